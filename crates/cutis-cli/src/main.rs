@@ -1,0 +1,2 @@
+//! The `cutis` program.
+fn main() {}

@@ -1,0 +1,67 @@
+//! Voxel index → world millimetres, in the RAS+ frame.
+
+use nalgebra::{Matrix4, Point3, Vector3};
+
+use crate::VolumeError;
+
+/// Invertible affine map from continuous voxel index `(i, j, k)` to RAS+ world millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Affine {
+    to_mm: Matrix4<f64>,
+    to_index: Matrix4<f64>,
+}
+
+impl Affine {
+    /// From the four rows of the homogeneous matrix, as NIfTI and nibabel write it.
+    ///
+    /// # Errors
+    /// [`VolumeError::SingularAffine`] if a value is not finite, the last row is not `0 0 0 1`, or the map is not invertible.
+    pub fn from_rows(rows: [[f64; 4]; 4]) -> Result<Self, VolumeError> {
+        let to_mm = Matrix4::from_fn(|r, c| rows[r][c]);
+        let finite = to_mm.iter().all(|v| v.is_finite()) && rows[3] == [0.0, 0.0, 0.0, 1.0];
+        match to_mm.try_inverse().filter(|inverse| finite && inverse.iter().all(|v| v.is_finite())) {
+            Some(to_index) => Ok(Self { to_mm, to_index }),
+            None => Err(VolumeError::SingularAffine { rows }),
+        }
+    }
+
+    /// Axis-aligned: `spacing_mm` along +R, +A, +S and the centre of voxel (0, 0, 0) at `origin_mm`.
+    ///
+    /// # Errors
+    /// As [`Affine::from_rows`], for a spacing of zero or a value that is not finite.
+    pub fn from_spacing(spacing_mm: [f64; 3], origin_mm: [f64; 3]) -> Result<Self, VolumeError> {
+        let [sx, sy, sz] = spacing_mm;
+        let [ox, oy, oz] = origin_mm;
+        Self::from_rows([[sx, 0.0, 0.0, ox], [0.0, sy, 0.0, oy], [0.0, 0.0, sz, oz], [0.0, 0.0, 0.0, 1.0]])
+    }
+
+    /// The four rows of index → mm.
+    pub fn rows(&self) -> [[f64; 4]; 4] {
+        std::array::from_fn(|r| std::array::from_fn(|c| self.to_mm[(r, c)]))
+    }
+
+    /// World position of a continuous index, mm.
+    pub fn to_mm(&self, index: Point3<f64>) -> Point3<f64> {
+        self.to_mm.transform_point(&index)
+    }
+
+    /// Continuous index of a world position given in mm.
+    pub fn to_index(&self, mm: Point3<f64>) -> Point3<f64> {
+        self.to_index.transform_point(&mm)
+    }
+
+    /// Column `axis`: the step in mm from one voxel to the next along that index axis.
+    pub fn step_mm(&self, axis: usize) -> Vector3<f64> {
+        self.to_mm.fixed_view::<3, 1>(0, axis).into_owned()
+    }
+
+    /// Lengths of the three index steps, mm.
+    pub fn spacing_mm(&self) -> [f64; 3] {
+        std::array::from_fn(|axis| self.step_mm(axis).norm())
+    }
+
+    /// Signed volume of one voxel, mm³; negative for a left-handed index frame.
+    pub fn voxel_volume_mm3(&self) -> f64 {
+        self.to_mm.fixed_view::<3, 3>(0, 0).determinant()
+    }
+}

@@ -1,0 +1,12 @@
+//! CT volumes: geometry, NIfTI in and out, Hounsfield-unit tables, resampling to lattice points, a synthetic phantom.
+#![forbid(unsafe_code)]
+
+mod affine;
+mod error;
+mod grid;
+mod volume;
+
+pub use affine::Affine;
+pub use error::VolumeError;
+pub use grid::Grid;
+pub use volume::Volume;
