@@ -1,1 +1,32 @@
-//! cutis-coloring
+//! Graph colouring of constraints: index tuples in, groups without shared vertices out.
+//!
+//! Two constraints that share a vertex cannot be projected at the same time. A colouring gives each constraint a
+//! colour so that constraints of one colour share no vertex; a solver then runs colour after colour, and the
+//! constraints inside a colour in any order or in parallel, with the same result bit for bit. This crate knows
+//! nothing of what the constraints mean.
+//!
+//! ```
+//! use cutis_coloring::greedy;
+//!
+//! // A chain of four edges over five vertices needs two colours.
+//! let edges = [[0, 1], [1, 2], [2, 3], [3, 4]];
+//! let groups = greedy(&edges, 5)?;
+//! assert_eq!(groups.len(), 2);
+//! assert_eq!(groups.group(0), [0, 2]);
+//! assert_eq!(groups.group(1), [1, 3]);
+//! groups.verify(&edges, 5)?;
+//! # Ok::<(), cutis_coloring::ColoringError>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod error;
+mod greedy;
+mod groups;
+mod sort;
+mod statistics;
+mod verify;
+
+pub use error::ColoringError;
+pub use greedy::greedy;
+pub use groups::Groups;
+pub use statistics::Statistics;

@@ -1,0 +1,71 @@
+//! Whether groups are a valid colouring, and if not, what clashes.
+
+use crate::sort::filled;
+use crate::{ColoringError, Groups};
+
+impl Groups {
+    /// Checks that each constraint is in exactly one group and that no two constraints of a group share a vertex.
+    ///
+    /// Needs 8 bytes per vertex and 1 byte per constraint, and one pass.
+    ///
+    /// # Errors
+    /// [`ColoringError::Clash`] names the two constraints and the vertex; [`ColoringError::WrongLength`],
+    /// [`ColoringError::BrokenOffsets`], [`ColoringError::NotAPermutation`], [`ColoringError::VertexOutOfRange`] and
+    /// [`ColoringError::RepeatedVertex`] say what else is wrong.
+    pub fn verify<const N: usize>(
+        &self,
+        constraints: &[[u32; N]],
+        vertex_count: usize,
+    ) -> Result<(), ColoringError> {
+        let count = constraints.len();
+        if self.order.len() != count {
+            return Err(ColoringError::WrongLength { order_len: self.order.len(), count });
+        }
+        self.check_offsets()?;
+
+        let mut seen = filled(false, count)?;
+        // For each vertex, one more than the position in the order of the last constraint that has it.
+        let mut last = filled(0usize, vertex_count)?;
+        for group in 0..self.len() {
+            let start = self.offsets[group] as usize;
+            for position in start..self.offsets[group + 1] as usize {
+                let constraint = self.order[position];
+                match seen.get_mut(constraint as usize) {
+                    Some(seen) if !*seen => *seen = true,
+                    _ => return Err(ColoringError::NotAPermutation { position, constraint, count }),
+                }
+                for &vertex in &constraints[constraint as usize] {
+                    let Some(last) = last.get_mut(vertex as usize) else {
+                        let constraint = constraint as usize;
+                        return Err(ColoringError::VertexOutOfRange { constraint, vertex, vertex_count });
+                    };
+                    if *last == position + 1 {
+                        let constraint = constraint as usize;
+                        return Err(ColoringError::RepeatedVertex { constraint, vertex });
+                    }
+                    if *last > start {
+                        let first = self.order[*last - 1];
+                        return Err(ColoringError::Clash { group, first, second: constraint, vertex });
+                    }
+                    *last = position + 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_offsets(&self) -> Result<(), ColoringError> {
+        let order_len = self.order.len();
+        let broken = |position| ColoringError::BrokenOffsets { position, order_len };
+        if self.offsets.first() != Some(&0) {
+            return Err(broken(0));
+        }
+        if let Some(i) = self.offsets.windows(2).position(|pair| pair[1] < pair[0]) {
+            return Err(broken(i + 1));
+        }
+        if self.offsets.last().is_none_or(|&end| end as usize != order_len) {
+            return Err(broken(self.offsets.len() - 1));
+        }
+        Ok(())
+    }
+}
