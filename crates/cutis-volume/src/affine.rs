@@ -64,4 +64,30 @@ impl Affine {
     pub fn voxel_volume_mm3(&self) -> f64 {
         self.to_mm.fixed_view::<3, 3>(0, 0).determinant()
     }
+
+    /// Largest |cosine| between two of the index axes: 0 where they are perpendicular.
+    pub fn shear(&self) -> f64 {
+        let axes: [Vector3<f64>; 3] = std::array::from_fn(|axis| self.step_mm(axis).normalize());
+        [(0, 1), (0, 2), (1, 2)].map(|(a, b)| axes[a].dot(&axes[b]).abs()).into_iter().fold(0.0, f64::max)
+    }
+
+    /// True if the axes are not perpendicular beyond the rounding of a header written in f32 or in decimals
+    /// (a gantry tilt of 0.01° is more): such a map is no rotation with spacings, and a NIfTI qform cannot hold it.
+    pub fn is_sheared(&self) -> bool {
+        self.shear() > 1e-4
+    }
+
+    /// Where each index axis points, to the nearest: `R`/`L`, `A`/`P`, `S`/`I`, as in `RAS`.
+    pub fn orientation(&self) -> [char; 3] {
+        let cosine = |world: usize, axis: usize| self.step_mm(axis)[world] / self.spacing_mm()[axis];
+        let permutations = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        let score = |worlds: &[usize; 3]| (0..3).map(|axis| cosine(worlds[axis], axis).abs()).sum::<f64>();
+        // The first of equals, so that a tie at 45° has one answer.
+        let best = permutations.into_iter().reduce(|a, b| if score(&b) > score(&a) { b } else { a });
+        let worlds = best.unwrap_or([0, 1, 2]);
+        std::array::from_fn(|axis| {
+            let [positive, negative] = [['R', 'L'], ['A', 'P'], ['S', 'I']][worlds[axis]];
+            if cosine(worlds[axis], axis) > 0.0 { positive } else { negative }
+        })
+    }
 }

@@ -1,6 +1,8 @@
 //! The crate's error type.
 
-/// Everything that can be wrong with a volume or its file.
+use std::path::PathBuf;
+
+/// Everything that can be wrong with a volume, its file, a table or a lattice.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
@@ -9,7 +11,7 @@ pub enum VolumeError {
     VoxelCount {
         /// Voxels per axis.
         shape: [usize; 3],
-        /// Product of the shape.
+        /// Product of the shape, saturated.
         expected: usize,
         /// Length of the data.
         found: usize,
@@ -19,5 +21,144 @@ pub enum VolumeError {
     SingularAffine {
         /// The four rows.
         rows: [[f64; 4]; 4],
+    },
+    /// The operating system refused: missing file, no permission, disk full, damaged gzip stream.
+    #[error("cannot {action} {path}: {source}")]
+    Io {
+        /// The file the user named.
+        path: PathBuf,
+        /// What was tried: `read`, `write`, `create`, …
+        action: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The name does not end in a NIfTI extension.
+    #[error("{path}: expected a file name that ends in {expected}")]
+    Extension {
+        /// The file the user named.
+        path: PathBuf,
+        /// The extensions that would do.
+        expected: &'static str,
+    },
+    /// A `.hdr` without its `.img`, or the other way round.
+    #[error("{path} is one half of a NIfTI pair, and the other half {partner} is not beside it")]
+    MissingPartner {
+        /// The file the user named.
+        path: PathBuf,
+        /// The file that should be there.
+        partner: PathBuf,
+    },
+    /// The first bytes are no NIfTI header.
+    #[error("{path} is not a NIfTI file: {reason}")]
+    NotNifti {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        reason: &'static str,
+    },
+    /// A header field holds a value that cannot be right.
+    #[error("{path}: header field {field} is {value}, expected {expected}")]
+    Header {
+        /// The file.
+        path: PathBuf,
+        /// Name of the field in the NIfTI standard.
+        field: &'static str,
+        /// What it holds.
+        value: String,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// Colour, complex or other voxels that are not one real number.
+    #[error(
+        "{path}: voxel type {dtype} (code {code}) is not a CT: expected one integer or real number per voxel"
+    )]
+    VoxelType {
+        /// The file.
+        path: PathBuf,
+        /// Name of the type.
+        dtype: &'static str,
+        /// `datatype` in the header.
+        code: i16,
+    },
+    /// A time series or several channels.
+    #[error("{path} holds {count} volumes (dim {dim:?}): expected one; extract the one to use first")]
+    SeveralVolumes {
+        /// The file.
+        path: PathBuf,
+        /// How many.
+        count: u64,
+        /// Sizes of all axes.
+        dim: Vec<u64>,
+    },
+    /// The file ends before its last voxel.
+    #[error(
+        "{path} is truncated: the header promises {expected_bytes} bytes of voxels, {found_bytes} are there"
+    )]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Voxels × bytes per voxel.
+        expected_bytes: u64,
+        /// Bytes found after the header.
+        found_bytes: u64,
+    },
+    /// More voxels than this program, or this machine, can address.
+    #[error("{path}: {shape:?} voxels are more than this machine can hold")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Voxels per axis.
+        shape: [u64; 3],
+    },
+    /// HU that do not fit into int16.
+    #[error(
+        "{path}: values from {min} to {max} HU do not fit into int16 (-32768 to 32767 HU); is this a CT in Hounsfield units?"
+    )]
+    Range {
+        /// The file.
+        path: PathBuf,
+        /// Lowest value, HU.
+        min: f64,
+        /// Highest value, HU.
+        max: f64,
+    },
+    /// A voxel is plus or minus infinity.
+    #[error("{path}: voxel {index:?} is {value}: expected finite values (NaN counts as air)")]
+    Infinite {
+        /// The file.
+        path: PathBuf,
+        /// Index of the first such voxel.
+        index: [usize; 3],
+        /// Infinity or minus infinity.
+        value: f64,
+    },
+    /// NIfTI-1 cannot hold this shape.
+    #[error("{path}: shape {shape:?} cannot be written: NIfTI-1 holds 1 to 32767 voxels per axis")]
+    WriteShape {
+        /// The target.
+        path: PathBuf,
+        /// Voxels per axis.
+        shape: [usize; 3],
+    },
+    /// The affine has a shear, which a qform cannot represent and ITK refuses.
+    #[error(
+        "{path}: the voxel axes are not perpendicular (largest cosine between two {cosine:.6}), which a NIfTI qform cannot hold; \
+         resample to an orthogonal grid first"
+    )]
+    Sheared {
+        /// The target.
+        path: PathBuf,
+        /// Largest |cosine| between two index axes.
+        cosine: f64,
+    },
+    /// A streaming writer got more or fewer voxels than its grid has.
+    #[error("{path}: {found} voxels were pushed, the grid has {expected}")]
+    Pushed {
+        /// The target.
+        path: PathBuf,
+        /// Voxels of the grid.
+        expected: usize,
+        /// Voxels pushed.
+        found: usize,
     },
 }

@@ -4,9 +4,12 @@
 mod affine;
 mod error;
 mod grid;
+pub mod nifti;
+mod partial_file;
 mod volume;
 
 pub use affine::Affine;
 pub use error::VolumeError;
 pub use grid::Grid;
+pub use partial_file::PartialFile;
 pub use volume::Volume;

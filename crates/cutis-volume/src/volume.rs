@@ -21,7 +21,11 @@ impl Volume {
     /// [`VolumeError::VoxelCount`] if the number of voxels is not the product of the shape.
     pub fn new(grid: Grid, voxels: Vec<i16>, slope: f32, intercept: f32) -> Result<Self, VolumeError> {
         if voxels.len() != grid.len() {
-            return Err(VolumeError::VoxelCount { shape: grid.shape, expected: grid.len(), found: voxels.len() });
+            return Err(VolumeError::VoxelCount {
+                shape: grid.shape,
+                expected: grid.len(),
+                found: voxels.len(),
+            });
         }
         Ok(Self { grid, voxels, slope, intercept })
     }

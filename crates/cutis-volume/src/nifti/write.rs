@@ -1,0 +1,157 @@
+//! NIfTI-1 out: int16, millimetres, qform and sform the same with code 1.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::encode::encode;
+use super::gzip::GzipWriter;
+use crate::{Grid, PartialFile, Volume, VolumeError};
+
+/// Voxels converted to bytes at a time.
+const PORTION: usize = 1 << 16;
+
+/// Writes `volume` to a `.nii` or `.nii.gz` file.
+///
+/// HU are written as they are (slope 1, intercept 0) where all of them are whole numbers within int16; otherwise the stored
+/// values are written, with the volume's slope and intercept in the header. The file appears under its name when it is complete.
+///
+/// # Errors
+/// As [`Writer::create`] and [`Writer::push_slices`].
+pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), VolumeError> {
+    let path = path.as_ref();
+    let whole = |hu: f32| hu == hu.trunc() && (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&hu);
+    if volume.slope() == 1.0 && volume.intercept() == 0.0 {
+        let mut writer = Writer::create(path, *volume.grid())?;
+        writer.push_slices(volume.voxels())?;
+        writer.finish()
+    } else if volume.voxels().iter().all(|&stored| whole(volume.hu(stored))) {
+        let mut writer = Writer::create(path, *volume.grid())?;
+        for portion in volume.voxels().chunks(PORTION) {
+            let hu: Vec<i16> = portion.iter().map(|&stored| volume.hu(stored) as i16).collect();
+            writer.push_slices(&hu)?;
+        }
+        writer.finish()
+    } else {
+        let mut writer = Writer::create_scaled(path, *volume.grid(), volume.slope(), volume.intercept())?;
+        writer.push_slices(volume.voxels())?;
+        writer.finish()
+    }
+}
+
+/// Writes a volume slice by slice, so that it never has to be in memory as a whole.
+///
+/// `.nii.gz` is compressed in parallel into one gzip member whose bytes do not depend on the number of threads.
+/// The file appears under its name at [`Writer::finish`]; a writer dropped before that leaves nothing behind.
+///
+/// ```
+/// use cutis_volume::{Affine, Grid, nifti};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("ramp.nii.gz");
+/// let affine = Affine::from_spacing([1.0, 1.0, 2.5], [0.0; 3])?;
+/// let mut writer = nifti::Writer::create(&path, Grid { shape: [4, 3, 2], affine })?;
+/// writer.push_slices(&[-1000; 12])?;
+/// writer.push_slices(&[40; 12])?;
+/// writer.finish()?;
+/// assert!(path.exists());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Writer {
+    sink: Sink,
+    path: PathBuf,
+    expected: usize,
+    pushed: usize,
+}
+
+enum Sink {
+    Plain(BufWriter<PartialFile>),
+    Gzip(GzipWriter<PartialFile>),
+}
+
+impl Sink {
+    fn as_write(&mut self) -> &mut dyn Write {
+        match self {
+            Self::Plain(file) => file,
+            Self::Gzip(file) => file,
+        }
+    }
+}
+
+impl Writer {
+    /// Opens the file and writes the header for HU as they are (slope 1, intercept 0).
+    ///
+    /// # Errors
+    /// [`VolumeError::Extension`], [`VolumeError::WriteShape`], [`VolumeError::Sheared`] for a grid whose axes are not
+    /// perpendicular, [`VolumeError::Io`].
+    pub fn create(path: impl AsRef<Path>, grid: Grid) -> Result<Self, VolumeError> {
+        Self::create_scaled(path, grid, 1.0, 0.0)
+    }
+
+    /// As [`Writer::create`], for stored values with `HU = slope · stored + intercept`.
+    ///
+    /// # Errors
+    /// As [`Writer::create`].
+    pub fn create_scaled(
+        path: impl AsRef<Path>,
+        grid: Grid,
+        slope: f32,
+        intercept: f32,
+    ) -> Result<Self, VolumeError> {
+        let path = path.as_ref();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let gzip = name.ends_with(".nii.gz");
+        if !gzip && !name.ends_with(".nii") {
+            return Err(VolumeError::Extension { path: path.into(), expected: ".nii or .nii.gz" });
+        }
+        let header = encode(path, &grid, slope, intercept)?;
+        let file = PartialFile::create(path)?;
+        let failed = |source| VolumeError::Io { path: path.into(), action: "write", source };
+        let mut sink = match gzip {
+            true => Sink::Gzip(GzipWriter::new(file).map_err(failed)?),
+            false => Sink::Plain(BufWriter::with_capacity(1 << 20, file)),
+        };
+        sink.as_write().write_all(&header).map_err(failed)?;
+        Ok(Self { sink, path: path.into(), expected: grid.len(), pushed: 0 })
+    }
+
+    /// Appends voxels, index `i` fastest: whole slices or any other portion.
+    ///
+    /// # Errors
+    /// [`VolumeError::Pushed`] if these are more voxels than the grid has left, [`VolumeError::Io`].
+    pub fn push_slices(&mut self, voxels: &[i16]) -> Result<(), VolumeError> {
+        self.pushed = self.pushed.saturating_add(voxels.len());
+        if self.pushed > self.expected {
+            return Err(self.wrong_count());
+        }
+        let mut bytes = Vec::with_capacity(2 * PORTION.min(voxels.len()));
+        for portion in voxels.chunks(PORTION) {
+            bytes.clear();
+            bytes.extend(portion.iter().flat_map(|voxel| voxel.to_le_bytes()));
+            self.sink.as_write().write_all(&bytes).map_err(|source| self.failed(source))?;
+        }
+        Ok(())
+    }
+
+    /// Completes the file and gives it its name.
+    ///
+    /// # Errors
+    /// [`VolumeError::Pushed`] if voxels are missing, [`VolumeError::Io`].
+    pub fn finish(self) -> Result<(), VolumeError> {
+        if self.pushed != self.expected {
+            return Err(self.wrong_count());
+        }
+        let Self { sink, path, .. } = self;
+        let file = match sink {
+            Sink::Plain(buffer) => buffer.into_inner().map_err(io::IntoInnerError::into_error),
+            Sink::Gzip(gzip) => gzip.finish(),
+        };
+        file.map_err(|source| VolumeError::Io { path, action: "write", source })?.commit()
+    }
+
+    fn wrong_count(&self) -> VolumeError {
+        VolumeError::Pushed { path: self.path.clone(), expected: self.expected, found: self.pushed }
+    }
+
+    fn failed(&self, source: io::Error) -> VolumeError {
+        VolumeError::Io { path: self.path.clone(), action: "write", source }
+    }
+}
