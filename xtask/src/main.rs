@@ -1,0 +1,56 @@
+//! Developer commands of the workspace, started by `cargo xtask`: the tests, the checks they consist of, and nothing else.
+
+mod deny;
+mod python;
+mod spdx;
+mod steps;
+mod tidy;
+mod workspace;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use workspace::Workspace;
+
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+  test [--quick]      everything a change must pass; --quick leaves out the slow steps and lists them
+  ci                  the same with CI=true: nothing may be skipped, the lock files must be up to date
+  tidy                layers, file headers, unsafe, paths named in the docs, links, manifests
+  licences            licences, bans and sources of every dependency, by deny.toml
+  python              outputs and awkward inputs compared with nibabel and SimpleITK
+  publish --dry-run   packages every crate as for crates.io and builds it from the package";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match dispatch(&words) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nerror: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn dispatch(words: &[&str]) -> Result<()> {
+    let workspace = Workspace::find()?;
+    match words {
+        ["test"] => steps::run_all(&workspace, false),
+        ["test", "--quick"] => steps::run_all(&workspace, true),
+        ["ci"] => steps::run_all(&workspace.in_ci(), false),
+        ["tidy"] => tidy::run(&workspace),
+        ["licences"] => deny::run(&workspace),
+        ["python"] => steps::build_program(&workspace).and_then(|()| python::run(&workspace)),
+        ["publish", "--dry-run"] => steps::publish_dry_run(&workspace),
+        ["publish"] => bail!(
+            "only `cargo xtask publish --dry-run` is offered; a release is made by `cargo publish --workspace`"
+        ),
+        [] | ["help" | "--help" | "-h"] => {
+            println!("{USAGE}");
+            Ok(())
+        }
+        other => bail!("unknown command `{}`\n\n{USAGE}", other.join(" ")),
+    }
+}

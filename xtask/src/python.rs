@@ -1,0 +1,111 @@
+//! `cargo xtask python`: runs the checks of `tests/python` in a private environment with pinned packages.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+
+use crate::workspace::{Workspace, execute};
+
+/// Prepares the environment (again only if its requirements changed) and runs every check.
+pub fn run(workspace: &Workspace) -> Result<()> {
+    let target = workspace.target_dir()?;
+    let python = environment(workspace, &target.join("venv"))?;
+    let program = target.join("release").join(format!("cutis{}", std::env::consts::EXE_SUFFIX));
+    if !program.is_file() {
+        bail!("{} is missing; build it with `cargo build --release -p cutis-cli`", program.display());
+    }
+    for script in scripts(&workspace.root.join("tests/python"))? {
+        let mut command = workspace.command(&python);
+        execute(command.arg(&script).env("CUTIS_PROGRAM", &program).env("PYTHONDONTWRITEBYTECODE", "1"))?;
+    }
+    Ok(())
+}
+
+/// The checks: every `*.py` in order of name, but for `_*.py`, which the checks share.
+fn scripts(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut scripts = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        if name.ends_with(".py") && !name.starts_with('_') {
+            scripts.push(path);
+        }
+    }
+    if scripts.is_empty() {
+        bail!("no checks in {}", folder.display());
+    }
+    scripts.sort();
+    Ok(scripts)
+}
+
+/// The interpreter of the environment in `folder`, made or renewed when its stamp does not fit.
+fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
+    let requirements = workspace.root.join("tests/python/requirements.txt");
+    let wanted =
+        std::fs::read_to_string(&requirements).with_context(|| requirements.display().to_string())?;
+    let version = require_python(workspace)?;
+    let stamp = folder.join("requirements.stamp");
+    let wanted_stamp = format!("{version}\n{wanted}");
+    let bin = if cfg!(windows) { "Scripts" } else { "bin" };
+    let python = folder.join(bin).join("python");
+    if std::fs::read_to_string(&stamp).is_ok_and(|found| found == wanted_stamp) && python.exists() {
+        return Ok(python);
+    }
+    execute(workspace.command(PYTHON).args(["-m", "venv", "--clear"]).arg(folder))
+        .context("cannot make a Python environment; on Debian: apt-get install -y python3-venv")?;
+    execute(
+        workspace
+            .command(&python)
+            .args([
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--disable-pip-version-check",
+                "--only-binary",
+                ":all:",
+                "-r",
+            ])
+            .arg(&requirements),
+    )
+    .context("cannot install the packages of tests/python/requirements.txt (is PyPI reachable?)")?;
+    std::fs::write(&stamp, wanted_stamp).with_context(|| stamp.display().to_string())?;
+    Ok(python)
+}
+
+const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
+
+/// The version of the system's Python, or what to install.
+fn require_python(workspace: &Workspace) -> Result<String> {
+    let Ok(output) = workspace.command(PYTHON).arg("--version").output() else {
+        bail!("{PYTHON} is missing; on Debian: apt-get install -y python3 python3-venv");
+    };
+    let complete = workspace.command(PYTHON).args(["-c", "import ensurepip, venv"]).output();
+    if !complete.is_ok_and(|output| output.status.success()) {
+        bail!(
+            "{PYTHON} cannot make environments (venv or pip is missing); on Debian: apt-get install -y python3-venv"
+        );
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checks_are_found_and_helpers_are_not() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python");
+        let names: Vec<String> = scripts(&folder)
+            .unwrap()
+            .iter()
+            .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
+            .collect();
+        assert_eq!(names, ["awkward.py", "outputs.py"]);
+    }
+
+    #[test]
+    fn a_folder_without_checks_is_an_error() {
+        assert!(scripts(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).is_err());
+    }
+}

@@ -1,0 +1,154 @@
+//! The steps of `cargo xtask test`, in order, each timed; the first failure ends the run.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use crate::workspace::{Workspace, execute};
+use crate::{deny, python, tidy};
+
+struct Step {
+    name: &'static str,
+    /// Also part of `--quick`.
+    quick: bool,
+    run: fn(&Workspace) -> Result<()>,
+}
+
+const STEPS: &[Step] = &[
+    Step { name: "format", quick: true, run: format },
+    Step { name: "tidy", quick: true, run: tidy::run },
+    Step { name: "licences", quick: true, run: deny::run },
+    Step { name: "xtask", quick: true, run: xtask },
+    Step { name: "clippy", quick: true, run: clippy },
+    Step { name: "tests", quick: true, run: tests },
+    Step { name: "documentation", quick: false, run: documentation },
+    Step { name: "program", quick: false, run: build_program },
+    Step { name: "python", quick: false, run: python::run },
+    Step { name: "publish --dry-run", quick: false, run: publish_dry_run },
+];
+
+/// Runs every step, or with `quick` the quick ones; prints what was run, how long it took and what was left out.
+pub fn run_all(workspace: &Workspace, quick: bool) -> Result<()> {
+    if quick && workspace.ci {
+        bail!("`--quick` leaves steps out, and CI is set: run `cargo xtask test`");
+    }
+    let start = Instant::now();
+    let mut outcomes = Vec::new();
+    let mut failure = None;
+    for (number, step) in STEPS.iter().enumerate() {
+        if failure.is_some() {
+            outcomes.push((step.name, "not reached", None));
+        } else if quick && !step.quick {
+            outcomes.push((step.name, "left out by --quick", None));
+        } else {
+            println!("\n=== {}/{} {}", number + 1, STEPS.len(), step.name);
+            let step_start = Instant::now();
+            let result = (step.run)(workspace).with_context(|| format!("step `{}` failed", step.name));
+            outcomes.push((
+                step.name,
+                if result.is_ok() { "passed" } else { "FAILED" },
+                Some(step_start.elapsed()),
+            ));
+            println!("=== {} took {:.1} s", step.name, step_start.elapsed().as_secs_f64());
+            failure = result.err();
+        }
+    }
+    print!("\n{}", summary(&outcomes, start.elapsed()));
+    failure.map_or(Ok(()), Err)
+}
+
+fn summary(outcomes: &[(&str, &str, Option<Duration>)], total: Duration) -> String {
+    let mut table = String::new();
+    for (name, outcome, time) in outcomes {
+        let time = time.map_or_else(String::new, |time| format!("{:8.1} s", time.as_secs_f64()));
+        table += format!("{name:<20}{outcome:<22}{time}").trim_end();
+        table.push('\n');
+    }
+    table + &format!("{:<20}{:<22}{:8.1} s\n", "total", "", total.as_secs_f64())
+}
+
+fn format(workspace: &Workspace) -> Result<()> {
+    require_component(workspace, "fmt", "rustfmt")?;
+    execute(workspace.cargo("fmt").args(["--all", "--check"]))?;
+    execute(workspace.cargo("fmt").arg("--manifest-path").arg(workspace.xtask_manifest()).arg("--check"))
+}
+
+fn xtask(workspace: &Workspace) -> Result<()> {
+    require_component(workspace, "clippy", "clippy")?;
+    let manifest = workspace.xtask_manifest();
+    execute(
+        workspace
+            .cargo("clippy")
+            .arg("--manifest-path")
+            .arg(&manifest)
+            .args(["--all-targets", "--quiet"])
+            .args(DENY),
+    )?;
+    execute(workspace.cargo("test").arg("--manifest-path").arg(&manifest).arg("--quiet"))
+}
+
+const DENY: [&str; 3] = ["--", "-D", "warnings"];
+
+fn clippy(workspace: &Workspace) -> Result<()> {
+    require_component(workspace, "clippy", "clippy")?;
+    execute(workspace.cargo("clippy").args(["--workspace", "--all-targets", "--quiet"]).args(DENY))
+}
+
+/// Unit tests, integration tests and doctests.
+fn tests(workspace: &Workspace) -> Result<()> {
+    execute(workspace.cargo("test").args(["--workspace", "--no-fail-fast"]))
+}
+
+/// Libraries only: the program `cutis` and the crate `cutis` would write the same page.
+fn documentation(workspace: &Workspace) -> Result<()> {
+    let mut command = workspace.cargo("doc");
+    execute(command.args(["--workspace", "--lib", "--no-deps", "--quiet"]).env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+/// Builds the release program, which the Python checks run.
+pub fn build_program(workspace: &Workspace) -> Result<()> {
+    execute(workspace.cargo("build").args(["--release", "--package", "cutis-cli"]))
+}
+
+/// Packages every publishable crate and builds each from its package. Outside CI a dirty checkout is allowed.
+pub fn publish_dry_run(workspace: &Workspace) -> Result<()> {
+    let mut command = workspace.cargo("publish");
+    command.args(["--workspace", "--dry-run", "--quiet"]);
+    if !workspace.ci {
+        command.arg("--allow-dirty");
+    }
+    execute(&mut command)
+}
+
+fn require_component(workspace: &Workspace, subcommand: &str, component: &str) -> Result<()> {
+    let found =
+        workspace.command(workspace.cargo(subcommand).get_program()).args([subcommand, "--version"]).output();
+    if !found.is_ok_and(|output| output.status.success()) {
+        bail!("`cargo {subcommand}` is missing; install it with `rustup component add {component}`");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_summary_names_every_step_with_its_outcome() {
+        let second = Some(Duration::from_secs(1));
+        let table = summary(
+            &[("tidy", "passed", second), ("tests", "FAILED", second), ("python", "not reached", None)],
+            Duration::from_secs(2),
+        );
+        let lines: Vec<&str> = table.lines().collect();
+        assert_eq!(lines.len(), 4);
+        assert!(lines[1].starts_with("tests") && lines[1].contains("FAILED") && lines[1].ends_with("1.0 s"));
+        assert!(lines[2].ends_with("not reached"));
+    }
+
+    #[test]
+    fn quick_is_refused_in_ci() {
+        let workspace = Workspace { root: ".".into(), ci: true };
+        assert!(run_all(&workspace, true).unwrap_err().to_string().contains("--quick"));
+    }
+}

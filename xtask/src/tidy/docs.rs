@@ -1,0 +1,165 @@
+//! Rules about pages: links lead somewhere, named paths exist, examples are not switched off.
+
+use super::Finding;
+use super::files::Files;
+use super::rules::is_ignored_fence;
+
+/// Endings by which a word in backticks is taken for a file of the repository.
+const FILE_ENDINGS: [&str; 6] = [".rs", ".md", ".toml", ".py", ".wgsl", ".sh"];
+
+/// Relative links and pictures of a page whose target does not exist.
+pub fn links(page: &str, text: &str, files: &Files) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (number, line) in prose(text) {
+        for target in link_targets(&without_code(line)) {
+            let path = target.split('#').next().unwrap_or_default();
+            if path.is_empty() || target.contains("://") || target.starts_with("mailto:") {
+                continue;
+            }
+            match resolve(page, path) {
+                Some(path) if files.exists(&path) => {}
+                _ => findings.push(Finding::failure(
+                    page,
+                    number,
+                    format!("the link to `{target}` leads nowhere"),
+                )),
+            }
+        }
+    }
+    findings
+}
+
+/// Words in backticks that look like a path of the repository and are none.
+pub fn named_paths(page: &str, text: &str, files: &Files) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (number, line) in prose(text) {
+        for name in line.split('`').skip(1).step_by(2).filter(|name| looks_like_path(name, files)) {
+            let found = if name.contains('/') { files.exists(name) } else { files.has_name(name) };
+            if !found {
+                findings.push(Finding::failure(page, number, format!("`{name}` does not exist")));
+            }
+        }
+    }
+    findings
+}
+
+/// Code blocks that doctests would leave out.
+pub fn ignored_examples(page: &str, text: &str) -> Vec<Finding> {
+    let ignored = text.lines().enumerate().filter(|(_, line)| is_ignored_fence(line.trim_start()));
+    ignored
+        .map(|(index, _)| Finding::failure(page, index + 1, "an example is ignored: make it compile"))
+        .collect()
+}
+
+/// Lines outside code blocks, numbered from 1.
+fn prose(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let mut in_code = false;
+    text.lines().enumerate().filter_map(move |(index, line)| {
+        let fence = line.trim_start().starts_with("```");
+        in_code ^= fence;
+        (!in_code && !fence).then_some((index + 1, line))
+    })
+}
+
+/// The line with what stands in backticks removed.
+fn without_code(line: &str) -> String {
+    line.split('`').step_by(2).collect::<Vec<_>>().join("``")
+}
+
+/// Targets of `[text](target)`, `![alt](target)`, `[label]: target` and `src="target"`.
+fn link_targets(line: &str) -> Vec<String> {
+    let mut targets = Vec::new();
+    for (open, close) in [("](", ')'), ("src=\"", '"'), ("href=\"", '"')] {
+        for piece in line.split(open).skip(1) {
+            let target = piece.split(close).next().unwrap_or_default();
+            targets.extend(
+                target.split_whitespace().next().map(|target| target.trim_matches(['<', '>']).to_owned()),
+            );
+        }
+    }
+    if let Some((label, target)) = line.split_once("]: ")
+        && label.starts_with('[')
+    {
+        targets.extend(target.split_whitespace().next().map(str::to_owned));
+    }
+    targets
+}
+
+/// The path from the root that a link on `page` means; none if it leaves the repository.
+fn resolve(page: &str, link: &str) -> Option<String> {
+    let mut parts: Vec<&str> = page.split('/').collect();
+    parts.pop();
+    for part in link.trim_end_matches('/').split('/') {
+        match part {
+            "." | "" => {}
+            ".." => {
+                parts.pop()?;
+            }
+            name => parts.push(name),
+        }
+    }
+    Some(parts.join("/"))
+}
+
+/// `crates/cutis/src/lib.rs`, `docs/book/`, `deny.toml`; neither `f32/f64` nor `cutis run SCENE` nor `a::b`.
+fn looks_like_path(name: &str, files: &Files) -> bool {
+    let plain = |character: char| character.is_ascii_alphanumeric() || "._-/".contains(character);
+    if name.is_empty() || !name.chars().all(plain) || name.starts_with('/') {
+        return false;
+    }
+    let is_file = FILE_ENDINGS.iter().any(|ending| name.len() > ending.len() && name.ends_with(ending));
+    let top = name.split('/').next().unwrap_or_default();
+    is_file || (name.contains('/') && (name.ends_with('/') || files.exists(&format!("{top}/"))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files() -> Files {
+        Files::of(&[
+            "README.md",
+            "docs/ARCHITECTURE.md",
+            "docs/book/theory.md",
+            "crates/cutis/src/lib.rs",
+            "deny.toml",
+        ])
+    }
+
+    #[test]
+    fn links_that_resolve_pass() {
+        let page = "[a](../ARCHITECTURE.md#layers) [b](https://x.org/y) [c](#here) ![d](./theory.md \"title\")\n\
+                    [root](../..)\n[label]: ../../README.md\n<img src=\"../../deny.toml\">\n";
+        assert_eq!(links("docs/book/theory.md", page, &files()), []);
+    }
+
+    #[test]
+    fn dead_links_are_caught() {
+        let page = "[a](gone.md)\n![b](../gone.png)\n[c](../../../README.md)\n[label]: gone.md\n<img src=\"gone.png\">\n";
+        assert_eq!(links("docs/book/theory.md", page, &files()).len(), 5);
+    }
+
+    #[test]
+    fn links_in_code_are_no_links() {
+        assert_eq!(links("README.md", "```\n[a](gone.md)\n```\n`x[0](gone)`\n", &files()), []);
+    }
+
+    #[test]
+    fn named_paths_must_exist() {
+        let check = |text: &str| named_paths("docs/ARCHITECTURE.md", text, &files()).len();
+        assert_eq!(check("`crates/cutis/src/lib.rs` `docs/book/` `lib.rs` `deny.toml`\n"), 0);
+        assert_eq!(check("`f32/f64` `N/m` `cutis run SCENE` `a::b` `report.json` `.rs`\n"), 0);
+        assert_eq!(
+            check(
+                "`crates/cutis/src/gone.rs`\n`docs/gone/`\n`docs/gone`\n`gone.rs`\n`shaders/wgsl/x.wgsl`\n"
+            ),
+            5
+        );
+    }
+
+    #[test]
+    fn ignored_examples_are_caught() {
+        assert_eq!(ignored_examples("a.md", "```rust,ignore\nx\n```\n").len(), 1);
+        assert_eq!(ignored_examples("a.md", "```toml\nx = 1\n```\n").len(), 0);
+    }
+}

@@ -1,0 +1,203 @@
+//! The layers of the workspace: a crate depends only on crates of lower layers, and only on those named for it.
+
+use anyhow::{Context, Result};
+use serde_json::Value;
+
+use super::Finding;
+
+/// One crate of the table.
+struct Layer {
+    name: &'static str,
+    level: u8,
+    may_use: MayUse,
+}
+
+/// Which crates of lower layers a crate may depend on.
+enum MayUse {
+    These(&'static [&'static str]),
+    AnyBelow,
+}
+
+use MayUse::{AnyBelow, These};
+
+/// The table of `docs/ARCHITECTURE.md`. A new crate gets a row here first.
+const LAYERS: &[Layer] = &[
+    Layer { name: "cutis-coloring", level: 0, may_use: These(&[]) },
+    Layer { name: "cutis-volume", level: 1, may_use: These(&[]) },
+    Layer { name: "cutis-constraints", level: 1, may_use: These(&[]) },
+    Layer { name: "cutis-mesh", level: 2, may_use: These(&["cutis-volume"]) },
+    Layer { name: "cutis-solver", level: 2, may_use: These(&["cutis-constraints", "cutis-coloring"]) },
+    Layer {
+        name: "cutis-solver-cpu",
+        level: 3,
+        may_use: These(&["cutis-solver", "cutis-constraints", "cutis-coloring"]),
+    },
+    Layer { name: "cutis-resample", level: 3, may_use: These(&["cutis-volume", "cutis-mesh"]) },
+    Layer { name: "cutis-render", level: 3, may_use: These(&["cutis-volume", "cutis-mesh"]) },
+    Layer { name: "cutis", level: 5, may_use: AnyBelow },
+    Layer { name: "cutis-cli", level: 6, may_use: AnyBelow },
+];
+
+/// Uses what it likes, is used by none, and is not published.
+const OUTSIDE: &str = "cutis-tests";
+
+/// What the rule looks at of a workspace member.
+#[derive(Debug)]
+pub struct Package {
+    name: String,
+    publish: bool,
+    /// Names of normal and build dependencies.
+    dependencies: Vec<String>,
+}
+
+/// The members of the workspace, from `cargo metadata --no-deps`.
+pub fn packages(metadata: &Value) -> Result<Vec<Package>> {
+    let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
+    packages
+        .iter()
+        .map(|package| {
+            let dependencies =
+                package["dependencies"].as_array().context("a package without dependencies")?;
+            let dependencies = dependencies
+                .iter()
+                .filter(|dependency| dependency["kind"] != "dev")
+                .filter_map(|dependency| dependency["name"].as_str().map(str::to_owned))
+                .collect();
+            let name = package["name"].as_str().context("a package without a name")?.to_owned();
+            Ok(Package { name, publish: package["publish"] != Value::Array(Vec::new()), dependencies })
+        })
+        .collect()
+}
+
+/// Every arrow that does not point down, every crate without a row, every row without a crate.
+pub fn check(packages: &[Package]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for package in packages.iter().filter(|package| package.name == OUTSIDE && package.publish) {
+        findings.push(Finding::failure(&package.name, 0, "must not be published: set `publish = false`"));
+    }
+    for package in packages.iter().filter(|package| package.name != OUTSIDE) {
+        let Some(from) = find(&package.name) else {
+            findings.push(Finding::failure(&package.name, 0, "has no row in the table of layers"));
+            continue;
+        };
+        for dependency in &package.dependencies {
+            if packages.iter().any(|other| other.name == *dependency)
+                && let Some(complaint) = complaint(from, dependency)
+            {
+                findings.push(Finding::failure(&package.name, 0, complaint));
+            }
+        }
+    }
+    for row in LAYERS.iter().filter(|row| packages.iter().all(|package| package.name != row.name)) {
+        findings.push(Finding::failure(
+            row.name,
+            0,
+            "has a row in the table of layers but is no crate of the workspace",
+        ));
+    }
+    findings
+}
+
+fn complaint(from: &Layer, dependency: &str) -> Option<String> {
+    let Some(to) = find(dependency) else {
+        return Some(format!("depends on `{dependency}`, which is in no layer"));
+    };
+    if to.level >= from.level {
+        return Some(format!(
+            "layer {} depends on `{dependency}` of layer {}: arrows point down",
+            from.level, to.level
+        ));
+    }
+    match from.may_use {
+        These(names) if !names.contains(&dependency) => {
+            Some(format!("depends on `{dependency}`, which is not among {names:?}"))
+        }
+        _ => None,
+    }
+}
+
+fn find(name: &str) -> Option<&'static Layer> {
+    LAYERS.iter().find(|row| row.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    /// The whole table without dependencies, but for `name`'s.
+    fn with(name: &str, dependencies: &[&str]) -> Vec<Package> {
+        let dependencies: Vec<String> =
+            dependencies.iter().map(|&dependency| dependency.to_owned()).collect();
+        let names = LAYERS.iter().map(|row| row.name).chain((find(name).is_none()).then_some(name));
+        names
+            .map(|member| Package {
+                name: member.to_owned(),
+                publish: true,
+                dependencies: if member == name { dependencies.clone() } else { Vec::new() },
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_table_itself_points_down() {
+        for row in LAYERS {
+            if let These(names) = row.may_use {
+                assert!(
+                    names.iter().all(|name| find(name).is_some_and(|to| to.level < row.level)),
+                    "{}",
+                    row.name
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn downward_arrows_and_foreign_crates_pass() {
+        assert_eq!(check(&with("cutis-mesh", &["cutis-volume", "rayon"])), []);
+        assert_eq!(check(&with("cutis-cli", &["cutis", "cutis-volume"])), []);
+    }
+
+    #[test]
+    fn wrong_arrows_are_caught() {
+        for (name, dependency) in [
+            ("cutis-volume", "cutis-mesh"),     // up
+            ("cutis-render", "cutis-resample"), // sideways
+            ("cutis-mesh", "cutis-coloring"),   // down, but not named
+            ("cutis-constraints", "cutis"),     // far up
+        ] {
+            assert_eq!(check(&with(name, &[dependency])).len(), 1, "{name} -> {dependency}");
+        }
+    }
+
+    #[test]
+    fn unknown_and_missing_crates_are_caught() {
+        assert_eq!(check(&with("cutis-new", &[])).len(), 1);
+        let mut packages = with("cutis", &[]);
+        packages.retain(|package| package.name != "cutis-mesh");
+        assert_eq!(check(&packages).len(), 1);
+    }
+
+    #[test]
+    fn none_may_use_the_tests_and_they_stay_unpublished() {
+        let mut packages = with("cutis", &[OUTSIDE]);
+        packages.push(Package {
+            name: OUTSIDE.to_owned(),
+            publish: false,
+            dependencies: vec!["cutis".to_owned()],
+        });
+        assert_eq!(check(&packages).len(), 1);
+        packages.last_mut().unwrap().publish = true;
+        assert_eq!(check(&packages).len(), 2);
+    }
+
+    #[test]
+    fn build_dependencies_count_and_dev_dependencies_do_not() {
+        let metadata = json!({ "packages": [{ "name": "a", "publish": null, "dependencies": [
+            { "name": "normal", "kind": null }, { "name": "build", "kind": "build" }, { "name": "dev", "kind": "dev" }
+        ] }] });
+        let packages = packages(&metadata).unwrap();
+        assert_eq!(packages[0].dependencies, ["normal", "build"]);
+        assert!(packages[0].publish);
+    }
+}

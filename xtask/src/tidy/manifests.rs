@@ -1,0 +1,107 @@
+//! One fact in one place: members take versions, lints and dependencies from the workspace manifest.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde_json::Value;
+
+use super::Finding;
+
+/// Keys of `[package]` that have their one value in the workspace manifest.
+const INHERITED: [&str; 4] = ["version", "edition", "rust-version", "license"];
+
+/// Manifests of the members, by path from the root.
+pub fn members(metadata: &Value, root: &Path) -> Result<Vec<String>> {
+    let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
+    packages
+        .iter()
+        .map(|package| {
+            let path = Path::new(package["manifest_path"].as_str().context("a package without a manifest")?);
+            let path = path
+                .strip_prefix(root)
+                .with_context(|| format!("{} is outside the checkout", path.display()))?;
+            Ok(path.to_string_lossy().replace('\\', "/"))
+        })
+        .collect()
+}
+
+/// What a member's manifest says itself but should inherit.
+pub fn check(path: &str, text: &str) -> Vec<Finding> {
+    let table: toml::Table = match text.parse() {
+        Ok(table) => table,
+        Err(error) => return vec![Finding::failure(path, 0, format!("not TOML: {error}"))],
+    };
+    let failure = |message: String| Finding::failure(path, 0, message);
+    let mut findings = Vec::new();
+    for key in INHERITED {
+        if !inherits(table.get("package").and_then(|package| package.get(key))) {
+            findings.push(failure(format!("write `{key}.workspace = true` in [package]")));
+        }
+    }
+    if !inherits(table.get("lints")) {
+        findings.push(failure("write `workspace = true` in [lints]".to_owned()));
+    }
+    let targets = table.get("target").and_then(toml::Value::as_table);
+    let scopes = std::iter::once(&table)
+        .chain(targets.into_iter().flat_map(|targets| targets.values().filter_map(toml::Value::as_table)));
+    for scope in scopes {
+        for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let dependencies = scope.get(section).and_then(toml::Value::as_table);
+            for (name, value) in dependencies.into_iter().flatten() {
+                if !inherits(Some(value)) {
+                    findings.push(failure(format!(
+                        "`{name}` in [{section}]: its version belongs in the workspace manifest"
+                    )));
+                }
+            }
+        }
+    }
+    findings
+}
+
+fn inherits(value: Option<&toml::Value>) -> bool {
+    value.and_then(|value| value.get("workspace")).and_then(toml::Value::as_bool) == Some(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = "
+        [package]
+        name = \"a\"
+        version.workspace = true
+        edition.workspace = true
+        rust-version.workspace = true
+        license.workspace = true
+        [lints]
+        workspace = true
+        [dependencies]
+        rayon.workspace = true
+        serde = { workspace = true, optional = true }
+    ";
+
+    #[test]
+    fn a_member_that_inherits_everything_passes() {
+        assert_eq!(check("Cargo.toml", GOOD), []);
+    }
+
+    #[test]
+    fn each_own_value_is_caught() {
+        for (from, to) in [
+            ("version.workspace = true\n        edition", "version = \"1.0.0\"\n        edition"),
+            ("rust-version.workspace = true", "rust-version = \"1.80\""),
+            ("license.workspace = true", ""),
+            ("[lints]\n        workspace = true", ""),
+            ("rayon.workspace = true", "rayon = \"1\""),
+            (
+                "serde = { workspace = true, optional = true }",
+                "[target.'cfg(unix)'.dev-dependencies]\nlibc = \"0.2\"",
+            ),
+        ] {
+            assert!(GOOD.contains(from), "{from}");
+            assert_eq!(check("Cargo.toml", &GOOD.replace(from, to)).len(), 1, "{from} -> {to}");
+        }
+        assert_eq!(check("Cargo.toml", "not toml").len(), 1);
+    }
+}

@@ -1,0 +1,98 @@
+//! The checkout that is worked on: its root, its cargo, its metadata, and how child programs are run.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+
+/// The checkout, and whether it is tested under CI's stricter rules.
+pub struct Workspace {
+    /// The folder that holds the root `Cargo.toml`.
+    pub root: PathBuf,
+    /// True when `CI` is set: nothing is skipped and lock files must be up to date.
+    pub ci: bool,
+}
+
+impl Workspace {
+    /// The checkout this program was started from.
+    pub fn find() -> Result<Self> {
+        let manifest_dir = std::env::var_os("CARGO_MANIFEST_DIR")
+            .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
+        let root = manifest_dir.parent().context("xtask has no parent folder")?.to_path_buf();
+        let ci = std::env::var_os("CI").is_some_and(|value| !value.is_empty() && value != "false");
+        Ok(Self { root, ci })
+    }
+
+    /// The same checkout under CI's rules.
+    pub fn in_ci(self) -> Self {
+        Self { ci: true, ..self }
+    }
+
+    /// The manifest of this program, which is a workspace of its own.
+    pub fn xtask_manifest(&self) -> PathBuf {
+        self.root.join("xtask/Cargo.toml")
+    }
+
+    /// A program to be run from the root, told whether this is CI.
+    pub fn command(&self, program: impl Into<OsString>) -> Command {
+        let mut command = Command::new(program.into());
+        command.current_dir(&self.root);
+        if self.ci {
+            command.env("CI", "true");
+        }
+        command
+    }
+
+    /// `cargo SUBCOMMAND`, with `--locked` in CI where the subcommand resolves dependencies.
+    pub fn cargo(&self, subcommand: &str) -> Command {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let mut command = self.command(cargo);
+        command.arg(subcommand);
+        if self.ci && subcommand != "fmt" {
+            command.arg("--locked");
+        }
+        command
+    }
+
+    /// `cargo metadata` of one of the two workspaces; with `dependencies`, of every package they resolve to.
+    pub fn metadata(&self, manifest: &Path, dependencies: bool) -> Result<Value> {
+        let mut command = self.cargo("metadata");
+        command.args(["--format-version", "1", "--manifest-path"]).arg(manifest);
+        command.arg(if dependencies { "--all-features" } else { "--no-deps" });
+        let output = command.output().context("cannot start cargo")?;
+        if !output.status.success() {
+            bail!("cargo metadata failed: {}", String::from_utf8_lossy(&output.stderr).trim());
+        }
+        serde_json::from_slice(&output.stdout).context("cargo metadata did not print JSON")
+    }
+
+    /// Where builds go; follows `CARGO_TARGET_DIR`.
+    pub fn target_dir(&self) -> Result<PathBuf> {
+        let metadata = self.metadata(&self.root.join("Cargo.toml"), false)?;
+        let folder =
+            metadata["target_directory"].as_str().context("cargo metadata names no target_directory")?;
+        Ok(PathBuf::from(folder))
+    }
+}
+
+/// Runs a program with its output shown, after printing its command line; an error if it does not end with 0.
+pub fn execute(command: &mut Command) -> Result<()> {
+    let line = command_line(command);
+    println!("$ {line}");
+    let status = command.status().with_context(|| format!("cannot start `{line}`"))?;
+    if !status.success() {
+        bail!("`{line}` ended with {status}");
+    }
+    Ok(())
+}
+
+fn command_line(command: &Command) -> String {
+    let program = Path::new(command.get_program()).file_name().unwrap_or(command.get_program());
+    std::iter::once(program)
+        .chain(command.get_args())
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect::<Vec<_>>()
+        .join(" ")
+}
