@@ -33,8 +33,68 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 
 /// A scalar constraint over the positions of `N` vertices.
 ///
-/// `eval` must be written without branches on values (see [`Real`]), must return a zero gradient where the gradient
-/// is undefined, and must not use any absolute epsilon or absolute length.
+/// # Theory
+/// A constraint measures how far `N` points are from where they should be, as one number `C(x)`: 0 at rest, **positive
+/// when stretched, negative when compressed**. With a compliance `α` (inverse stiffness, supplied by the solver) it
+/// stands for the energy and the forces
+///
+/// ```text
+/// U(x) = C(x)² / (2α)            [J]
+/// f_i  = −∂U/∂x_i = −(C/α) ∇_iC  [N]
+/// ```
+///
+/// If `C` has the unit `u`, then `∇C` has `u/m` and `α` has `u²/J`. With inverse masses `w`, a projection moves the
+/// points along `w_i ∇_iC`:
+///
+/// ```text
+/// PBD    Δx_i = −s · w_i ∇_iC · C / Σ_j w_j |∇_jC|²              s in 0 to 1
+/// XPBD   Δλ   = (−C − α̃ λ) / (Σ_j w_j |∇_jC|² + α̃),  α̃ = α/h²
+///        Δx_i = w_i ∇_iC Δλ                                       h: substep, λ = 0 at its start
+/// ```
+///
+/// Sources: Müller et al., *Position Based Dynamics*, J. Vis. Commun. Image R. 18 (2007), eq. 5–9; Macklin et al.,
+/// *XPBD*, MIG 2016, eq. 17–18.
+///
+/// # Rules for an implementation
+/// - `∇C` is the exact gradient of `C`. Check it against finite differences: a wrong length of `∇C` goes unnoticed in a
+///   picture but makes the stiffness depend on the unit of length.
+/// - If `C` depends on the shape alone, not on where it lies or how it is turned, the gradients sum to zero and make
+///   no torque: `Σ ∇_iC = 0` and `Σ x_i × ∇_iC = 0`. Then a projection conserves momentum.
+/// - Where the gradient is undefined (coincident points, a flat triangle) it is zero, and `C` is finite.
+/// - No branch on a value: compute both sides and `select`, so that SIMD lanes can differ (see [`Real`]).
+/// - No absolute epsilon and no absolute length: compare with the element's own size.
+///
+/// # Parameters are flat arrays
+/// [`Params`](Constraint::Params) is `[T; K]`, not a struct: the same formula then reads them as `f32`, as `f64` or as
+/// lanes gathered from several constraints, and a solver can store, upload and transpose them knowing only `K`.
+/// Destructure them by name at the head of `eval`.
+///
+/// # Example
+/// A constraint of one's own: a point that should stay on the plane `z = height`.
+/// ```
+/// use cutis_constraints::{Constraint, Eval, Real};
+/// use nalgebra::{Point3, Vector3};
+///
+/// struct OnPlane;
+///
+/// impl Constraint<1> for OnPlane {
+///     const NAME: &'static str = "on plane";
+///     type Params<T: Real> = [T; 1];
+///     type Material = ();
+///     fn from_rest<T: Real>([point]: &[Point3<T>; 1], _: &()) -> [T; 1] {
+///         [point.z]
+///     }
+///     fn eval<T: Real>([point]: &[Point3<T>; 1], &[height]: &[T; 1]) -> Eval<T, 1> {
+///         Eval { c: point.z - height, grad: [Vector3::z()] }
+///     }
+///     fn rest_size<T: Real>(&[height]: &[T; 1]) -> T {
+///         height
+///     }
+/// }
+///
+/// let eval = OnPlane::eval(&[Point3::new(0.0, 0.0, 0.5)], &[0.2]);
+/// assert_eq!(eval.c, 0.3);
+/// ```
 pub trait Constraint<const N: usize>: Send + Sync + 'static {
     /// Name in reports, benchmarks and tests.
     const NAME: &'static str;
@@ -44,8 +104,8 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     type Material;
     /// Parameters of a constraint whose rest shape is `x` (positions in metres).
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;
-    /// `C` and `∇C` at `x`.
+    /// `C` and `∇C` at `x` (positions in metres).
     fn eval<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Eval<T, N>;
-    /// The size that `C` is compared with in residuals: rest length, rest volume, rest area.
+    /// The size that `C` is compared with in residuals: rest length (m), rest area (m²), rest volume (m³).
     fn rest_size<T: Real>(params: &Self::Params<T>) -> T;
 }

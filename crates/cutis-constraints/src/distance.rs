@@ -1,0 +1,65 @@
+//! Distance constraint: an edge keeps its length.
+
+use nalgebra::Point3;
+
+use crate::material::{MaterialError, check_positive};
+use crate::{Constraint, Eval, Real};
+
+/// An edge keeps its length.
+///
+/// ```text
+/// C   = |x1 − x2| − L                      [m]
+/// ∇1C = (x1 − x2)/|x1 − x2|,  ∇2C = −∇1C   [1]
+/// ```
+///
+/// Parameters `[L]`: the rest length in m. The gradient is zero where the points coincide.
+/// Compliance: [`distance_compliance`](crate::distance_compliance), m/N. Source: Müller et al. 2007, §3.3.
+#[derive(Clone, Copy, Debug)]
+pub struct Distance;
+
+/// How a [`Distance`] is built from its rest shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistanceMaterial {
+    /// Rest length over initial length: below 1 the edge pulls from the start. Above 0.
+    pub rest_scale: f64,
+}
+
+impl Default for DistanceMaterial {
+    /// At rest as built.
+    fn default() -> Self {
+        Self { rest_scale: 1.0 }
+    }
+}
+
+impl DistanceMaterial {
+    /// # Errors
+    /// [`MaterialError::NotPositive`] unless the scale is finite and above 0.
+    pub fn check(&self) -> Result<(), MaterialError> {
+        check_positive("rest_scale of a distance", "1", self.rest_scale)
+    }
+}
+
+impl Constraint<2> for Distance {
+    const NAME: &'static str = "distance";
+    type Params<T: Real> = [T; 1];
+    type Material = DistanceMaterial;
+
+    fn from_rest<T: Real>([x1, x2]: &[Point3<T>; 2], material: &DistanceMaterial) -> [T; 1] {
+        let d = x1 - x2;
+        [d.dot(&d).simd_sqrt() * T::constant(material.rest_scale)]
+    }
+
+    #[inline(always)]
+    fn eval<T: Real>([x1, x2]: &[Point3<T>; 2], &[rest_length]: &[T; 1]) -> Eval<T, 2> {
+        let d = x1 - x2;
+        let length = d.dot(&d).simd_sqrt();
+        let zero = T::zero();
+        let inverse = (T::one() / length).select(length.simd_gt(zero), zero);
+        let direction = d * inverse;
+        Eval { c: length - rest_length, grad: [direction, -direction] }
+    }
+
+    fn rest_size<T: Real>(&[rest_length]: &[T; 1]) -> T {
+        rest_length
+    }
+}

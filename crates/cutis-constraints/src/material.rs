@@ -1,0 +1,138 @@
+//! Compliances from material parameters that do not depend on the mesh.
+//!
+//! A compliance `α` turns a constraint `C` into the energy `C²/(2α)` in joules. Each formula here divides out the size
+//! of the element, so that refining a mesh changes the compliances but not the material. Inputs and results are `f64`
+//! in SI units. A modulus of infinity is a rigid material: `α = 0`.
+
+/// Why a material parameter or a rest size cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaterialError {
+    /// A value that must be above 0 is not, or is not a number.
+    #[error("{quantity} is {value} {unit}; it must be a finite number above 0")]
+    NotPositive {
+        /// What the value is.
+        quantity: &'static str,
+        /// The value.
+        value: f64,
+        /// Its unit, "1" if it has none.
+        unit: &'static str,
+    },
+    /// A value that must be 0 or more is not, or is not finite.
+    #[error("{quantity} is {value} {unit}; it must be a finite number, 0 or more")]
+    Negative {
+        /// What the value is.
+        quantity: &'static str,
+        /// The value.
+        value: f64,
+        /// Its unit, "1" if it has none.
+        unit: &'static str,
+    },
+    /// The stiffness of PBD is a share of the error that one iteration removes.
+    #[error("stiffness is {value}; it must be above 0 and at most 1")]
+    StiffnessOutOfRange {
+        /// The value.
+        value: f64,
+    },
+    /// The inputs are valid, but so small or large that the compliance is no finite number.
+    #[error("the compliance of a {constraint} constraint of rest size {rest_size} comes out as {value}")]
+    ComplianceOutOfRange {
+        /// Name of the constraint.
+        constraint: &'static str,
+        /// Rest length (m), area (m²) or volume (m³).
+        rest_size: f64,
+        /// The compliance.
+        value: f64,
+    },
+}
+
+/// Compliance of a [`Distance`](crate::Distance) in m/N: `α = L²/(E·V_e)`.
+///
+/// The edge is a rod of length `rest_length` `L` (m), cross-section `V_e/L` and Young's modulus `youngs_modulus_pa` `E`
+/// (Pa), where `edge_volume` `V_e` (m³) is the edge's share of the volume of the tetrahedra around it.
+///
+/// # Errors
+/// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
+///
+/// ```
+/// // 1 cm of a rod of 1 cm² and 20 kPa: k = E·area/L = 200 N/m.
+/// let alpha = cutis_constraints::distance_compliance(0.01, 2e4, 1e-6)?;
+/// assert!((alpha - 1.0 / 200.0).abs() < 1e-15);
+/// # Ok::<(), cutis_constraints::MaterialError>(())
+/// ```
+pub fn distance_compliance(
+    rest_length: f64,
+    youngs_modulus_pa: f64,
+    edge_volume: f64,
+) -> Result<f64, MaterialError> {
+    check_positive("rest length", "m", rest_length)?;
+    check_modulus("Young's modulus", "Pa", youngs_modulus_pa)?;
+    check_positive("edge volume", "m³", edge_volume)?;
+    // Quotients first: their exponents stay near the result's.
+    let compliance = rest_length / youngs_modulus_pa * (rest_length / edge_volume);
+    finite("distance", rest_length, compliance)
+}
+
+/// Compliance of a [`Volume`](crate::Volume) in m³/Pa: `α = V0/K`.
+///
+/// `rest_volume` `V0` in m³, `bulk_modulus_pa` `K` in Pa: then `C²/(2α)` is `½ K (ΔV/V0)² V0`.
+///
+/// # Errors
+/// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
+pub fn volume_compliance(rest_volume: f64, bulk_modulus_pa: f64) -> Result<f64, MaterialError> {
+    check_positive("rest volume", "m³", rest_volume)?;
+    check_modulus("bulk modulus", "Pa", bulk_modulus_pa)?;
+    finite("volume", rest_volume, rest_volume / bulk_modulus_pa)
+}
+
+/// Compliance of a [`SkinTension`](crate::SkinTension) in m³/N: `α = A0/T`.
+///
+/// `rest_area` `A0` in m², `area_modulus_n_per_m` `T` in N/m: the tension per relative growth of the area. `k = T/A0`
+/// is the stiffness of the energy form.
+///
+/// # Errors
+/// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
+pub fn skin_compliance(rest_area: f64, area_modulus_n_per_m: f64) -> Result<f64, MaterialError> {
+    check_positive("rest area", "m²", rest_area)?;
+    check_modulus("area modulus", "N/m", area_modulus_n_per_m)?;
+    finite("skin tension", rest_area, rest_area / area_modulus_n_per_m)
+}
+
+/// Fails unless `value` is finite and above 0.
+pub(crate) fn check_positive(
+    quantity: &'static str,
+    unit: &'static str,
+    value: f64,
+) -> Result<(), MaterialError> {
+    if value.is_finite() { check_modulus(quantity, unit, value) } else { not_positive(quantity, unit, value) }
+}
+
+/// Fails unless `value` is finite and 0 or more.
+pub(crate) fn check_not_negative(
+    quantity: &'static str,
+    unit: &'static str,
+    value: f64,
+) -> Result<(), MaterialError> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(())
+    } else {
+        Err(MaterialError::Negative { quantity, value, unit })
+    }
+}
+
+/// Fails unless `value` is above 0; infinity is a rigid material.
+fn check_modulus(quantity: &'static str, unit: &'static str, value: f64) -> Result<(), MaterialError> {
+    if value > 0.0 { Ok(()) } else { not_positive(quantity, unit, value) }
+}
+
+fn not_positive(quantity: &'static str, unit: &'static str, value: f64) -> Result<(), MaterialError> {
+    Err(MaterialError::NotPositive { quantity, value, unit })
+}
+
+fn finite(constraint: &'static str, rest_size: f64, value: f64) -> Result<f64, MaterialError> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(MaterialError::ComplianceOutOfRange { constraint, rest_size, value })
+    }
+}

@@ -1,0 +1,80 @@
+//! Volume constraint: a tetrahedron keeps its signed volume.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::material::{MaterialError, check_positive};
+use crate::{Constraint, Eval, Real};
+
+/// A tetrahedron keeps its signed volume.
+///
+/// ```text
+/// V   = (x2 − x1)·((x3 − x1) × (x4 − x1)) / 6,  C = V − V0   [m³]
+/// ∇2C = (x3 − x1) × (x4 − x1) / 6                            [m²]
+/// ∇3C = (x4 − x1) × (x2 − x1) / 6
+/// ∇4C = (x2 − x1) × (x3 − x1) / 6
+/// ∇1C = −(∇2C + ∇3C + ∇4C)
+/// ```
+///
+/// The 1/6 belongs into the gradient as well as into the volume. Without it the gradient is six times too long and a
+/// projection removes a sixth of the error instead of all of it; a test shows it.
+///
+/// Parameters `[V0]`: the rest volume in m³, positive where the vertices 2, 3, 4 run counter-clockwise seen from the
+/// side away from vertex 1. An inverted tetrahedron has a negative volume and is pushed back through itself. The
+/// gradient is a polynomial: defined everywhere, and zero where all four points lie on a line.
+/// Compliance: [`volume_compliance`](crate::volume_compliance), m³/Pa. Source: Müller et al. 2007, §4.3,
+/// for a single tetrahedron.
+#[derive(Clone, Copy, Debug)]
+pub struct Volume;
+
+/// How a [`Volume`] is built from its rest shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumeMaterial {
+    /// Rest volume over initial volume: above 1 the tetrahedron swells from the start. Above 0.
+    pub rest_scale: f64,
+}
+
+impl Default for VolumeMaterial {
+    /// At rest as built.
+    fn default() -> Self {
+        Self { rest_scale: 1.0 }
+    }
+}
+
+impl VolumeMaterial {
+    /// # Errors
+    /// [`MaterialError::NotPositive`] unless the scale is finite and above 0.
+    pub fn check(&self) -> Result<(), MaterialError> {
+        check_positive("rest_scale of a volume", "1", self.rest_scale)
+    }
+}
+
+/// Volume and its four gradients.
+#[inline(always)]
+fn volume_and_gradient<T: Real>([x1, x2, x3, x4]: &[Point3<T>; 4]) -> (T, [Vector3<T>; 4]) {
+    let (a, b, c) = (x2 - x1, x3 - x1, x4 - x1);
+    let sixth = T::constant(1.0 / 6.0);
+    let grad2 = b.cross(&c) * sixth;
+    let grad3 = c.cross(&a) * sixth;
+    let grad4 = a.cross(&b) * sixth;
+    (a.dot(&grad2), [-(grad2 + grad3 + grad4), grad2, grad3, grad4])
+}
+
+impl Constraint<4> for Volume {
+    const NAME: &'static str = "volume";
+    type Params<T: Real> = [T; 1];
+    type Material = VolumeMaterial;
+
+    fn from_rest<T: Real>(x: &[Point3<T>; 4], material: &VolumeMaterial) -> [T; 1] {
+        [volume_and_gradient(x).0 * T::constant(material.rest_scale)]
+    }
+
+    #[inline(always)]
+    fn eval<T: Real>(x: &[Point3<T>; 4], &[rest_volume]: &[T; 1]) -> Eval<T, 4> {
+        let (volume, grad) = volume_and_gradient(x);
+        Eval { c: volume - rest_volume, grad }
+    }
+
+    fn rest_size<T: Real>(&[rest_volume]: &[T; 1]) -> T {
+        rest_volume.simd_abs()
+    }
+}
