@@ -1,0 +1,225 @@
+//! Storage of one kind of constraint: flat arrays ordered by colour, and the loop over a range of them.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use cutis_coloring::Groups;
+use cutis_constraints::{Constraint, Scalar};
+use nalgebra::Point3;
+
+use crate::coloured::SharedVertices;
+use crate::{ConstraintSet, Pbd, Residual, Rule, SolverError, Step, Stiffness, Vertex, Xpbd, project};
+
+/// Where a loop over constraints reads and moves vertices.
+pub trait Store<T> {
+    /// The vertex `index`.
+    fn load(&self, index: u32) -> Vertex<T>;
+    /// Replaces the vertex `index`.
+    fn store(&mut self, index: u32, vertex: Vertex<T>);
+}
+
+impl<T: Copy> Store<T> for &mut [Vertex<T>] {
+    #[inline]
+    fn load(&self, index: u32) -> Vertex<T> {
+        self[index as usize]
+    }
+    #[inline]
+    fn store(&mut self, index: u32, vertex: Vertex<T>) {
+        self[index as usize] = vertex;
+    }
+}
+
+/// The projections of a kind. Its module is private, so that nothing outside this crate implements or calls it.
+pub trait Project<T: Scalar> {
+    /// Projects `range` in ascending order. `multipliers` belongs to `range`, or is empty when none are kept.
+    fn project(&self, range: Range<usize>, vertices: &mut [Vertex<T>], step: Step<T>, multipliers: &mut [T]);
+    /// The same, with vertices that other threads may be moving too: no two constraints in work at a time may share
+    /// one.
+    fn project_shared(
+        &self,
+        range: Range<usize>,
+        vertices: SharedVertices<'_, T>,
+        step: Step<T>,
+        multipliers: &mut [T],
+    );
+    /// Number of vertices that the indices were checked against.
+    fn vertex_count(&self) -> usize;
+}
+
+/// All constraints of the kind `C`. No two of one colour share a vertex; every index is below `vertex_count`.
+pub(crate) struct Batch<C, const N: usize, T, P> {
+    vertex_count: usize,
+    offsets: Vec<u32>,
+    indices: Vec<[u32; N]>,
+    params: Vec<P>,
+    stiffness: Stiffness<T>,
+    kind: PhantomData<fn() -> C>,
+}
+
+impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
+    /// Checks everything that the inner loops rely on, then sorts the constraints by colour.
+    pub(crate) fn new(
+        vertex_count: usize,
+        indices: &[[u32; N]],
+        params: &[C::Params<T>],
+        stiffness: Stiffness<T>,
+        groups: &Groups,
+    ) -> Result<Self, SolverError> {
+        let kind = C::NAME;
+        let count = indices.len();
+        if u32::try_from(count).is_err() {
+            return Err(SolverError::TooMany { what: "constraints", count });
+        }
+        if params.len() != count {
+            let (what, found) = ("parameter sets", params.len());
+            return Err(SolverError::KindLength { kind, what, found, expected: count });
+        }
+        for (constraint, (tuple, params)) in indices.iter().zip(params).enumerate() {
+            check_tuple(kind, constraint, tuple, vertex_count)?;
+            for (parameter, value) in params.as_ref().iter().enumerate() {
+                let value = value.to_f64();
+                if !value.is_finite() {
+                    return Err(SolverError::Parameter { kind, constraint, parameter, value });
+                }
+            }
+        }
+        groups
+            .verify(indices, vertex_count)
+            .map_err(|error| SolverError::Groups { kind, reason: error.to_string() })?;
+        let order = &groups.order;
+        Ok(Self {
+            vertex_count,
+            offsets: groups.offsets.clone(),
+            indices: order.iter().map(|&k| indices[k as usize]).collect(),
+            params: order.iter().map(|&k| params[k as usize]).collect(),
+            stiffness: stiffness.validated(kind, count, order)?,
+            kind: PhantomData,
+        })
+    }
+
+    fn positions(&self, k: usize, vertices: &[Vertex<T>]) -> [Point3<T>; N] {
+        self.indices[k].map(|i| vertices[i as usize].position())
+    }
+
+    fn run<S: Store<T>>(&self, range: Range<usize>, store: S, step: Step<T>, multipliers: &mut [T]) {
+        match step {
+            Step::Pbd => self.sweep(range, store, Pbd, multipliers),
+            Step::Xpbd { inverse_h_squared } => {
+                self.sweep(range, store, Xpbd { inverse_h_squared }, multipliers);
+            }
+        }
+    }
+
+    fn sweep<S: Store<T>, R: Rule<T>>(
+        &self,
+        range: Range<usize>,
+        mut store: S,
+        rule: R,
+        multipliers: &mut [T],
+    ) {
+        let start = range.start;
+        let stiffness = self.stiffness.values();
+        for (k, (tuple, params)) in self.indices[range.clone()].iter().zip(&self.params[range]).enumerate() {
+            let vertices = tuple.map(|i| store.load(i));
+            let x = vertices.map(|v| v.position());
+            let w = vertices.map(|v| v.inverse_mass());
+            let multiplier = multipliers.get(k).copied().unwrap_or_else(T::zero);
+            let done = project::<C, N, T, R>(&x, &w, params, rule, stiffness.at(start + k), multiplier);
+            if let Some(multiplier) = multipliers.get_mut(k) {
+                *multiplier += done.multiplier;
+            }
+            for i in 0..N {
+                store.store(tuple[i], Vertex::new(x[i] + done.corrections[i], w[i]));
+            }
+        }
+    }
+}
+
+fn check_tuple(
+    kind: &'static str,
+    constraint: usize,
+    tuple: &[u32],
+    vertex_count: usize,
+) -> Result<(), SolverError> {
+    for (i, &vertex) in tuple.iter().enumerate() {
+        if vertex as usize >= vertex_count {
+            return Err(SolverError::VertexOutOfRange { kind, constraint, vertex, vertex_count });
+        }
+        if tuple[..i].contains(&vertex) {
+            return Err(SolverError::RepeatedVertex { kind, constraint, vertex });
+        }
+    }
+    Ok(())
+}
+
+impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, C::Params<T>> {
+    fn project(&self, range: Range<usize>, vertices: &mut [Vertex<T>], step: Step<T>, multipliers: &mut [T]) {
+        self.run(range, vertices, step, multipliers);
+    }
+
+    fn project_shared(
+        &self,
+        range: Range<usize>,
+        vertices: SharedVertices<'_, T>,
+        step: Step<T>,
+        multipliers: &mut [T],
+    ) {
+        self.run(range, vertices, step, multipliers);
+    }
+
+    fn vertex_count(&self) -> usize {
+        self.vertex_count
+    }
+}
+
+impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, N, T, C::Params<T>> {
+    fn name(&self) -> &'static str {
+        C::NAME
+    }
+
+    fn arity(&self) -> usize {
+        N
+    }
+
+    fn offsets(&self) -> &[u32] {
+        &self.offsets
+    }
+
+    fn indices(&self) -> &[u32] {
+        self.indices.as_flattened()
+    }
+
+    fn stiffness(&self) -> &Stiffness<T> {
+        &self.stiffness
+    }
+
+    fn residual(&self, vertices: &[Vertex<T>]) -> Residual {
+        let ratios = (0..self.indices.len()).filter_map(|k| {
+            let rest_size = C::rest_size(&self.params[k]).to_f64();
+            let c = C::eval(&self.positions(k, vertices), &self.params[k]).c.to_f64();
+            (rest_size != 0.0).then(|| c / rest_size)
+        });
+        Residual::of(C::NAME, ratios)
+    }
+
+    fn elastic_energy(&self, vertices: &[Vertex<T>]) -> Option<f64> {
+        let Stiffness::Compliance(compliance) = &self.stiffness else { return None };
+        let energy = |k: usize| {
+            let c = C::eval(&self.positions(k, vertices), &self.params[k]).c.to_f64();
+            let compliance = compliance.at(k).to_f64();
+            if compliance > 0.0 { 0.5 * c * c / compliance } else { 0.0 }
+        };
+        Some((0..self.indices.len()).map(energy).sum())
+    }
+
+    fn bytes(&self) -> usize {
+        let stiffness = match self.stiffness.values() {
+            crate::Values::Uniform(_) => 0,
+            crate::Values::Each(values) => size_of_val(values.as_slice()),
+        };
+        size_of_val(self.offsets.as_slice())
+            + size_of_val(self.indices.as_slice())
+            + size_of_val(self.params.as_slice())
+            + stiffness
+    }
+}

@@ -1,0 +1,74 @@
+//! Kinematic vertices: what a hand, a hook or a clamp moves along a given path.
+
+use cutis_constraints::Scalar;
+use nalgebra::{Point3, Vector3};
+
+use crate::{SolverError, Vertex};
+
+/// A group of vertices carried along a straight path at constant speed, then held.
+///
+/// Its vertices take the inverse mass 0 and the position `rest + move_m·min(t/over_s, 1)`; with `over_s` 0 they are
+/// at the end of their path from the first substep on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Handle {
+    /// The vertices it moves.
+    pub vertices: Vec<u32>,
+    /// The whole path in metres.
+    pub move_m: [f64; 3],
+    /// Time that the path takes, in seconds.
+    pub over_s: f64,
+}
+
+/// A checked handle with the rest positions of its vertices.
+#[derive(Clone, Debug)]
+pub(crate) struct Carried<T: Scalar> {
+    vertices: Vec<u32>,
+    rest: Vec<Point3<T>>,
+    move_m: [f64; 3],
+    over_s: f64,
+}
+
+impl<T: Scalar> Carried<T> {
+    /// Checks the numbers of `handle` and takes its vertices out of the dynamics.
+    pub(crate) fn new(
+        index: usize,
+        handle: Handle,
+        vertices: &mut [Vertex<T>],
+        taken: &[Self],
+    ) -> Result<Self, SolverError> {
+        for value in handle.move_m {
+            if !value.is_finite() {
+                let (key, expected) = ("handle move_m", "three finite numbers");
+                return Err(SolverError::Setting { key, value, expected });
+            }
+        }
+        if !(handle.over_s.is_finite() && handle.over_s >= 0.0) {
+            let (key, expected) = ("handle over_s", "a finite time, 0 s or more");
+            return Err(SolverError::Setting { key, value: handle.over_s, expected });
+        }
+        let mut rest = Vec::with_capacity(handle.vertices.len());
+        for &vertex in &handle.vertices {
+            let error = |reason| SolverError::Handle { handle: index, vertex, reason };
+            let place = vertices.get_mut(vertex as usize).ok_or_else(|| error("does not exist"))?;
+            if taken.iter().any(|other| other.vertices.contains(&vertex)) {
+                return Err(error("is moved by an earlier handle already"));
+            }
+            rest.push(place.position());
+            *place = Vertex::new(place.position(), T::zero());
+        }
+        Ok(Self { vertices: handle.vertices, rest, move_m: handle.move_m, over_s: handle.over_s })
+    }
+
+    /// Puts the vertices where they are at `time_s`.
+    pub(crate) fn carry(&self, vertices: &mut [Vertex<T>], time_s: f64) {
+        let share = if time_s < self.over_s { time_s / self.over_s } else { 1.0 };
+        let path = Vector3::from(self.move_m.map(|d| T::constant(d * share)));
+        for (&vertex, rest) in self.vertices.iter().zip(&self.rest) {
+            vertices[vertex as usize].set_position(rest + path);
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.vertices.as_slice()) + size_of_val(self.rest.as_slice())
+    }
+}

@@ -1,0 +1,93 @@
+//! The projection of one constraint: the one function that every CPU backend runs.
+
+use cutis_constraints::{Constraint, Real};
+use nalgebra::{Point3, Vector3, convert};
+
+/// From a constraint's value to the multiplier of its gradients.
+pub trait Rule<T: Real>: Copy + Send + Sync {
+    /// `Δλ` for the value `c`, the weighted square of the gradients `Σ w|∇C|²`, the stiffness of the constraint and
+    /// its multiplier so far; zero where the quotient is undefined or overflows.
+    fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T;
+}
+
+/// `Δλ = −s·C / Σ w|∇C|²` (Müller et al. 2007, eqs. 8–9); the stiffness is `s`.
+#[derive(Clone, Copy, Debug)]
+pub struct Pbd;
+
+/// `Δλ = (−C − α̃λ) / (Σ w|∇C|² + α̃)`, `α̃ = α/h²` (Macklin et al. 2016, eq. 18); the stiffness is `α`.
+#[derive(Clone, Copy, Debug)]
+pub struct Xpbd<T> {
+    /// `1/h²` in 1/s².
+    pub inverse_h_squared: T,
+}
+
+impl<T: Real> Rule<T> for Pbd {
+    #[inline]
+    fn multiplier(self, c: T, weighted_square: T, stiffness: T, _multiplier: T) -> T {
+        quotient_or_zero(-(stiffness * c), weighted_square)
+    }
+}
+
+impl<T: Real> Rule<T> for Xpbd<T> {
+    #[inline]
+    fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T {
+        let compliance = stiffness * self.inverse_h_squared;
+        quotient_or_zero(-c - compliance * multiplier, weighted_square + compliance)
+    }
+}
+
+/// `numerator / denominator`, or zero where the denominator is zero or the quotient is not finite: a constraint whose
+/// vertices cannot move, or whose gradient vanishes, moves nothing.
+#[inline]
+fn quotient_or_zero<T: Real>(numerator: T, denominator: T) -> T {
+    let quotient = numerator / denominator;
+    // The product is zero for a finite quotient and NaN for any other.
+    let finite = (quotient * T::zero()).simd_eq(T::zero());
+    quotient.select(finite, T::zero())
+}
+
+/// What one projection does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projection<T, const N: usize> {
+    /// Correction of each position in metres.
+    pub corrections: [Vector3<T>; N],
+    /// Change of the multiplier.
+    pub multiplier: T,
+}
+
+/// Projects constraint `C` at positions `x` with inverse masses `w`.
+///
+/// A pure function: it knows no index, no storage and no thread. `T` may be a number or a vector of lanes.
+#[inline]
+pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
+    x: &[Point3<T>; N],
+    w: &[T; N],
+    params: &C::Params<T>,
+    rule: R,
+    stiffness: T,
+    multiplier: T,
+) -> Projection<T, N> {
+    let eval = C::eval(x, params);
+    let mut weighted_square: T = convert(0.0);
+    for i in 0..N {
+        weighted_square += w[i] * eval.grad[i].dot(&eval.grad[i]);
+    }
+    let multiplier = rule.multiplier(eval.c, weighted_square, stiffness, multiplier);
+    Projection { corrections: std::array::from_fn(|i| eval.grad[i] * (w[i] * multiplier)), multiplier }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn undefined_quotients_move_nothing() {
+        let rule = Xpbd { inverse_h_squared: 1.0f32 };
+        assert_eq!(rule.multiplier(1.0, 0.0, 0.0, 0.0), 0.0);
+        assert_eq!(rule.multiplier(1e-3, 1e-45, 0.0, 0.0), 0.0, "overflow");
+        assert_eq!(rule.multiplier(f32::NAN, 1.0, 0.0, 0.0), 0.0);
+        assert_eq!(Pbd.multiplier(0.0, 0.0, 1.0f64, 0.0), 0.0);
+        assert_eq!(Pbd.multiplier(2.0, 4.0, 0.5f64, 0.0), -0.25);
+        assert_eq!(rule.multiplier(2.0, 1.0, 3.0, 0.0), -0.5);
+    }
+}

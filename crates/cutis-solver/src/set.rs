@@ -1,0 +1,64 @@
+//! A kind of constraint as backends see it: one virtual call per chunk of a colour, never per constraint.
+
+use std::ops::Range;
+
+use cutis_constraints::Scalar;
+
+use crate::batch::Project;
+use crate::{Residual, Stiffness, Vertex};
+
+/// What a substep asks of every projection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step<T> {
+    /// PBD.
+    Pbd,
+    /// XPBD.
+    Xpbd {
+        /// `1/h²` in 1/s².
+        inverse_h_squared: T,
+    },
+}
+
+/// All constraints of one kind, ordered by colour. Implemented by what
+/// [`SystemBuilder::add`](crate::SystemBuilder::add) stores, and by nothing else.
+pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
+    /// The kind's name, [`Constraint::NAME`](cutis_constraints::Constraint::NAME).
+    fn name(&self) -> &'static str;
+    /// Vertices of one constraint.
+    fn arity(&self) -> usize;
+    /// Start of each colour, and the end of the last one: `colors + 1` numbers.
+    fn offsets(&self) -> &[u32];
+    /// The vertices of each constraint, `arity` of them in a row, ordered by colour.
+    fn indices(&self) -> &[u32];
+    /// Stiffness, ordered by colour where there is one for each constraint.
+    fn stiffness(&self) -> &Stiffness<T>;
+    /// `C` over rest size at the given positions; rest sizes of zero are left out.
+    fn residual(&self, vertices: &[Vertex<T>]) -> Residual;
+    /// `Σ ½C²/α` in joules over the constraints with `α > 0`; `None` for a PBD stiffness, which stands for no energy.
+    fn elastic_energy(&self, vertices: &[Vertex<T>]) -> Option<f64>;
+    /// Bytes that the kind stores.
+    fn bytes(&self) -> usize;
+
+    /// Number of constraints.
+    fn len(&self) -> usize {
+        self.offsets().last().map_or(0, |&end| end as usize)
+    }
+    /// Whether there is none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Number of colours.
+    fn colors(&self) -> usize {
+        self.offsets().len().saturating_sub(1)
+    }
+    /// The constraints of `color`, as a range over the ordered constraints; empty for a colour that does not exist.
+    fn range(&self, color: usize) -> Range<usize> {
+        match self.offsets().get(color..color.saturating_add(2)) {
+            Some(&[start, end]) => start as usize..end as usize,
+            _ => 0..0,
+        }
+    }
+}
+
+/// A kind as a system stores it.
+pub type Kind<T> = Box<dyn ConstraintSet<T>>;

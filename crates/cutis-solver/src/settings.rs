@@ -1,0 +1,96 @@
+//! What the caller chooses about the time integration, checked once when a solver is built.
+
+use crate::SolverError;
+
+/// How a constraint's value becomes a correction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formulation {
+    /// Stiffness in `[0, 1]` per iteration (Müller et al. 2007). The result depends on iterations and time step.
+    Pbd,
+    /// Compliance in 1/(N/m) for a length, generally `1/k` of the energy `½kC²` (Macklin et al. 2016).
+    Xpbd,
+}
+
+/// Time step, iterations and outer forces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// PBD or XPBD; must be what every kind of the system was given.
+    pub formulation: Formulation,
+    /// Time of one frame in seconds.
+    pub dt_s: f64,
+    /// Substeps of one frame, each `h = dt_s/substeps` long.
+    pub substeps: u32,
+    /// Sweeps over all constraints in one substep.
+    pub iterations: u32,
+    /// Gravity in m/s².
+    pub gravity_m_s2: [f64; 3],
+    /// Velocities are multiplied by `exp(−damping_per_s·h)` at the end of every substep. 0 = undamped.
+    pub damping_per_s: f64,
+}
+
+impl Default for Settings {
+    /// XPBD at 60 Hz, 10 substeps of one iteration, no gravity, no damping.
+    fn default() -> Self {
+        Self {
+            formulation: Formulation::Xpbd,
+            dt_s: 1.0 / 60.0,
+            substeps: 10,
+            iterations: 1,
+            gravity_m_s2: [0.0; 3],
+            damping_per_s: 0.0,
+        }
+    }
+}
+
+impl Settings {
+    /// Length of a substep in seconds.
+    pub fn substep_s(&self) -> f64 {
+        self.dt_s / f64::from(self.substeps)
+    }
+
+    /// Whether multipliers must be kept from one sweep to the next.
+    pub fn keeps_multipliers(&self) -> bool {
+        self.formulation == Formulation::Xpbd && self.iterations > 1
+    }
+
+    /// Checks every value; [`SolverError::Setting`] names the first that cannot be used.
+    pub fn validate(&self) -> Result<(), SolverError> {
+        let check = |key, value: f64, valid: bool, expected| {
+            if valid { Ok(()) } else { Err(SolverError::Setting { key, value, expected }) }
+        };
+        let positive = self.dt_s.is_finite() && self.dt_s > 0.0;
+        check("dt_s", self.dt_s, positive, "a finite time above 0 s")?;
+        check("substeps", self.substeps.into(), self.substeps > 0, "at least 1")?;
+        check("iterations", self.iterations.into(), self.iterations > 0, "at least 1")?;
+        for value in self.gravity_m_s2 {
+            check("gravity_m_s2", value, value.is_finite(), "three finite numbers")?;
+        }
+        let damping = self.damping_per_s;
+        check("damping_per_s", damping, damping.is_finite() && damping >= 0.0, "a finite number, 0 or more")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_that_cannot_be_used_are_named() {
+        let good = Settings::default();
+        assert!(good.validate().is_ok());
+        let bad = [
+            ("dt_s", Settings { dt_s: 0.0, ..good }),
+            ("dt_s", Settings { dt_s: f64::NAN, ..good }),
+            ("substeps", Settings { substeps: 0, ..good }),
+            ("iterations", Settings { iterations: 0, ..good }),
+            ("gravity_m_s2", Settings { gravity_m_s2: [0.0, f64::INFINITY, 0.0], ..good }),
+            ("damping_per_s", Settings { damping_per_s: -1.0, ..good }),
+        ];
+        for (expected, settings) in bad {
+            let Err(SolverError::Setting { key, .. }) = settings.validate() else {
+                panic!("{expected} must be refused");
+            };
+            assert_eq!(key, expected);
+        }
+    }
+}

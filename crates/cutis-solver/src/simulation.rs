@@ -1,0 +1,148 @@
+//! The stepping loop, written once: what runs in which order is here, how a pass is spread over threads is not.
+
+use cutis_constraints::Scalar;
+
+use crate::passes::Integrator;
+use crate::{
+    ConstraintSet, Formulation, Motion, Schedule, Settings, SolverError, Step, Sweep, System, Vertex,
+    VertexBlock,
+};
+
+/// How the passes of a substep are executed on the host: one after the other, or by several threads.
+pub trait Execute<T: Scalar> {
+    /// Runs `pass` on `block`, or on its parts in any order.
+    fn vertices(&self, block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync));
+
+    /// Projects the constraints of one sweep. `multipliers` has one number per constraint of the set, or none.
+    fn sweep(
+        &self,
+        sweep: Sweep,
+        set: &dyn ConstraintSet<T>,
+        vertices: &mut [Vertex<T>],
+        step: Step<T>,
+        multipliers: &mut [T],
+    );
+
+    /// The first vertex with a coordinate that is not finite.
+    fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize>;
+}
+
+/// A system, its settings and its clock.
+pub struct Simulation<T: Scalar> {
+    system: System<T>,
+    settings: Settings,
+    schedule: Schedule,
+    integrator: Integrator<T>,
+    step: Step<T>,
+    multipliers: Vec<Vec<T>>,
+    frame: u64,
+    substep: u32,
+}
+
+impl<T: Scalar> Simulation<T> {
+    /// Checks the settings and that every kind has a stiffness of their formulation.
+    ///
+    /// Multipliers are stored only for XPBD with more than one iteration: with one, each starts and ends at zero.
+    pub fn new(system: System<T>, settings: Settings) -> Result<Self, SolverError> {
+        settings.validate()?;
+        for kind in &system.kinds {
+            let (found, expected) = (kind.stiffness().formulation(), settings.formulation);
+            if found != expected {
+                return Err(SolverError::Formulation { kind: kind.name(), found, expected });
+            }
+        }
+        let length = |kind: &dyn ConstraintSet<T>| if settings.keeps_multipliers() { kind.len() } else { 0 };
+        let multipliers = system.kinds.iter().map(|kind| vec![T::zero(); length(&**kind)]).collect();
+        let h = settings.substep_s();
+        let inverse_h_squared = T::constant(1.0 / (h * h));
+        if !(T::constant(h) > T::zero() && inverse_h_squared.is_finite()) {
+            let expected = "a substep whose inverse square the number type can hold";
+            return Err(SolverError::Setting { key: "dt_s / substeps", value: h, expected });
+        }
+        Ok(Self {
+            schedule: Schedule::new(&system.kinds, &settings),
+            integrator: Integrator::new(&settings),
+            step: match settings.formulation {
+                Formulation::Pbd => Step::Pbd,
+                Formulation::Xpbd => Step::Xpbd { inverse_h_squared },
+            },
+            multipliers,
+            system,
+            settings,
+            frame: 0,
+            substep: 0,
+        })
+    }
+
+    /// The body in its present state.
+    pub fn system(&self) -> &System<T> {
+        &self.system
+    }
+
+    /// The settings it was built with.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// What a frame executes.
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
+    }
+
+    /// Simulated time in seconds.
+    pub fn time_s(&self) -> f64 {
+        self.frame as f64 * self.settings.dt_s + f64::from(self.substep) * self.settings.substep_s()
+    }
+
+    /// Bytes of the stored multipliers; 0 unless XPBD runs more than one iteration.
+    pub fn multiplier_bytes(&self) -> usize {
+        self.multipliers.iter().map(|kind| size_of_val(kind.as_slice())).sum()
+    }
+
+    /// Runs `frames` frames. Running them one by one gives the same bits. Nothing is allocated.
+    ///
+    /// # Errors
+    /// [`SolverError::NotFinite`] as soon as a position is not finite after a substep. The state is then that of the
+    /// start of this substep, with all velocities zero, and may be stepped on.
+    pub fn run(&mut self, frames: usize, execute: &impl Execute<T>) -> Result<(), SolverError> {
+        let mut motion = Motion::Predict;
+        let end = self.frame.saturating_add(frames as u64);
+        while self.frame < end {
+            self.move_vertices(motion, execute);
+            self.system.carry_handles(self.time_s() + self.settings.substep_s());
+            self.project(execute);
+            if let Some(vertex) = execute.first_not_finite(&self.system.vertices) {
+                self.move_vertices(Motion::Restore, execute);
+                let (frame, substep, time_s) = (self.frame, self.substep, self.time_s());
+                return Err(SolverError::NotFinite { vertex, frame, substep, time_s });
+            }
+            motion = Motion::FinishAndPredict;
+            self.substep += 1;
+            if self.substep == self.schedule.substeps {
+                (self.frame, self.substep) = (self.frame + 1, 0);
+            }
+        }
+        if motion == Motion::FinishAndPredict {
+            self.move_vertices(Motion::Finish, execute);
+        }
+        Ok(())
+    }
+
+    fn move_vertices(&mut self, motion: Motion, execute: &impl Execute<T>) {
+        let integrator = self.integrator;
+        execute.vertices(self.system.block(), &|block| integrator.run(motion, block));
+    }
+
+    fn project(&mut self, execute: &impl Execute<T>) {
+        for kind in &mut self.multipliers {
+            kind.fill(T::zero());
+        }
+        for _ in 0..self.schedule.iterations {
+            for &sweep in &self.schedule.sweeps {
+                let (vertices, kinds) = self.system.projection_parts();
+                let multipliers = &mut self.multipliers[sweep.kind];
+                execute.sweep(sweep, &*kinds[sweep.kind], vertices, self.step, multipliers);
+            }
+        }
+    }
+}

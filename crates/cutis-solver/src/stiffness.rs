@@ -1,0 +1,101 @@
+//! Stiffness of a kind of constraint: one number for all of them, or one for each.
+
+use cutis_constraints::Scalar;
+
+use crate::{Formulation, SolverError};
+
+/// One value for a whole kind, or one value for each constraint in the caller's order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values<T> {
+    /// The same for all; needs no storage per constraint.
+    Uniform(T),
+    /// One for each.
+    Each(Vec<T>),
+}
+
+impl<T: Copy> Values<T> {
+    #[inline]
+    pub(crate) fn at(&self, index: usize) -> T {
+        match self {
+            Self::Uniform(value) => *value,
+            Self::Each(values) => values[index],
+        }
+    }
+}
+
+/// Stiffness of a kind, in the terms of one formulation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stiffness<T> {
+    /// Share of the error removed by one projection, in `[0, 1]`; for [`Formulation::Pbd`].
+    Pbd(Values<T>),
+    /// Compliance `α = 1/k` of the energy `½C²/α`, 0 or more; for [`Formulation::Xpbd`].
+    Compliance(Values<T>),
+}
+
+impl<T: Scalar> Stiffness<T> {
+    /// The same PBD stiffness for all constraints.
+    pub fn pbd(stiffness: T) -> Self {
+        Self::Pbd(Values::Uniform(stiffness))
+    }
+
+    /// The same compliance for all constraints.
+    pub fn compliance(compliance: T) -> Self {
+        Self::Compliance(Values::Uniform(compliance))
+    }
+
+    /// The formulation that it belongs to.
+    pub fn formulation(&self) -> Formulation {
+        match self {
+            Self::Pbd(_) => Formulation::Pbd,
+            Self::Compliance(_) => Formulation::Xpbd,
+        }
+    }
+
+    pub(crate) fn values(&self) -> &Values<T> {
+        match self {
+            Self::Pbd(values) | Self::Compliance(values) => values,
+        }
+    }
+
+    /// Checks range and length, then sorts per-constraint values by `order`.
+    pub(crate) fn validated(
+        self,
+        kind: &'static str,
+        count: usize,
+        order: &[u32],
+    ) -> Result<Self, SolverError> {
+        let highest = match self {
+            Self::Pbd(_) => 1.0,
+            Self::Compliance(_) => f64::MAX,
+        };
+        let (values, expected): (Values<T>, _) = match self {
+            Self::Pbd(ref values) => (values.clone(), "a PBD stiffness from 0 to 1"),
+            Self::Compliance(ref values) => (values.clone(), "a finite compliance, 0 or more"),
+        };
+        let check = |constraint, value: T| {
+            let value = value.to_f64();
+            let valid = (0.0..=highest).contains(&value);
+            if valid { Ok(()) } else { Err(SolverError::Stiffness { kind, constraint, value, expected }) }
+        };
+        let values = match values {
+            Values::Uniform(value) => {
+                check(None, value)?;
+                Values::Uniform(value)
+            }
+            Values::Each(values) => {
+                if values.len() != count {
+                    let what = "stiffness values";
+                    return Err(SolverError::KindLength { kind, what, found: values.len(), expected: count });
+                }
+                for (constraint, &value) in values.iter().enumerate() {
+                    check(Some(constraint), value)?;
+                }
+                Values::Each(order.iter().map(|&k| values[k as usize]).collect())
+            }
+        };
+        Ok(match self {
+            Self::Pbd(_) => Self::Pbd(values),
+            Self::Compliance(_) => Self::Compliance(values),
+        })
+    }
+}

@@ -1,0 +1,137 @@
+//! The state of a body: vertices, velocities, constraints by kind, handles.
+
+use cutis_constraints::Scalar;
+use nalgebra::{Point3, Vector3};
+
+use crate::handle::Carried;
+use crate::{Energy, Kind, MemoryPart, Momentum, Residual, SolverError, Vertex, VertexBlock};
+
+/// A body ready to be solved; built and checked by [`SystemBuilder`](crate::SystemBuilder).
+///
+/// A kind that was not added has no storage here at all.
+pub struct System<T: Scalar> {
+    pub(crate) origin: Vector3<T>,
+    pub(crate) vertices: Vec<Vertex<T>>,
+    pub(crate) previous: Vec<Point3<T>>,
+    pub(crate) velocities: Vec<Vector3<T>>,
+    pub(crate) kinds: Vec<Kind<T>>,
+    pub(crate) handles: Vec<Carried<T>>,
+}
+
+impl<T: Scalar> System<T> {
+    /// What the solver's coordinates are relative to, in the caller's coordinates (m). Zero unless the body lies
+    /// farther from the caller's origin than its own extent.
+    pub fn origin(&self) -> Point3<T> {
+        Point3::from(self.origin)
+    }
+
+    /// Vertices relative to [`origin`](Self::origin).
+    pub fn vertices(&self) -> &[Vertex<T>] {
+        &self.vertices
+    }
+
+    /// Positions in the caller's coordinates (m). A vertex that never moved has exactly the position it was given.
+    pub fn positions(&self) -> Vec<Point3<T>> {
+        self.vertices.iter().map(|vertex| vertex.position() + self.origin).collect()
+    }
+
+    /// Velocities in m/s.
+    pub fn velocities(&self) -> &[Vector3<T>] {
+        &self.velocities
+    }
+
+    /// The kinds of constraints, in the order they were added.
+    pub fn kinds(&self) -> &[Kind<T>] {
+        &self.kinds
+    }
+
+    /// The vertices to be moved and the kinds that say where, for use with [`Coloured`](crate::Coloured).
+    pub fn projection_parts(&mut self) -> (&mut [Vertex<T>], &[Kind<T>]) {
+        (&mut self.vertices, &self.kinds)
+    }
+
+    pub(crate) fn block(&mut self) -> VertexBlock<'_, T> {
+        VertexBlock {
+            vertices: &mut self.vertices,
+            previous: &mut self.previous,
+            velocities: &mut self.velocities,
+        }
+    }
+
+    pub(crate) fn carry_handles(&mut self, time_s: f64) {
+        for handle in &self.handles {
+            handle.carry(&mut self.vertices, time_s);
+        }
+    }
+
+    /// Residual of each kind at the present positions.
+    pub fn residuals(&self) -> Vec<Residual> {
+        self.kinds.iter().map(|kind| kind.residual(&self.vertices)).collect()
+    }
+
+    /// Vertices with finite mass: mass in kg, position in the caller's coordinates, velocity.
+    fn masses(&self) -> impl Iterator<Item = (f64, Vector3<f64>, Vector3<f64>)> {
+        self.vertices.iter().zip(&self.velocities).filter_map(|(vertex, velocity)| {
+            let inverse_mass = vertex.inverse_mass().to_f64();
+            let x = vertex.position().coords.map(T::to_f64) + self.origin.map(T::to_f64);
+            (inverse_mass > 0.0).then(|| (1.0 / inverse_mass, x, velocity.map(T::to_f64)))
+        })
+    }
+
+    /// Energy at the present positions and velocities, under the gravity given in m/s².
+    pub fn energy(&self, gravity_m_s2: [f64; 3]) -> Energy {
+        let gravity = Vector3::from(gravity_m_s2);
+        let (mut kinetic_j, mut gravity_j) = (0.0, 0.0);
+        for (mass, x, velocity) in self.masses() {
+            kinetic_j += 0.5 * mass * velocity.norm_squared();
+            gravity_j -= mass * gravity.dot(&x);
+        }
+        let elastic_j = self.kinds.iter().map(|kind| kind.elastic_energy(&self.vertices)).sum();
+        Energy { kinetic_j, elastic_j, gravity_j }
+    }
+
+    /// Linear momentum, angular momentum about the centre of mass, and the centre of mass.
+    pub fn momentum(&self) -> Momentum {
+        let (mut total, mut centre, mut linear) = (0.0, Vector3::zeros(), Vector3::zeros());
+        for (mass, x, velocity) in self.masses() {
+            total += mass;
+            centre += x * mass;
+            linear += velocity * mass;
+        }
+        if total > 0.0 {
+            centre /= total;
+        }
+        let angular = self.masses().map(|(mass, x, v)| (x - centre).cross(&v) * mass).sum();
+        Momentum { linear, angular, centre: Point3::from(centre) }
+    }
+
+    /// The largest distance in metres between a vertex and its place in `reference` (caller's coordinates).
+    ///
+    /// # Errors
+    /// [`SolverError::VertexLength`] unless `reference` has one position per vertex.
+    pub fn max_displacement<S: Scalar>(&self, reference: &[Point3<S>]) -> Result<f64, SolverError> {
+        let (found, expected) = (reference.len(), self.vertices.len());
+        if found != expected {
+            return Err(SolverError::VertexLength { what: "reference", found, expected });
+        }
+        let origin = self.origin.map(T::to_f64);
+        let distance = |(vertex, reference): (&Vertex<T>, &Point3<S>)| {
+            (vertex.position().coords.map(T::to_f64) + origin - reference.coords.map(S::to_f64)).norm()
+        };
+        Ok(self.vertices.iter().zip(reference).map(distance).fold(0.0, f64::max))
+    }
+
+    /// What the body stores: the vertices, then each kind that was added, then the handles if there are any.
+    pub fn bytes(&self) -> Vec<MemoryPart> {
+        let vertices = size_of_val(self.vertices.as_slice())
+            + size_of_val(self.previous.as_slice())
+            + size_of_val(self.velocities.as_slice());
+        let mut parts = vec![MemoryPart { name: "vertices", bytes: vertices }];
+        parts.extend(self.kinds.iter().map(|kind| MemoryPart { name: kind.name(), bytes: kind.bytes() }));
+        if !self.handles.is_empty() {
+            let bytes = self.handles.iter().map(Carried::bytes).sum();
+            parts.push(MemoryPart { name: "handles", bytes });
+        }
+        parts
+    }
+}

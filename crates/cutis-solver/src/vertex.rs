@@ -1,0 +1,42 @@
+//! One vertex: position and inverse mass side by side, because every projection needs both.
+
+use bytemuck::{Pod, Zeroable};
+use cutis_constraints::Scalar;
+use nalgebra::Point3;
+
+/// Position in metres and inverse mass in 1/kg (0 = fixed), four scalars in a row (16 bytes in `f32`).
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Vertex<T>([T; 4]);
+
+impl<T: Scalar> Vertex<T> {
+    /// A vertex at `position` (m) with `inverse_mass` (1/kg).
+    #[inline]
+    pub fn new(position: Point3<T>, inverse_mass: T) -> Self {
+        Self([position.x, position.y, position.z, inverse_mass])
+    }
+
+    /// Position in metres, relative to [`System::origin`](crate::System::origin).
+    #[inline]
+    pub fn position(&self) -> Point3<T> {
+        Point3::new(self.0[0], self.0[1], self.0[2])
+    }
+
+    /// Inverse mass in 1/kg; 0 = fixed or kinematic.
+    #[inline]
+    pub fn inverse_mass(&self) -> T {
+        self.0[3]
+    }
+
+    /// Moves the vertex; the mass stays.
+    #[inline]
+    pub fn set_position(&mut self, position: Point3<T>) {
+        *self = Self::new(position, self.inverse_mass());
+    }
+
+    /// Whether all three coordinates are finite.
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        self.0[..3].iter().all(|value| value.is_finite())
+    }
+}
