@@ -1,0 +1,34 @@
+//! What happened to the voxels.
+
+use std::ops::Add;
+
+use serde::Serialize;
+
+/// Counts over the voxels and tets of one resampling. Voxels are those of the region that was asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ResampleReport {
+    /// Voxels whose centre lies in a deformed tet.
+    pub covered_voxels: usize,
+    /// Covered voxels whose tet moved.
+    pub moved_voxels: usize,
+    /// Voxels of the rest shape that no deformed tet covers any more: they became air.
+    pub vacated_voxels: usize,
+    /// Voxels whose centre lies strictly inside two or more deformed body tets.
+    pub folds: usize,
+    /// Tets, of the whole mesh, whose volume changed its sign or vanished.
+    pub inverted_tets: usize,
+}
+
+impl Add for ResampleReport {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            covered_voxels: self.covered_voxels + other.covered_voxels,
+            moved_voxels: self.moved_voxels + other.moved_voxels,
+            vacated_voxels: self.vacated_voxels + other.vacated_voxels,
+            folds: self.folds + other.folds,
+            inverted_tets: self.inverted_tets + other.inverted_tets,
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Filling one z-slab of the output.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::raster::{Hold, TetRaster};
+use crate::report::ResampleReport;
+use crate::sample::trilinear;
+use crate::space::IndexSpace;
+use crate::warp::Warp;
+
+/// Bits of a voxel's state. The lowest two bits count the body tets that hold it strictly, up to two.
+const STRICT_COUNT: u8 = 0b11;
+const NEAR: u8 = 1 << 2;
+const INSIDE: u8 = 1 << 3;
+const MOVED: u8 = 1 << 4;
+const VACATED: u8 = 1 << 5;
+
+/// What a slab is filled from.
+pub struct Source<'a> {
+    pub warp: &'a Warp<'a>,
+    pub space: &'a IndexSpace,
+    pub voxels: &'a [i16],
+    pub shape: [usize; 3],
+    /// Stored value of a vacated voxel.
+    pub air: i16,
+}
+
+/// A box of output voxels, a few slices thick.
+pub struct Slab<'a> {
+    source: &'a Source<'a>,
+    region: [Range<usize>; 3],
+    values: &'a mut [i16],
+    state: Vec<u8>,
+}
+
+impl<'a> Slab<'a> {
+    /// `values` are the output voxels of `region`, filled with the input.
+    pub fn new(source: &'a Source<'a>, region: [Range<usize>; 3], values: &'a mut [i16]) -> Self {
+        let state = vec![0; values.len()];
+        Self { source, region, values, state }
+    }
+
+    /// Position in `values` of the first voxel of row `(j, k)`, less the region's first column.
+    fn row(&self, j: usize, k: usize) -> usize {
+        let [columns, rows, slices] = &self.region;
+        ((k - slices.start) * rows.len() + (j - rows.start)) * columns.len()
+    }
+
+    /// Gives the voxels of a deformed tet to it. Tets must come in ascending order.
+    pub fn deform(&mut self, tet: usize) {
+        let Source { warp, space, voxels, shape, .. } = *self.source;
+        let vertices = warp.tets[tet].map(|v| v as usize);
+        let deformed = vertices.map(|v| space.index(warp.deformed[v]));
+        let Some(raster) = TetRaster::new(&deformed, space.tolerance) else { return };
+        let inverse =
+            warp.tet_moved(tet).then(|| RestMap::new(&raster, vertices.map(|v| space.index(warp.rest[v]))));
+        let in_body = tet < warp.body_tets;
+        let region = self.region.clone();
+        raster.rows(&region, |j, k, range, base| {
+            let row = self.row(j, k);
+            for i in range {
+                let at = row + i - region[0].start;
+                let hold = raster.hold(&base, i);
+                let state = &mut self.state[at];
+                if in_body && hold == Hold::Strict && *state & STRICT_COUNT < 2 {
+                    *state += 1;
+                }
+                let claim = if hold == Hold::Near { NEAR } else { INSIDE };
+                // The first tet wins, and a tet that holds the centre wins over one that only comes near it.
+                if *state & INSIDE != 0 || *state & claim != 0 {
+                    continue;
+                }
+                *state = *state & !MOVED | claim;
+                self.values[at] = match &inverse {
+                    None => voxels[i + shape[0] * (j + shape[1] * k)],
+                    Some(map) => {
+                        *state |= MOVED;
+                        let rest = if hold == Hold::Near {
+                            map.nearest(raster.lambda(&base, i))
+                        } else {
+                            map.at([i, j, k].map(|index| index as f64))
+                        };
+                        trilinear(voxels, shape, rest)
+                    }
+                };
+            }
+        });
+    }
+
+    /// Turns the voxels of a tet at rest that no deformed tet covers to air. Call it after all [`Slab::deform`].
+    pub fn vacate(&mut self, vertices: [u32; 4]) {
+        let Source { warp, space, air, .. } = *self.source;
+        let rest = vertices.map(|v| space.index(warp.rest[v as usize]));
+        let Some(raster) = TetRaster::new(&rest, space.tolerance) else { return };
+        let region = self.region.clone();
+        raster.rows(&region, |j, k, range, _| {
+            let row = self.row(j, k);
+            for at in row + range.start - region[0].start..row + range.end - region[0].start {
+                if self.state[at] & (NEAR | INSIDE | VACATED) == 0 {
+                    self.state[at] = VACATED;
+                    self.values[at] = air;
+                }
+            }
+        });
+    }
+
+    /// Counts of this slab.
+    pub fn report(&self) -> ResampleReport {
+        let mut report = ResampleReport::default();
+        for &state in &self.state {
+            report.covered_voxels += usize::from(state & (NEAR | INSIDE) != 0);
+            report.moved_voxels += usize::from(state & MOVED != 0);
+            report.vacated_voxels += usize::from(state & VACATED != 0);
+            report.folds += usize::from(state & STRICT_COUNT > 1);
+        }
+        report
+    }
+}
+
+/// Deformed index → rest index inside one tet.
+struct RestMap {
+    corners: [Point3<f64>; 4],
+    linear: Matrix3<f64>,
+    offset: Vector3<f64>,
+}
+
+impl RestMap {
+    fn new(raster: &TetRaster, corners: [Point3<f64>; 4]) -> Self {
+        let mut linear = Matrix3::zeros();
+        let mut offset = corners[0].coords;
+        for c in 1..4 {
+            let edge = corners[c] - corners[0];
+            linear += edge * raster.gradient_of(c).transpose();
+            offset += edge * raster.constant_of(c);
+        }
+        Self { corners, linear, offset }
+    }
+
+    #[inline]
+    fn at(&self, index: [f64; 3]) -> [f64; 3] {
+        (self.linear * Vector3::from(index) + self.offset).into()
+    }
+
+    /// For a centre just outside: the coordinates are held in the tet, however thin it is.
+    fn nearest(&self, lambda: [f64; 4]) -> [f64; 3] {
+        let held = lambda.map(|l| l.max(0.0));
+        let sum: f64 = held.iter().sum();
+        let mut position = Vector3::zeros();
+        for c in 0..4 {
+            position += self.corners[c].coords * (held[c] / sum);
+        }
+        position.into()
+    }
+}

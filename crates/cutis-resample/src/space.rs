@@ -1,0 +1,49 @@
+//! Local metres of the mesh → continuous voxel index of the volume.
+
+use cutis_volume::Affine;
+use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
+
+/// The affine map from local metres to voxel index, with the rounding error that `f32` positions have there.
+pub struct IndexSpace {
+    linear: Matrix3<f64>,
+    offset: Vector3<f64>,
+    /// Length in voxels below which two `f32` positions cannot be told apart.
+    pub tolerance: f64,
+}
+
+impl IndexSpace {
+    /// The map for a mesh at `origin_mm`. The tolerance is four roundings of the largest coordinate of `positions`.
+    pub fn new(affine: &Affine, origin_mm: Point3<f64>, positions: [&[Point3<f32>]; 2]) -> Self {
+        // A power of two, so that the division is exact, of the size of a body.
+        let reach = 1024.0;
+        let zero = affine.to_index(Point3::origin());
+        let column = |axis: usize| {
+            let mut end = Point3::origin();
+            end[axis] = reach;
+            (affine.to_index(end) - zero) * (1000.0 / reach)
+        };
+        let linear = Matrix3::from_columns(&[column(0), column(1), column(2)]);
+        let extent =
+            |points: &[Point3<f32>]| points.par_iter().map(|p| p.coords.amax()).reduce(|| 0.0, f32::max);
+        let largest = f64::from(extent(positions[0]).max(extent(positions[1])));
+        let stretch = (0..3).map(|row| linear.row(row).norm()).fold(0.0, f64::max);
+        Self {
+            linear,
+            offset: affine.to_index(origin_mm).coords,
+            tolerance: 4.0 * f64::from(f32::EPSILON) * largest * stretch,
+        }
+    }
+
+    /// Continuous index of a position in local metres.
+    #[inline]
+    pub fn index(&self, local: Point3<f32>) -> Point3<f64> {
+        Point3::from(self.linear * local.coords.map(f64::from) + self.offset)
+    }
+
+    /// Third component of [`IndexSpace::index`], the same bits.
+    #[inline]
+    pub fn slice(&self, local: Point3<f32>) -> f64 {
+        self.index(local).z
+    }
+}
