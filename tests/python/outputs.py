@@ -1,0 +1,194 @@
+"""What `cutis` writes, read by nibabel and SimpleITK: same voxels, same millimetres, a header that both understand."""
+
+import json
+import tempfile
+from pathlib import Path
+
+import nibabel
+import numpy as np
+
+from _compare import (
+    POSITION_SHARE,
+    Tally,
+    by_itk,
+    by_nibabel,
+    data_folder,
+    differences,
+    inspect,
+    marked_voxel_mm,
+    require_rejection,
+    run_program,
+    same_place,
+)
+
+# Springs that are at rest: whatever moves in these scenes is moved by gravity alone.
+SCENE = """
+[volume]
+path = "{volume}"
+[tissue]
+keep = "all"
+[constraints.distance]
+youngs_modulus_pa = 2.0e4
+[solver]
+dt_s = {dt_s}
+substeps = 1
+gravity_m_s2 = [{gravity}, 0.0, 0.0]
+damping_per_s = 0.0
+[run]
+frames = {frames}
+[output]
+volume = true
+report = true
+"""
+
+# Inputs of other orientations, types and slopes, from the folder of test data.
+OTHERS = ["awkward/orient_PIR.nii.gz", "awkward/oblique.nii.gz", "awkward/bigendian_i16.nii", "ct/leg_sts013_64x55x58.nii.gz"]
+
+REPORT_KEYS = {
+    "schema": (),
+    "cutis_version": (),
+    "inputs": (),
+    "backend": ("name", "adapter"),
+    "sizes": ("vertices", "edges", "tets", "skin_triangles"),
+    "colors": ("distance", "volume", "stc"),
+    "stages": (),
+    "frames": ("count", "ms_mean", "ms_min"),
+    "wound": ("initial_mm", "final_mm", "mid_mm"),
+    "resample": ("covered_voxels", "folds"),
+    "residuals": (),
+    "left_out": (),
+    "warnings": (),
+}
+
+
+def run_or_fail(*words):
+    process = run_program(*words)
+    if process.returncode != 0:
+        raise AssertionError(f"cutis {' '.join(map(str, words))} ended with {process.returncode}: {process.stderr}")
+    return process
+
+
+def header_problems(path):
+    """NIfTI-1, int16, no scaling, mm, qform and sform alike."""
+    image = nibabel.load(path)
+    header = image.header
+    wanted = {
+        "NIfTI-1": type(image) is nibabel.Nifti1Image,
+        "int16": image.get_data_dtype() == np.int16,
+        "slope 1": image.dataobj.slope == 1.0 and image.dataobj.inter == 0.0,
+        "mm": header.get_xyzt_units()[0] == "mm",
+        "codes 1": int(header["qform_code"]) == int(header["sform_code"]) == 1,
+        "qform = sform": np.allclose(image.get_qform(), image.get_sform(), rtol=0.0, atol=POSITION_SHARE * min(header.get_zooms())),
+    }
+    return [f"header is not {name}" for name, held in wanted.items() if not held]
+
+
+def readers_agree(path, label, tally):
+    """All three read the file alike, and put its brightest voxel at one place. Returns what nibabel sees."""
+    ours, report = inspect(path)
+    if ours is None:
+        raise AssertionError(f"cutis refuses its own {label}: {report.stderr}")
+    nibabel_sees, itk_sees = by_nibabel(path), by_itk(path)
+    apart = np.abs(marked_voxel_mm(nibabel_sees) - marked_voxel_mm(itk_sees)).max()
+    tally.check(f"{label} header", header_problems(path))
+    tally.check(f"{label} by nibabel", differences(ours, nibabel_sees))
+    tally.check(f"{label} by SimpleITK", differences(ours, itk_sees))
+    tally.check(f"{label} marked voxel", [] if apart < 1e-3 else [f"{apart} mm apart"])
+    require_rejection(nibabel_sees)
+    return nibabel_sees
+
+
+def deformed(volume, folder, frames=0, gravity=0.0, dt_s=0.01):
+    """Runs the scene and gives the path of the deformed CT."""
+    folder.mkdir()
+    scene = folder / "scene.toml"
+    scene.write_text(SCENE.format(volume=volume, frames=frames, gravity=gravity, dt_s=dt_s))
+    run_or_fail("run", scene, "--out", folder / "run")
+    return folder / "run" / "deformed.nii.gz"
+
+
+def untouched_problems(before, after):
+    """A body that nothing moved comes back voxel for voxel, at the same place."""
+    problems = [] if same_place(after, before) else ["shape or affine changed"]
+    if before.values.shape == after.values.shape:
+        changed = int((before.values != after.values).sum())
+        problems += [f"{changed} voxels changed"] if changed else []
+    return problems
+
+
+def shifted_problems(before, after):
+    """Tissue with tissue all around it has moved by one voxel along the first axis, value for value."""
+    tissue = before.values > -449
+    inner = tissue[1:-1, 1:-1, 1:-1].copy()
+    for axis in range(3):
+        for step in (-1, 1):
+            inner &= np.roll(tissue, step, axis)[1:-1, 1:-1, 1:-1]
+    if inner.sum() < 1000:
+        return [f"only {inner.sum()} voxels to compare"]
+    source = before.values[1:-1, 1:-1, 1:-1][inner]
+    target = after.values[2:, 1:-1, 1:-1][inner]
+    wrong = int((source != target).sum())
+    return [f"{wrong} of {inner.sum()} voxels did not arrive"] if wrong else []
+
+
+def check_phantom(work, tally):
+    phantom = work / "phantom.nii.gz"
+    for path, seed in ((phantom, 1), (work / "again.nii.gz", 1), (work / "other.nii.gz", 2)):
+        run_or_fail("phantom", "--size", "48,48,40", "--seed", seed, "--out", path)
+    same = phantom.read_bytes() == (work / "again.nii.gz").read_bytes()
+    other = phantom.read_bytes() != (work / "other.nii.gz").read_bytes()
+    tally.check("phantom by seed", ([] if same else ["one seed, two files"]) + ([] if other else ["the seed has no effect"]))
+    return phantom, readers_agree(phantom, "phantom", tally)
+
+
+def check_runs(phantom, before, work, tally):
+    rest = readers_agree(deformed(phantom, work / "rest"), "rest", tally)
+    tally.check("rest", untouched_problems(before, rest))
+
+    # One frame under gravity g moves everything by g dt^2: here by one voxel along +x.
+    step_mm = before.affine[0, 0]
+    falling = deformed(phantom, work / "fall", frames=1, gravity=step_mm / 1000.0 / 0.01**2)
+    fallen = readers_agree(falling, "fall", tally)
+    tally.check("fall", shifted_problems(before, fallen))
+    tally.check("fall keeps the grid", [] if same_place(fallen, before) else ["shape or affine changed"])
+
+    caught = bool(untouched_problems(before, fallen)) and bool(shifted_problems(before, rest))
+    tally.check("negative control", [] if caught else ["a fall passed for rest, or rest for a fall"])
+
+
+def check_demo(work, tally):
+    folder = work / "demo"
+    run_or_fail("demo", "--out", folder, "--frames", 2)
+    readers_agree(folder / "deformed.nii.gz", "demo", tally)
+    report = json.loads((folder / "report.json").read_text())
+    missing = [key for key in REPORT_KEYS if key not in report]
+    for key, inner in REPORT_KEYS.items():
+        missing += [f"{key}.{name}" for name in inner if name not in (report.get(key) or {})]
+    tally.check("demo report", [f"report.json has no {key}" for key in missing])
+    unfinished = [path.name for path in folder.iterdir() if not path.stat().st_size or path.suffix in (".tmp", ".part")]
+    tally.check("demo folder", [f"{name} is empty or unfinished" for name in unfinished])
+
+
+def check_others(work, tally):
+    data = data_folder()
+    if data is None:
+        return
+    for number, name in enumerate(OTHERS):
+        before = by_nibabel(data / name)
+        after = readers_agree(deformed(data / name, work / f"other{number}"), name, tally)
+        tally.check(f"{name} untouched", untouched_problems(before, after))
+
+
+def main():
+    tally = Tally("outputs")
+    with tempfile.TemporaryDirectory() as work:
+        work = Path(work)
+        phantom, before = check_phantom(work, tally)
+        check_runs(phantom, before, work, tally)
+        check_demo(work, tally)
+        check_others(work, tally)
+    tally.finish()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,5 @@
-//! One fact in one place: members take versions, lints and dependencies from the workspace manifest.
+//! One fact in one place: members take versions, lints and dependencies from the workspace manifest; what is published
+//! carries its licences.
 
 use std::path::Path;
 
@@ -6,6 +7,10 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 
 use super::Finding;
+use super::files::Files;
+
+/// What every published crate carries, as links to the files of the root.
+const LICENCES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 
 /// Keys of `[package]` that have their one value in the workspace manifest.
 const INHERITED: [&str; 4] = ["version", "edition", "rust-version", "license"];
@@ -59,6 +64,23 @@ pub fn check(path: &str, text: &str) -> Vec<Finding> {
     findings
 }
 
+/// Licence files that are missing beside a member's manifest, unless it is never published.
+pub fn licences(path: &str, text: &str, files: &Files) -> Vec<Finding> {
+    let table: toml::Table = text.parse().unwrap_or_default();
+    let publish =
+        table.get("package").and_then(|package| package.get("publish")).and_then(toml::Value::as_bool);
+    if publish == Some(false) {
+        return Vec::new();
+    }
+    let folder = path.trim_end_matches("Cargo.toml");
+    let missing = LICENCES.iter().filter(|name| !files.exists(&format!("{folder}{name}")));
+    missing
+        .map(|name| {
+            Finding::failure(path, 0, format!("needs `{name}` beside it: ln -s ../../{name} {folder}"))
+        })
+        .collect()
+}
+
 fn inherits(value: Option<&toml::Value>) -> bool {
     value.and_then(|value| value.get("workspace")).and_then(toml::Value::as_bool) == Some(true)
 }
@@ -103,5 +125,14 @@ mod tests {
             assert_eq!(check("Cargo.toml", &GOOD.replace(from, to)).len(), 1, "{from} -> {to}");
         }
         assert_eq!(check("Cargo.toml", "not toml").len(), 1);
+    }
+
+    #[test]
+    fn a_published_crate_without_its_licences_is_caught() {
+        let files = Files::of(&["crates/a/LICENSE-MIT", "crates/a/LICENSE-APACHE", "crates/b/LICENSE-MIT"]);
+        assert_eq!(licences("crates/a/Cargo.toml", GOOD, &files), []);
+        assert_eq!(licences("crates/b/Cargo.toml", GOOD, &files).len(), 1);
+        let unpublished = GOOD.replace("[package]", "[package]\npublish = false");
+        assert_eq!(licences("crates/b/Cargo.toml", &unpublished, &files), []);
     }
 }

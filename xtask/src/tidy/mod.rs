@@ -77,7 +77,9 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         pages += 1;
     }
     for path in manifests::members(&metadata, &workspace.root)? {
-        findings.extend(manifests::check(&path, &files.read(&path)?));
+        let text = files.read(&path)?;
+        findings.extend(manifests::check(&path, &text));
+        findings.extend(manifests::licences(&path, &text, &files));
     }
 
     for finding in &findings {
