@@ -20,7 +20,7 @@ pub enum VolumeError {
     #[error("affine {rows:?} is not invertible: it must map voxel indices to distinct millimetre positions")]
     SingularAffine {
         /// The four rows.
-        rows: [[f64; 4]; 4],
+        rows: Box<[[f64; 4]; 4]>,
     },
     /// The operating system refused: missing file, no permission, disk full, damaged gzip stream.
     #[error("cannot {action} {path}: {source}")]
@@ -160,5 +160,111 @@ pub enum VolumeError {
         expected: usize,
         /// Voxels pushed.
         found: usize,
+    },
+    /// A phantom with no voxels along an axis, or with too many for the axis or for memory.
+    #[error(
+        "a phantom of shape {shape:?} cannot be made: expected 1 to {most} voxels per axis, and memory for all of them"
+    )]
+    PhantomShape {
+        /// Voxels per axis.
+        shape: [usize; 3],
+        /// The most that an axis may have.
+        most: usize,
+    },
+    /// Slices that a volume does not have.
+    #[error("slices {start}..{end} were asked for, the volume has {count}")]
+    SliceRange {
+        /// First slice.
+        start: usize,
+        /// One past the last slice.
+        end: usize,
+        /// Slices of the volume.
+        count: usize,
+    },
+    /// Concentric spheres need radii that are finite, positive and decrease from the outermost inwards.
+    #[error(
+        "sphere radii {radii_mm:?} mm: expected finite positive values, the outermost first and each one smaller"
+    )]
+    SphereRadii {
+        /// The radii, mm.
+        radii_mm: Vec<f64>,
+    },
+    /// A volume needs at least one voxel, and no more than memory can address.
+    #[error(
+        "shape {shape:?} is not possible: expected at least 1 voxel per axis, and fewer than {} in all",
+        usize::MAX
+    )]
+    Shape {
+        /// Voxels per axis.
+        shape: [usize; 3],
+    },
+    /// The map from stored values to HU must be invertible.
+    #[error("HU = {slope} × stored + {intercept}: expected finite numbers and a slope that is not 0")]
+    Scaling {
+        /// HU per stored unit.
+        slope: f32,
+        /// HU of the stored value 0.
+        intercept: f32,
+    },
+    /// A table needs finite points in ascending order of HU.
+    #[error(
+        "table in {unit}: {count} points, point {point} is {value:?}: expected finite numbers and HU that increase from point to point"
+    )]
+    Table {
+        /// Unit of the table.
+        unit: String,
+        /// How many points were given; at least one is needed.
+        count: usize,
+        /// The first that is wrong.
+        point: usize,
+        /// Its HU and value.
+        value: Option<[f32; 2]>,
+    },
+    /// The text is no table.
+    #[error(
+        "{origin}: {message}; expected for example: unit = \"kg/m3\", points = [[-1000, 1.2], [0, 1000]]"
+    )]
+    TableText {
+        /// File name, or what else the text came from.
+        origin: String,
+        /// What the parser found.
+        message: String,
+    },
+    /// No preset of that name.
+    #[error("no {kind} table is called {name:?}: expected {expected}")]
+    Preset {
+        /// What the table is for.
+        kind: &'static str,
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        expected: String,
+    },
+    /// The text is no lattice size.
+    #[error(
+        "lattice {text:?}: expected native, a spacing in mm (4.0) or vertices along the axes (129,107,118)"
+    )]
+    LatticeText {
+        /// What was given.
+        text: String,
+    },
+    /// A lattice needs two vertices along each axis, and a number of vertices that fits into 32 bits.
+    #[error(
+        "a lattice of {vertices:?} vertices cannot be laid over {shape:?} voxels: expected at least 2 along each axis of both, \
+         and at most {most} in all"
+    )]
+    LatticeSize {
+        /// Vertices along the axes, rounded; infinite for a spacing of 0.
+        vertices: [f64; 3],
+        /// Voxels along the axes.
+        shape: [usize; 3],
+        /// The most a lattice can have.
+        most: u64,
+    },
+    /// A spacing must be a positive length.
+    #[error("lattice spacing {spacing_mm} mm: expected a positive number")]
+    LatticeSpacing {
+        /// What was given.
+        spacing_mm: f64,
     },
 }

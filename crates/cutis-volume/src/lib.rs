@@ -6,10 +6,11 @@ mod error;
 mod grid;
 pub mod nifti;
 mod partial_file;
+pub mod phantom;
 mod volume;
 
 pub use affine::Affine;
 pub use error::VolumeError;
 pub use grid::Grid;
 pub use partial_file::PartialFile;
-pub use volume::Volume;
+pub use volume::{AIR_HU, Volume};

@@ -34,7 +34,8 @@ impl Profile {
 
     /// An upper bound of the curve: the largest knot and what the spline may overshoot by.
     pub(super) fn highest(&self) -> f32 {
-        let (low, high) = self.0.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+        let (low, high) =
+            self.0.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
         // Between knots the outer weights of Catmull–Rom sum to −1/8 at most.
         high + 0.125 * (high - low)
     }

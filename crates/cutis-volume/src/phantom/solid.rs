@@ -286,7 +286,9 @@ mod tests {
     #[test]
     fn every_solid_lies_within_its_bounds() {
         let solids = [
-            Solid::Blob(Blob::new([3.0, -4.0, 5.0], [30.0, 12.0, 20.0]).squared(0.8).turned(0, 0.4).turned(1, -0.7)),
+            Solid::Blob(
+                Blob::new([3.0, -4.0, 5.0], [30.0, 12.0, 20.0]).squared(0.8).turned(0, 0.4).turned(1, -0.7),
+            ),
             Solid::Capsule(Capsule::new([[-20.0, 5.0, 5.0], [18.0, -9.0, 2.0]], [6.0, 2.0])),
             Solid::Board(Board { top: -10.0, thickness: 6.0, half_width: 30.0, bend: 60.0 }),
         ];
@@ -297,7 +299,10 @@ mod tests {
                 let p = [n % 40, n / 40 % 40, n / 1600].map(|c| 2.0 * f32::from(c) - 39.0);
                 if at(solid, p) < 0.0 {
                     inside += 1;
-                    assert!((0..3).all(|axis| bounds.covers(axis, p[axis], 1e-3)), "{p:?} is outside the bounds");
+                    assert!(
+                        (0..3).all(|axis| bounds.covers(axis, p[axis], 1e-3)),
+                        "{p:?} is outside the bounds"
+                    );
                 }
             }
             assert!(inside > 100, "the scan met the solid {inside} times only");

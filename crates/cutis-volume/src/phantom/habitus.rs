@@ -1,0 +1,106 @@
+//! Build of the person: outlines of skin, muscle and body cavity, the course of the spine, and the scanner table.
+//!
+//! RAS+ millimetres: x to the right, y to the front, z to the head; the lowest rib arch is near z = 0.
+
+use super::part::{Part, grainy, layer};
+use super::profile::Profile;
+use super::random::Random;
+use super::solid::{Board, Outline, Solid};
+
+/// Height of the skin of the back, mm: flat, as the person lies on it.
+const BACK_MM: f32 = 100.0;
+/// Free distance between the skin of the back and the table, mm.
+const TABLE_GAP_MM: f32 = 12.0;
+
+/// Outlines of one person.
+pub(super) struct Habitus {
+    pub(super) skin: Outline,
+    pub(super) muscle: Outline,
+    pub(super) cavity: Outline,
+    spine: Profile,
+    width: f32,
+    depth: f32,
+}
+
+impl Habitus {
+    /// A person of random width, depth and fatness.
+    pub(super) fn new(random: &mut Random) -> Self {
+        let width = random.between(0.94, 1.05);
+        let depth = random.between(0.94, 1.08);
+        let fatness = random.between(0.75, 1.3);
+
+        // Knots from z = −300 (hips) to 300 (upper chest), every 100 mm.
+        let side = Profile::new([172.0, 170.0, 161.0, 154.0, 158.0, 163.0, 158.0]).scaled(width);
+        let front = Profile::new([84.0, 92.0, 100.0, 101.0, 102.0, 101.0, 90.0]).scaled(depth);
+        let back = Profile::new([BACK_MM; 7]);
+        let skin = Outline { side, front, back, squareness: 0.45 };
+
+        let fat_side = Profile::new([28.0, 27.0, 25.0, 18.0, 12.0, 10.0, 10.0]);
+        let fat_front = Profile::new([18.0, 24.0, 25.0, 20.0, 13.0, 11.0, 11.0]);
+        let fat_back = Profile::new([20.0, 18.0, 14.0, 11.0, 10.0, 10.0, 10.0]);
+        let muscle = Outline {
+            side: side.plus(&fat_side, -fatness),
+            front: front.plus(&fat_front, -fatness),
+            back: back.plus(&fat_back, -1.0),
+            squareness: 0.45,
+        };
+
+        let wall_side = Profile::new([58.0, 46.0, 17.0, 14.0, 15.0, 16.0, 20.0]);
+        let wall_front = Profile::new([16.0, 11.0, 10.0, 11.0, 14.0, 16.0, 18.0]);
+        let wall_back = Profile::new([20.0, 22.0, 30.0, 26.0, 15.0, 15.0, 18.0]);
+        let cavity = Outline {
+            side: muscle.side.plus(&wall_side, -1.0),
+            front: muscle.front.plus(&wall_front, -1.0),
+            back: muscle.back.plus(&wall_back, -1.0),
+            squareness: 0.45,
+        };
+
+        let spine = Profile::new([-66.0, -58.0, -34.0, -36.0, -46.0, -50.0, -46.0]);
+        Self { skin, muscle, cavity, spine, width, depth }
+    }
+
+    /// A place described for the average person, moved to where it is in this one.
+    pub(super) fn place(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        [x * self.width, if y > 0.0 { y * self.depth } else { y }, z]
+    }
+
+    /// Height of the middle of the vertebral column at `z`.
+    pub(super) fn spine(&self, z: f32) -> f32 {
+        self.spine.at(z)
+    }
+
+    /// Skin and subcutaneous fat, the muscle wall, and the cavity filled with inner fat.
+    pub(super) fn walls(&self) -> Vec<Part> {
+        vec![
+            Part::new([Solid::Outline(self.skin)], [layer(0.0, 25.0), grainy(2.0, -102.0, 12.0)]),
+            Part::new([Solid::Outline(self.muscle)], [grainy(0.0, 52.0, 14.0)]).wobbly(1.5),
+            Part::new([Solid::Outline(self.cavity)], [grainy(0.0, -98.0, 14.0)]).wobbly(1.0),
+        ]
+    }
+}
+
+/// The scanner table: a carbon shell around foam.
+pub(super) fn table() -> Part {
+    let board = Board { top: -BACK_MM - TABLE_GAP_MM, thickness: 26.0, half_width: 185.0, bend: 620.0 };
+    Part::new([Solid::Board(board)], [layer(0.0, -60.0), layer(3.0, -925.0)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outlines_nest_in_everybody_and_fit_the_field_of_view() {
+        for seed in 0..200 {
+            let person = Habitus::new(&mut Random::new(seed, 0));
+            for z in (-300..=300).step_by(10).map(|z| z as f32) {
+                let outlines = [person.skin, person.muscle, person.cavity];
+                let radii = outlines.map(|o| [o.side.at(z), o.front.at(z), o.back.at(z)]);
+                for c in 0..3 {
+                    assert!(radii[0][c] < 195.0 && radii[2][c] > 30.0, "seed {seed}, z {z}: {radii:?}");
+                    assert!(radii[0][c] > radii[1][c] + 5.0 && radii[1][c] > radii[2][c] + 5.0);
+                }
+            }
+        }
+    }
+}

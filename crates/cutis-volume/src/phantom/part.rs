@@ -1,0 +1,244 @@
+//! Tissue: solids joined into one body with layers of Hounsfield units, painted over what lies below along rows of voxels.
+
+use super::random::Field;
+use super::solid::{Bounds, Outline, Solid};
+
+/// Material from `inset_mm` below the surface inwards, until the next layer.
+#[derive(Clone, Copy)]
+pub(super) struct Layer {
+    inset_mm: f32,
+    hu: f32,
+    grain_hu: f32,
+}
+
+/// A layer of even Hounsfield units.
+pub(super) const fn layer(inset_mm: f32, hu: f32) -> Layer {
+    grainy(inset_mm, hu, 0.0)
+}
+
+/// A layer whose Hounsfield units vary by `grain_hu` from place to place.
+pub(super) const fn grainy(inset_mm: f32, hu: f32, grain_hu: f32) -> Layer {
+    Layer { inset_mm, hu, grain_hu }
+}
+
+/// The union of some solids, filled with layers from the surface inwards.
+pub(super) struct Part {
+    solids: Vec<(Solid, Bounds)>,
+    layers: Vec<Layer>,
+    wobble_mm: f32,
+    cavity_margin_mm: Option<f32>,
+    above: Option<(usize, f32)>,
+}
+
+impl Part {
+    pub(super) fn new(solids: impl IntoIterator<Item = Solid>, layers: impl Into<Vec<Layer>>) -> Self {
+        let solids = solids.into_iter().map(|solid| {
+            let bounds = solid.bounds();
+            (solid, bounds)
+        });
+        Self {
+            solids: solids.collect(),
+            layers: layers.into(),
+            wobble_mm: 0.0,
+            cavity_margin_mm: None,
+            above: None,
+        }
+    }
+
+    /// With a surface that swells and shrinks by up to `wobble_mm`.
+    pub(super) fn wobbly(self, wobble_mm: f32) -> Self {
+        Self { wobble_mm, ..self }
+    }
+
+    /// Only what lies at least `margin_mm` inside the body cavity.
+    pub(super) fn in_cavity(self, margin_mm: f32) -> Self {
+        Self { cavity_margin_mm: Some(margin_mm), ..self }
+    }
+
+    /// Only what lies above `level_mm` along `axis` (1 or 2).
+    pub(super) fn above(self, axis: usize, level_mm: f32) -> Self {
+        Self { above: Some((axis, level_mm)), ..self }
+    }
+}
+
+/// The part and those of its solids that meet one axial plane.
+pub(super) struct Active<'a> {
+    part: &'a Part,
+    solids: Vec<&'a (Solid, Bounds)>,
+}
+
+/// The parts that meet the plane at height `z`, in painting order.
+pub(super) fn active(parts: &[Part], z: f32, blend_mm: f32) -> Vec<Active<'_>> {
+    let meets = |part: &Part, bounds: &Bounds| bounds.covers(2, z, part.wobble_mm + blend_mm);
+    let actives = parts.iter().map(|part| Active {
+        part,
+        solids: part.solids.iter().filter(|(_, bounds)| meets(part, bounds)).collect(),
+    });
+    actives.filter(|active| !active.solids.is_empty()).collect()
+}
+
+/// One row of sample points along x, and scratch space for painting it.
+pub(super) struct Row<'a> {
+    xs: &'a [f32],
+    step: f32,
+    blend_mm: f32,
+    hu: Vec<f32>,
+    distance: Vec<f32>,
+    cavity: Vec<f32>,
+    wobble: Vec<f32>,
+    grain: Vec<f32>,
+    columns: Vec<f32>,
+}
+
+/// What rows share: the fields of variation and the body cavity.
+pub(super) struct Surroundings {
+    pub(super) cavity: Outline,
+    pub(super) wobble: Field,
+    pub(super) grain: Field,
+}
+
+impl<'a> Row<'a> {
+    /// For the ascending, evenly spaced sample points `xs`; edges are blended over `blend_mm`.
+    pub(super) fn new(xs: &'a [f32], step: f32, blend_mm: f32) -> Self {
+        let zeros = || vec![0.0; xs.len()];
+        Self {
+            xs,
+            step,
+            blend_mm,
+            hu: zeros(),
+            distance: vec![f32::INFINITY; xs.len()],
+            cavity: zeros(),
+            wobble: zeros(),
+            grain: zeros(),
+            columns: Vec::new(),
+        }
+    }
+
+    /// Hounsfield units of the row at `(y, z)`: `background_hu`, then the parts painted over it one after the other.
+    pub(super) fn paint(
+        &mut self,
+        actives: &[Active<'_>],
+        around: &Surroundings,
+        y: f32,
+        z: f32,
+        background_hu: f32,
+    ) -> &[f32] {
+        self.hu.fill(background_hu);
+        self.cavity.fill(f32::INFINITY);
+        around.cavity.lower_row(self.xs, y, z, &mut self.cavity);
+        around.wobble.fill_row(self.xs, y, z, &mut self.columns, &mut self.wobble);
+        around.grain.fill_row(self.xs, y, z, &mut self.columns, &mut self.grain);
+        for active in actives {
+            self.paint_part(active, y, z);
+        }
+        &self.hu
+    }
+
+    fn paint_part(&mut self, active: &Active<'_>, y: f32, z: f32) {
+        let part = active.part;
+        let scale = 1.0 / self.blend_mm;
+        let side = match part.above {
+            Some((axis, level)) => coverage(level - if axis == 1 { y } else { z }, scale),
+            None => 1.0,
+        };
+        if side == 0.0 {
+            return;
+        }
+        let margin = part.wobble_mm + self.blend_mm;
+        let mut touched = self.xs.len()..0;
+        for (solid, bounds) in &active.solids {
+            if bounds.covers(1, y, margin) {
+                let span = self.span(bounds.low[0] - margin, bounds.high[0] + margin);
+                solid.lower_row(&self.xs[span.clone()], y, z, &mut self.distance[span.clone()]);
+                touched = touched.start.min(span.start)..touched.end.max(span.end);
+            }
+        }
+        if touched.is_empty() {
+            return;
+        }
+        let distance = &mut self.distance[touched.clone()];
+        let hu = &mut self.hu[touched.clone()];
+        let [cavity, wobble, grain] =
+            [&self.cavity, &self.wobble, &self.grain].map(|values| &values[touched.clone()]);
+        for (d, w) in distance.iter_mut().zip(wobble) {
+            *d += part.wobble_mm * w;
+        }
+        let mut outer: Option<Layer> = None;
+        for &layer in &part.layers {
+            for i in 0..hu.len() {
+                let share = match part.cavity_margin_mm {
+                    Some(margin) => side * coverage(cavity[i] + margin, scale),
+                    None => side,
+                };
+                let below = outer.map_or(hu[i], |outer| outer.hu + outer.grain_hu * grain[i]);
+                let value = layer.hu + layer.grain_hu * grain[i];
+                hu[i] += share * coverage(distance[i] + layer.inset_mm, scale) * (value - below);
+            }
+            outer = Some(layer);
+        }
+        distance.fill(f32::INFINITY);
+    }
+
+    /// The sample points from `low` to `high`, mm.
+    fn span(&self, low: f32, high: f32) -> std::ops::Range<usize> {
+        let Some(&first) = self.xs.first() else { return 0..0 };
+        let index = |x: f32| ((x - first) / self.step).max(0.0) as usize;
+        let end = if high < first { 0 } else { (index(high) + 2).min(self.xs.len()) };
+        index(low).min(end)..end
+    }
+}
+
+/// Share of a sample within a surface at signed distance `d`: a ramp over the width of one blend.
+#[inline(always)]
+fn coverage(d: f32, scale: f32) -> f32 {
+    (0.5 - d * scale).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::profile::Profile;
+    use super::super::solid::Blob;
+    use super::*;
+
+    fn paint(part: Part) -> Vec<f32> {
+        let xs: Vec<f32> = (0..81).map(|i| i as f32 - 40.0).collect();
+        let cavity = Outline {
+            side: Profile::new([15.0; 7]),
+            front: Profile::new([15.0; 7]),
+            back: Profile::new([15.0; 7]),
+            squareness: 0.0,
+        };
+        let around = Surroundings { cavity, wobble: Field::new(1, 1, 9.0), grain: Field::new(1, 2, 9.0) };
+        let parts = [part];
+        Row::new(&xs, 1.0, 1.0).paint(&active(&parts, 0.5, 1.0), &around, 0.25, 0.5, -1000.0).to_vec()
+    }
+
+    fn ball(radius: f32) -> Solid {
+        Solid::Blob(Blob::new([0.0; 3], [radius; 3]))
+    }
+
+    #[test]
+    fn layers_follow_the_surface() {
+        let row = paint(Part::new([ball(20.0)], [layer(0.0, 10.0), layer(4.0, 200.0)]));
+        assert_eq!([row[0], row[40], row[40 + 18], row[40 - 18]], [-1000.0, 200.0, 10.0, 10.0]);
+        assert!(row[60] > -1000.0 && row[60] < 10.0, "the edge is blended: {}", row[60]);
+    }
+
+    #[test]
+    fn clips_hold() {
+        let row = paint(Part::new([ball(20.0)], [layer(0.0, 10.0)]).in_cavity(2.0));
+        assert_eq!([row[40 + 12], row[40 + 14]], [10.0, -1000.0]);
+        let below = paint(Part::new([ball(20.0)], [layer(0.0, 10.0)]).above(1, 5.0));
+        assert!(below.iter().all(|&hu| hu == -1000.0));
+        let above = paint(Part::new([ball(20.0)], [layer(0.0, 10.0)]).above(2, -5.0));
+        assert_eq!(above[40], 10.0);
+    }
+
+    #[test]
+    fn solids_of_one_part_share_their_inside() {
+        // Two overlapping balls with a thick wall: no wall where they overlap.
+        let at = |x: f32| Solid::Blob(Blob::new([x, 0.0, 0.0], [12.0; 3]));
+        let row = paint(Part::new([at(-8.0), at(8.0)], [layer(0.0, 50.0), layer(3.0, 0.0)]));
+        assert_eq!([row[40], row[40 + 18], row[40 - 18]], [0.0, 50.0, 50.0]);
+    }
+}

@@ -1,0 +1,119 @@
+//! The scanner: voxels as means over sample points, with noise.
+
+use rayon::prelude::*;
+
+use super::anatomy::Anatomy;
+use super::part::{Active, Row, active};
+use super::random::{hash, normal};
+use crate::{AIR_HU, Grid};
+
+/// Largest distance between sample points, mm.
+const SAMPLE_MM: f64 = 2.5;
+const BACKGROUND_HU: f32 = -1000.0;
+/// Upper end of a 12-bit scanner's range, HU.
+const HIGHEST_HU: f32 = 3071.0;
+/// Standard deviation of the noise at the edge of the field of view and what the middle adds to it, HU.
+const NOISE_HU: [f32; 2] = [6.0, 7.0];
+/// The stream of random numbers of the noise.
+const NOISE_STREAM: u64 = 100;
+/// Rows that one task computes at least.
+const ROWS_PER_TASK: usize = 4;
+
+/// Sample points of one axis: `factor` for each voxel, evenly spread over it.
+struct Samples {
+    at: Vec<f32>,
+    factor: usize,
+    step: f32,
+}
+
+impl Samples {
+    fn new(grid: &Grid, axis: usize) -> Self {
+        let spacing = grid.affine.spacing_mm()[axis];
+        let first = grid.mm([0; 3])[axis];
+        let factor = (spacing / SAMPLE_MM).ceil().max(1.0) as usize;
+        let step = spacing / factor as f64;
+        let start = first - 0.5 * spacing + 0.5 * step;
+        let at = (0..grid.shape[axis] * factor).map(|n| (start + step * n as f64) as f32).collect();
+        Self { at, factor, step: step as f32 }
+    }
+
+    fn of(&self, voxel: usize) -> &[f32] {
+        &self.at[voxel * self.factor..(voxel + 1) * self.factor]
+    }
+}
+
+/// Computes the slices from `first` on until `out` is full. `out` holds whole slices of the grid.
+pub(super) fn fill(grid: &Grid, seed: u64, anatomy: &Anatomy, first: usize, out: &mut [i16]) {
+    let [nx, ny, _] = grid.shape;
+    let [xs, ys, zs] = [0, 1, 2].map(|axis| Samples::new(grid, axis));
+    let blend_mm = (xs.step + ys.step + zs.step) / 3.0;
+    let centres: Vec<f32> = (0..nx).map(|i| grid.mm([i, 0, 0]).x as f32).collect();
+    let noise =
+        Noise { key: hash(seed, NOISE_STREAM), edge_mm: -(centres[0] - 0.5 * xs.step * xs.factor as f32) };
+
+    out.par_chunks_mut(nx * ny).enumerate().for_each(|(slice, out)| {
+        let k = first + slice;
+        let planes: Vec<(f32, Vec<Active<'_>>)> =
+            zs.of(k).iter().map(|&z| (z, active(&anatomy.parts, z, blend_mm))).collect();
+        let scratch = || (Row::new(&xs.at, xs.step, blend_mm), vec![0.0_f32; nx]);
+        out.par_chunks_mut(nx).with_min_len(ROWS_PER_TASK).enumerate().for_each_init(
+            scratch,
+            |(row, sums), (j, out)| {
+                sums.fill(0.0);
+                for (z, actives) in &planes {
+                    for &y in ys.of(j) {
+                        let hu = row.paint(actives, &anatomy.surroundings, y, *z, BACKGROUND_HU);
+                        for (sum, samples) in sums.iter_mut().zip(hu.chunks_exact(xs.factor)) {
+                            *sum += samples.iter().sum::<f32>();
+                        }
+                    }
+                }
+                let scale = 1.0 / (xs.factor * ys.factor * zs.factor) as f32;
+                let y = grid.mm([0, j, 0]).y as f32;
+                let counter = grid.index([0, j, k]) as u64;
+                for (i, voxel) in out.iter_mut().enumerate() {
+                    *voxel = stored(sums[i] * scale + noise.at(centres[i], y, counter + i as u64));
+                }
+            },
+        );
+    });
+}
+
+/// Noise that grows towards the middle of the field of view, where the rays pass through more body.
+struct Noise {
+    key: u64,
+    edge_mm: f32,
+}
+
+impl Noise {
+    fn at(&self, x: f32, y: f32, counter: u64) -> f32 {
+        let middle = 1.0 - (x * x + y * y) / (self.edge_mm * self.edge_mm);
+        (NOISE_HU[0] + NOISE_HU[1] * middle.max(0.0)) * normal(hash(self.key, counter))
+    }
+}
+
+/// Rounded and clamped to a scanner's range.
+fn stored(hu: f32) -> i16 {
+    // The offset makes the value positive, so that truncation rounds down.
+    ((hu.clamp(AIR_HU, HIGHEST_HU) + 4096.5) as i32 - 4096) as i16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phantom::centred_grid;
+
+    #[test]
+    fn samples_are_centred_on_their_voxels() -> Result<(), crate::VolumeError> {
+        let grid = centred_grid([4, 4, 2], [1.0, 6.0, 2.5])?;
+        assert_eq!(Samples::new(&grid, 0).at, [-1.5, -0.5, 0.5, 1.5]);
+        assert_eq!(Samples::new(&grid, 1).of(2), [1.0, 3.0, 5.0]);
+        assert_eq!(Samples::new(&grid, 2).at, [-1.25, 1.25]);
+        Ok(())
+    }
+
+    #[test]
+    fn stored_values_are_rounded_and_clamped() {
+        assert_eq!([-1.6, -1.4, 0.4, 0.6, 9999.0, -2000.0].map(stored), [-2, -1, 0, 1, 3071, -1024]);
+    }
+}
