@@ -21,7 +21,7 @@ impl Affine {
         let finite = to_mm.iter().all(|v| v.is_finite()) && rows[3] == [0.0, 0.0, 0.0, 1.0];
         match to_mm.try_inverse().filter(|inverse| finite && inverse.iter().all(|v| v.is_finite())) {
             Some(to_index) => Ok(Self { to_mm, to_index }),
-            None => Err(VolumeError::SingularAffine { rows }),
+            None => Err(VolumeError::SingularAffine { rows: Box::new(rows) }),
         }
     }
 

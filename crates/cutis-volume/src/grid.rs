@@ -19,6 +19,11 @@ impl Grid {
         self.shape.iter().product()
     }
 
+    /// Number of points; none if some axis has no points, or there are more than memory can address.
+    pub fn checked_len(&self) -> Option<usize> {
+        self.shape.iter().try_fold(1usize, |len, &n| len.checked_mul(n)).filter(|&len| len > 0)
+    }
+
     /// True if some axis has no points.
     pub fn is_empty(&self) -> bool {
         self.shape.contains(&0)

@@ -1,7 +1,12 @@
 //! NIfTI files: NIfTI-1 and NIfTI-2 in, NIfTI-1 int16 out.
 
+mod convert;
 mod encode;
 mod gzip;
+mod header;
+mod placement;
+mod read;
 mod write;
 
+pub use read::{HuStats, Loaded, read};
 pub use write::{Writer, write};

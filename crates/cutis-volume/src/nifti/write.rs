@@ -52,7 +52,7 @@ pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), VolumeError>
 /// writer.push_slices(&[-1000; 12])?;
 /// writer.push_slices(&[40; 12])?;
 /// writer.finish()?;
-/// assert!(path.exists());
+/// assert_eq!(nifti::read(&path)?.stats.sum, 12.0 * (40.0 - 1000.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Writer {
