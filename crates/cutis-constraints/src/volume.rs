@@ -21,8 +21,8 @@ use crate::{Constraint, Eval, Real};
 /// Parameters `[V0]`: the rest volume in m³, positive where the vertices 2, 3, 4 run counter-clockwise seen from the
 /// side away from vertex 1. An inverted tetrahedron has a negative volume and is pushed back through itself. The
 /// gradient is a polynomial: defined everywhere, and zero where all four points lie on a line.
-/// Compliance: [`volume_compliance`](crate::volume_compliance), m³/Pa. Source: Müller et al. 2007, §4.3,
-/// for a single tetrahedron.
+/// Compliance: [`volume_compliance`](crate::volume_compliance), m³/Pa. Source: Bender, Müller and Macklin,
+/// *A Survey on Position Based Dynamics*, Eurographics Tutorials 2017.
 #[derive(Clone, Copy, Debug)]
 pub struct Volume;
 

@@ -1,0 +1,106 @@
+//! Coincident points, flat shapes and rest sizes of zero: finite, and a zero gradient where it is undefined.
+
+use cutis_constraints::{Constraint, Distance, Eval, Params, Scalar, SkinTension, SkinTensionPaper, Volume};
+use nalgebra::{Point3, Vector3};
+
+use crate::shapes::SCALES;
+
+fn eval<const N: usize, C: Constraint<N>, T: Scalar>(
+    x: [[f64; 3]; N],
+    scale: f64,
+    params: &[f64],
+) -> Eval<T, N> {
+    let x = x.map(|p| Point3::from(p.map(|v| T::constant(v * scale))));
+    let eval = C::eval(&x, &Params::from_fn(|k| T::constant(params[k])));
+    let finite = eval.grad.iter().flatten().chain([&eval.c]).all(|v| v.to_f64().is_finite());
+    assert!(finite, "{} at scale {scale}: {eval:?}", C::NAME);
+    eval
+}
+
+fn is_zero<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> bool {
+    eval.grad == [Vector3::zeros(); N]
+}
+
+/// Off the origin and with no round numbers, so that nothing is exact by luck.
+const A: [f64; 3] = [0.1, -0.7, 1.3];
+const B: [f64; 3] = [0.9, 0.3, 0.2];
+const C: [f64; 3] = [-0.4, 0.8, 0.6];
+
+fn lerp(t: f64) -> [f64; 3] {
+    std::array::from_fn(|axis| A[axis] + t * (B[axis] - A[axis]))
+}
+
+fn edges<T: Scalar>() {
+    for scale in SCALES {
+        for rest in [0.0, 1.0] {
+            let rest = rest * scale;
+            let point = eval::<2, Distance, T>([A, A], scale, &[rest]);
+            assert!(is_zero(&point));
+            assert_eq!(point.c.to_f64(), -T::constant(rest).to_f64());
+            assert!(!is_zero(&eval::<2, Distance, T>([A, B], scale, &[rest])));
+        }
+    }
+}
+
+fn triangles<T: Scalar>() {
+    let flat = [[A, A, A], [A, A, B], [A, B, A], [B, A, A]];
+    // On a line only up to rounding: the normal is noise.
+    let on_a_line = [[A, lerp(1.0 / 3.0), B], [A, B, lerp(0.3)], [lerp(0.7), A, B], [A, B, lerp(1.7)]];
+    for scale in SCALES {
+        for rest in [0.0, 1.0] {
+            for beta in [0.0, 2.0, 1e6] {
+                let rest = rest * scale * scale;
+                for x in flat.iter().chain(&on_a_line) {
+                    assert!(is_zero(&eval::<3, SkinTension, T>(*x, scale, &[rest, beta])), "{x:?}");
+                    assert!(is_zero(&eval::<3, SkinTensionPaper, T>(*x, scale, &[rest, beta, 1.0])), "{x:?}");
+                }
+                assert!(!is_zero(&eval::<3, SkinTension, T>([A, B, C], scale, &[rest, beta])));
+                // A sliver of a thousandth is no degenerate shape.
+                let mut sliver = lerp(0.5);
+                sliver[0] += 1e-3;
+                assert!(!is_zero(&eval::<3, SkinTension, T>([A, B, sliver], scale, &[rest, beta])));
+            }
+        }
+    }
+}
+
+fn tetrahedra<T: Scalar>() {
+    for scale in SCALES {
+        for rest in [0.0, 1.0] {
+            let rest = rest * scale.powi(3);
+            assert!(is_zero(&eval::<4, Volume, T>([A, A, A, A], scale, &[rest])));
+            assert!(is_zero(&eval::<4, Volume, T>([A, B, A, B], scale, &[rest])));
+            // In a plane the volume is 0, but its gradient is not: it points out of the plane.
+            let flat = eval::<4, Volume, T>([A, B, C, A], scale, &[rest]);
+            assert!(!is_zero(&flat));
+            assert_eq!(flat.c.to_f64(), -T::constant(rest).to_f64());
+        }
+    }
+}
+
+#[test]
+fn degenerate_edges() {
+    edges::<f32>();
+    edges::<f64>();
+}
+
+#[test]
+fn degenerate_triangles() {
+    triangles::<f32>();
+    triangles::<f64>();
+}
+
+#[test]
+fn degenerate_tetrahedra() {
+    tetrahedra::<f32>();
+    tetrahedra::<f64>();
+}
+
+/// With no rest area there is no stretch to amplify: a plain area constraint remains.
+#[test]
+fn rest_area_of_zero_is_not_amplified() {
+    let plain = eval::<3, SkinTension, f64>([A, B, C], 1.0, &[0.0, 0.0]);
+    assert_eq!(eval::<3, SkinTension, f64>([A, B, C], 1.0, &[0.0, 1e6]), plain);
+    assert_eq!(eval::<3, SkinTensionPaper, f64>([A, B, C], 1.0, &[0.0, 1e6, 1e9]).c, plain.c);
+    assert!(eval::<3, SkinTension, f64>([A, B, C], 1.0, &[1e-3, 1e6]).c > 100.0 * plain.c);
+}

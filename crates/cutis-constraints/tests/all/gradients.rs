@@ -1,0 +1,112 @@
+//! Gradients against finite differences; they conserve momentum; the energy form is what it says.
+
+use cutis_constraints::{Constraint, Distance, Eval, SkinTension, SkinTensionPaper, Volume};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+use crate::checks::{gradient_error, gradient_size, momentum_error, torque_error, with};
+use crate::shapes::{Shape, shape};
+
+/// Bound on the error against finite differences; the negative controls are off by 1e-3 or more.
+const EXACT: f64 = 1e-6;
+/// Bound on the momentum that rounding creates.
+const ROUNDING: f64 = 1e-12;
+
+fn area(x: &[nalgebra::Point3<f64>; 3]) -> f64 {
+    (x[1] - x[0]).cross(&(x[2] - x[0])).norm() / 2.0
+}
+
+/// Whether `eval` has the gradient of its value and conserves momentum, and whether the checks see it if not.
+fn check<const N: usize>(
+    eval: impl Fn(&[nalgebra::Point3<f64>; N]) -> Eval<f64, N> + Copy,
+    shape: &Shape<N>,
+) {
+    let grad = eval(&shape.x).grad;
+    let error = gradient_error(eval, shape);
+    assert!(error < EXACT, "gradient is off by {error}");
+    let error = momentum_error(&grad);
+    assert!(error < ROUNDING, "momentum of {error}");
+    let error = torque_error(&grad, shape);
+    assert!(error < ROUNDING, "torque of {error}");
+
+    // Negative controls: a sign, a factor of 1.001, and a couple that the sum does not show.
+    let altered = |alter: &dyn Fn(&mut [Vector3<f64>; N])| {
+        let mut eval = eval(&shape.x);
+        alter(&mut eval.grad);
+        eval.grad
+    };
+    let replaced =
+        |grad: [Vector3<f64>; N]| move |x: &[nalgebra::Point3<f64>; N]| Eval { c: eval(x).c, grad };
+    let longest = (0..N).max_by(|&a, &b| grad[a].norm().total_cmp(&grad[b].norm())).unwrap_or(0);
+    let flipped = altered(&|g| g[longest] = -g[longest]);
+    assert!(gradient_error(replaced(flipped), shape) > 1.0);
+    assert!(momentum_error(&flipped) > 1.0);
+    let stretched = altered(&|g| g.iter_mut().for_each(|g| *g *= 1.001));
+    assert!(gradient_error(replaced(stretched), shape) > 0.9e-3);
+    let arm = shape.x[1] - shape.x[0];
+    let across = arm.cross(&Vector3::new(arm.y, arm.z, -arm.x)).normalize() * (gradient_size(&grad) * 1e-3);
+    let couple = altered(&|g| {
+        g[0] += across;
+        g[1] -= across;
+    });
+    assert!(momentum_error(&couple) < ROUNDING);
+    assert!(torque_error(&couple, shape) > 1e-6);
+}
+
+/// Rest size over current size, not so near 1 that a difference straddles the kink of `max(0, C)`.
+fn rest_ratio() -> impl Strategy<Value = f64> {
+    prop_oneof![0.1..0.9f64, 1.1..5.0]
+}
+
+proptest! {
+    #[test]
+    fn distance_gradient(shape in shape::<2>(), ratio in rest_ratio()) {
+        check(&with::<2, Distance>([ratio * shape.scale]), &shape);
+    }
+
+    #[test]
+    fn volume_gradient(shape in shape::<4>(), ratio in rest_ratio()) {
+        check(&with::<4, Volume>([ratio * shape.scale.powi(3)]), &shape);
+    }
+
+    #[test]
+    fn skin_tension_gradient(shape in shape::<3>(), ratio in rest_ratio(), beta in 0.0..100.0f64) {
+        check(&with::<3, SkinTension>([ratio * area(&shape.x), beta]), &shape);
+    }
+
+    /// Where nothing is amplified, the paper form is the area constraint.
+    #[test]
+    fn paper_form_gradient(shape in shape::<3>(), ratio in 1.1..5.0f64, beta in 0.0..100.0f64) {
+        check(&with::<3, SkinTensionPaper>([ratio * area(&shape.x), beta, f64::MAX]), &shape);
+    }
+
+    /// `Ĉ ∇Ĉ` is the gradient of `U = ½C² + β max(0, C)³/(3 A0)` and the published force `C F ∇A`.
+    #[test]
+    fn energy_form_is_the_gradient_of_the_energy(
+        shape in shape::<3>(), ratio in rest_ratio(), beta in 0.0..100.0f64,
+    ) {
+        let rest_area = ratio * area(&shape.x);
+        let force = |eval: Eval<f64, 3>| eval.grad.map(|g| g * eval.c);
+        let energy = |x: &[nalgebra::Point3<f64>; 3]| {
+            let c = area(x) - rest_area;
+            let u = 0.5 * c * c + beta * c.max(0.0).powi(3) / (3.0 * rest_area);
+            Eval { c: u, grad: force(SkinTension::eval(x, &[rest_area, beta])) }
+        };
+        check(&energy, &shape);
+
+        let published = force(SkinTensionPaper::eval(&shape.x, &[rest_area, beta, f64::MAX]));
+        let ours = energy(&shape.x).grad;
+        let difference: [Vector3<f64>; 3] = std::array::from_fn(|i| published[i] - ours[i]);
+        prop_assert!(gradient_size(&difference) < 1e-12 * gradient_size(&ours));
+
+        // Negative control: without the derivative of q the force is another one, wherever there is amplification.
+        if ratio < 1.0 && beta > 0.1 {
+            let without = |x: &[nalgebra::Point3<f64>; 3]| {
+                let c = SkinTension::eval(x, &[rest_area, beta]).c;
+                let grad = SkinTension::eval(x, &[rest_area, 0.0]).grad;
+                Eval { c: energy(x).c, grad: grad.map(|g| g * c) }
+            };
+            prop_assert!(gradient_error(without, &shape) > 1e-3);
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! SIMD lanes give the same bits as scalars, each lane by itself.
+
+use cutis_constraints::{Constraint, Distance, Params, Real, Scalar, SkinTension, SkinTensionPaper, Volume};
+use nalgebra::{Point3, SimdValue};
+use simba::simd::{AutoF32x8, WideF32x4, WideF32x8, WideF64x4};
+
+use crate::shapes::{Random, SCALES};
+
+/// Evaluations of one vector each.
+const ROUNDS: usize = 200;
+
+/// Shapes of every kind: random at three scales, and each third one degenerate.
+fn shape<const N: usize>(random: &mut Random, number: usize) -> [Point3<f64>; N] {
+    let scale = SCALES[number % 3];
+    let mut x: [Point3<f64>; N] = std::array::from_fn(|_| random.point() * scale);
+    match number % 9 {
+        2 => x = [x[0]; N],
+        5 => x[N - 1] = x[0],
+        8 => x = std::array::from_fn(|i| Point3::new(i as f64, 2.0 * i as f64, 0.0) * scale),
+        _ => {}
+    }
+    x
+}
+
+/// Bits of value and gradient, lane by lane; any NaN fails.
+fn bits<S: Scalar>(c: S, grad: impl IntoIterator<Item = S>) -> Vec<u64> {
+    let numbers: Vec<f64> = std::iter::once(c).chain(grad).map(Scalar::to_f64).collect();
+    assert!(numbers.iter().all(|v| v.is_finite()), "{numbers:?}");
+    numbers.into_iter().map(f64::to_bits).collect()
+}
+
+fn check<const N: usize, C, L, S>(params: &[f64])
+where
+    C: Constraint<N>,
+    S: Scalar,
+    L: Real + SimdValue<Element = S>,
+{
+    let mut random = Random(7);
+    let mut mixed_up = 0;
+    for round in 0..ROUNDS {
+        let shapes: Vec<[Point3<S>; N]> = (0..L::LANES)
+            .map(|lane| shape(&mut random, round * L::LANES + lane).map(|p| p.map(S::constant)))
+            .collect();
+        // Rest sizes from 0 to beyond the shape's, so that lanes differ in the side of every selection.
+        let factors: Vec<f64> = (0..L::LANES).map(|_| (random.uniform() * 4.0).floor() * 0.3).collect();
+        let scalar_params: Vec<C::Params<S>> = (0..L::LANES)
+            .map(|lane| {
+                let scale = SCALES[(round * L::LANES + lane) % 3];
+                let dimension = [0, 0, 1, 2, 3][N];
+                let rest = factors[lane] * f64::powi(scale, dimension);
+                Params::from_fn(|k| S::constant(if k == 0 { rest } else { params[k] }))
+            })
+            .collect();
+
+        let mut x = [Point3::new(L::zero(), L::zero(), L::zero()); N];
+        for (lane, shape) in shapes.iter().enumerate() {
+            for i in 0..N {
+                for axis in 0..3 {
+                    x[i][axis].replace(lane, shape[i][axis]);
+                }
+            }
+        }
+        let wide_params = <C::Params<L> as Params<L>>::from_fn(|k| {
+            let mut value = L::zero();
+            for (lane, params) in scalar_params.iter().enumerate() {
+                value.replace(lane, params.as_ref()[k]);
+            }
+            value
+        });
+
+        let wide = C::eval(&x, &wide_params);
+        let of_lane = |lane: usize| {
+            bits(
+                wide.c.extract(lane),
+                wide.grad.iter().flatten().map(|v| v.extract(lane)).collect::<Vec<_>>(),
+            )
+        };
+        for lane in 0..L::LANES {
+            let scalar = C::eval(&shapes[lane], &scalar_params[lane]);
+            let scalar = bits(scalar.c, scalar.grad.iter().flatten().copied().collect::<Vec<_>>());
+            assert_eq!(of_lane(lane), scalar, "{} round {round} lane {lane}", C::NAME);
+            mixed_up += usize::from(of_lane((lane + 1) % L::LANES) == scalar);
+        }
+    }
+    // Negative control: the next lane holds another shape; only degenerate ones may look the same.
+    assert!(mixed_up < ROUNDS * L::LANES / 10, "{mixed_up}");
+}
+
+fn check_types<const N: usize, C: Constraint<N>>(params: &[f64]) {
+    check::<N, C, WideF32x8, f32>(params);
+    check::<N, C, WideF32x4, f32>(params);
+    check::<N, C, AutoF32x8, f32>(params);
+    check::<N, C, WideF64x4, f64>(params);
+}
+
+#[test]
+fn lanes_equal_scalars_bit_for_bit() {
+    check_types::<2, Distance>(&[0.0]);
+    check_types::<4, Volume>(&[0.0]);
+    check_types::<3, SkinTension>(&[0.0, 5.0]);
+    check_types::<3, SkinTensionPaper>(&[0.0, 5.0, 3.0]);
+}

@@ -1,0 +1,95 @@
+//! Compliances: the formula, its independence of the mesh, and what is refused.
+
+use cutis_constraints::{DistanceMaterial, MaterialError, SkinTensionMaterial, SkinTensionPaperMaterial};
+use cutis_constraints::{VolumeMaterial, distance_compliance, skin_compliance, volume_compliance};
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-14 * b.abs()
+}
+
+/// A rod cut into `n` edges in series is as stiff as one edge; the volume is cut as well.
+#[test]
+fn rod_in_pieces_is_as_stiff_as_in_one() {
+    let whole = distance_compliance(1.0, 2e4, 1e-2).unwrap();
+    assert!(near(whole, 1.0 / (2e4 * 1e-2)));
+    for n in [2.0, 10.0, 1000.0] {
+        let piece = distance_compliance(1.0 / n, 2e4, 1e-2 / n).unwrap();
+        assert!(near(n * piece, whole));
+    }
+}
+
+/// The same relative change of volume or area costs the same energy per volume or area in any mesh.
+#[test]
+fn energy_density_does_not_depend_on_the_mesh() {
+    let strain = 0.01;
+    for size in [1e-9, 1.0, 1e9] {
+        let change = strain * size;
+        let volume = change * change / (2.0 * volume_compliance(size, 1e5).unwrap());
+        assert!(near(volume / size, 0.5 * 1e5 * strain * strain));
+        let area = change * change / (2.0 * skin_compliance(size, 50.0).unwrap());
+        assert!(near(area / size, 0.5 * 50.0 * strain * strain));
+    }
+}
+
+#[test]
+fn infinite_modulus_is_rigid() {
+    assert_eq!(distance_compliance(1e-3, f64::INFINITY, 1e-9), Ok(0.0));
+    assert_eq!(volume_compliance(1e-9, f64::INFINITY), Ok(0.0));
+    assert_eq!(skin_compliance(1e-6, f64::INFINITY), Ok(0.0));
+}
+
+#[test]
+fn bad_values_are_refused_by_name() {
+    let refused = |result: Result<f64, MaterialError>, name: &str, bad: f64| match result {
+        Err(error @ MaterialError::NotPositive { quantity, value, .. }) => {
+            assert_eq!(quantity, name);
+            assert_eq!(value.to_bits(), bad.to_bits());
+            assert!(error.to_string().starts_with(name), "{error}");
+        }
+        other => panic!("{name} = {bad}: {other:?}"),
+    };
+    for bad in [0.0, -1.0, f64::NAN, f64::NEG_INFINITY] {
+        refused(distance_compliance(bad, 1.0, 1.0), "rest length", bad);
+        refused(distance_compliance(1.0, bad, 1.0), "Young's modulus", bad);
+        refused(distance_compliance(1.0, 1.0, bad), "edge volume", bad);
+        refused(volume_compliance(bad, 1.0), "rest volume", bad);
+        refused(volume_compliance(1.0, bad), "bulk modulus", bad);
+        refused(skin_compliance(bad, 1.0), "rest area", bad);
+        refused(skin_compliance(1.0, bad), "area modulus", bad);
+    }
+    refused(distance_compliance(f64::INFINITY, 1.0, 1.0), "rest length", f64::INFINITY);
+}
+
+#[test]
+fn compliance_beyond_all_numbers_is_refused() {
+    let error = distance_compliance(1e200, 1e-200, 1.0).unwrap_err();
+    assert!(matches!(error, MaterialError::ComplianceOutOfRange { constraint: "distance", .. }));
+    assert!(skin_compliance(1e200, 1e-200).is_err());
+}
+
+#[test]
+fn materials_check_themselves() {
+    assert_eq!(DistanceMaterial::default().check(), Ok(()));
+    assert_eq!(VolumeMaterial::default().check(), Ok(()));
+    assert_eq!(SkinTensionMaterial::default().check(), Ok(()));
+    for bad in [0.0, -0.5, f64::NAN, f64::INFINITY] {
+        assert!(DistanceMaterial { rest_scale: bad }.check().is_err());
+        assert!(VolumeMaterial { rest_scale: bad }.check().is_err());
+        assert!(SkinTensionMaterial { rest_area_scale: bad, amplification: 0.0 }.check().is_err());
+        let paper = |max_amplification| SkinTensionPaperMaterial {
+            rest_area_scale: 1.0,
+            amplification: 1.0,
+            max_amplification,
+        };
+        assert!(paper(bad).check().is_err());
+        assert_eq!(paper(2.0).check(), Ok(()));
+    }
+    for bad in [-1e-9, f64::NAN, f64::INFINITY] {
+        let material = SkinTensionMaterial { rest_area_scale: 1.0, amplification: bad };
+        assert!(matches!(material.check(), Err(MaterialError::Negative { .. })));
+    }
+    for bad in [0.0, -1.0, 1.1, f64::NAN] {
+        let error = SkinTensionPaperMaterial::for_stiffness(bad, 0.9, 1.0).unwrap_err();
+        assert!(matches!(error, MaterialError::StiffnessOutOfRange { .. }));
+    }
+}
