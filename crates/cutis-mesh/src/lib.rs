@@ -1,1 +1,25 @@
-//! cutis-mesh
+//! Tetrahedral lattices of CT volumes: meshes of tissue, skin detection, incisions, wound gape, mesh files.
+//!
+//! Mesh coordinates are local metres in 32 bits, placed by a [`Frame`]; millimetres appear only in names that end in `_mm`.
+#![forbid(unsafe_code)]
+
+mod build;
+mod cells;
+mod component;
+mod edges;
+mod error;
+mod frame;
+mod lattice;
+mod mass;
+mod select;
+pub mod skin;
+mod stencil;
+mod surface;
+
+pub use build::{NO_VERTEX, TetMesh, Tissue};
+pub use error::MeshError;
+pub use frame::Frame;
+pub use lattice::{Lattice, Split};
+pub use select::HalfSpace;
+pub use skin::{Skin, SkinMode, SkinOptions, SkinReport};
+pub use surface::Topology;

@@ -1,0 +1,96 @@
+//! Edges of a lattice mesh, generated per direction, and the lattice's closed-form colours.
+
+use cutis_volume::Grid;
+use rayon::prelude::*;
+
+use crate::build::split;
+use crate::cells::CellMasks;
+use crate::{Split, TetMesh};
+
+/// An edge is there if any of the tets around it is. Ascending; lower vertex first.
+pub(crate) fn generate(
+    grid: &Grid,
+    masks: &CellMasks,
+    lattice_index: &[u32],
+    vertex_of: &[u32],
+) -> Vec<[u32; 2]> {
+    let layer_size = grid.shape[0] * grid.shape[1];
+    let start = |layer: usize| lattice_index.partition_point(|&point| (point as usize) < layer * layer_size);
+    let starts: Vec<usize> = (0..=grid.shape[2]).map(start).collect();
+    // Per parity and direction: step in points, and the cells around with their tets.
+    let point_step = |[i, j, k]: [i8; 3]| {
+        i as isize + grid.shape[0] as isize * (j as isize + grid.shape[1] as isize * k as isize)
+    };
+    let directions = masks.stencil.directions.each_ref().map(|directions| {
+        let around =
+            |cells: &[([i8; 3], u8)]| cells.iter().map(|&(cell, mask)| (masks.delta(cell), mask)).collect();
+        directions
+            .iter()
+            .map(|d| (point_step(d.step), around(&d.cells)))
+            .collect::<Vec<(isize, Vec<(isize, u8)>)>>()
+    });
+    // First pass: which directions each vertex has an edge in.
+    let present = |&point: &u32| {
+        let [i, j, k] = grid.point(point as usize);
+        let cell = masks.flat([i, j, k]);
+        let has = |around: &[(isize, u8)]| {
+            around.iter().any(|&(delta, mask)| masks.bytes[cell.wrapping_add_signed(delta)] & mask != 0)
+        };
+        let own = directions[(i + j + k) & 1].iter().enumerate();
+        own.fold(0u16, |bits, (d, (_, around))| bits | u16::from(has(around)) << d)
+    };
+    let bits: Vec<u16> = lattice_index.par_iter().map(present).collect();
+    let layers: Vec<_> = starts.windows(2).map(|w| w[0]..w[1]).collect();
+    let count =
+        |layer: &std::ops::Range<usize>| bits[layer.clone()].iter().map(|b| b.count_ones() as usize).sum();
+    let counts: Vec<usize> = layers.par_iter().map(count).collect();
+    // Second pass: write them.
+    let mut edges = vec![[0u32; 2]; counts.iter().sum()];
+    split(&mut edges, &counts).into_par_iter().zip(layers).for_each(|(out, layer)| {
+        let mut out = out.iter_mut();
+        for vertex in layer {
+            let point = lattice_index[vertex] as usize;
+            let parity = grid.point(point).iter().sum::<usize>() & 1;
+            let own = directions[parity].iter().enumerate().filter(|(d, _)| bits[vertex] >> d & 1 == 1);
+            for ((_, (step, _)), edge) in own.zip(&mut out) {
+                *edge = [vertex as u32, vertex_of[point.wrapping_add_signed(*step)]];
+            }
+        }
+    });
+    edges
+}
+
+impl TetMesh {
+    /// Colours of lattice edges in closed form: edges of one colour share no vertex.
+    ///
+    /// Colour = 2 · direction + parity of the first point along the direction's first axis: 14 colours for `kuhn6` (7 directions),
+    /// 18 for `five` (9 directions). `edges` are edges of this mesh, or what a cut has left of them.
+    pub fn edge_classes(&self, edges: &[[u32; 2]]) -> Vec<u16> {
+        let directions = &self.lattice.stencil().directions;
+        let class = |&[a, b]: &[u32; 2]| {
+            let (p, q) = (self.point(a), self.point(b));
+            let step: [i8; 3] = std::array::from_fn(|axis| (q[axis] as isize - p[axis] as isize) as i8);
+            let axis = step.iter().position(|&s| s != 0).unwrap_or(0);
+            let own = &directions[p.iter().sum::<usize>() & 1];
+            let number = own.iter().find(|d| d.step == step).map_or(0, |d| d.number);
+            2 * number + (p[axis] & 1) as u16
+        };
+        edges.par_iter().map(class).collect()
+    }
+
+    /// Colours of lattice tets in closed form: tets of one colour share no vertex.
+    ///
+    /// `kuhn6`: colour = 4 · type + (i + j + k) mod 4 of the cell, 24 colours. `five`: 8 · type + the parities of i, j and k, 40
+    /// colours. `tets` are tets of this mesh, or what a cut has left of them.
+    pub fn tet_classes(&self, tets: &[[u32; 4]]) -> Vec<u16> {
+        let class = |tet: &[u32; 4]| {
+            let ([i, j, k], t) = self.cell_of(tet);
+            let color = match self.lattice.split() {
+                Split::Kuhn6 => 4 * t + (i + j + k) % 4,
+                Split::Five => 8 * t + (i & 1) + 2 * (j & 1) + 4 * (k & 1),
+            };
+            color as u16
+        };
+        tets.par_iter().map(class).collect()
+    }
+}

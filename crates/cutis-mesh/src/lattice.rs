@@ -1,0 +1,113 @@
+//! A grid of points whose cells are split into tetrahedra.
+
+use cutis_volume::Grid;
+use serde::{Deserialize, Serialize};
+
+use crate::MeshError;
+use crate::stencil::Stencil;
+
+/// How a cell is split into tetrahedra.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// Six tets around the diagonal from the cell's lowest-index to its highest-index corner (Kuhn).
+    #[default]
+    Kuhn6,
+    /// A tet in the middle and one at each of four corners, mirrored in cells whose `i + j + k` is odd.
+    ///
+    /// Face diagonals join lattice vertices whose `i + j + k` is even.
+    Five,
+}
+
+/// A lattice: a grid of at least 2×2×2 points, and the split of its cells.
+///
+/// Corners of a cell are numbered `di + 2 dj + 4 dk`; cell `(i, j, k)` has its corner 0 at point `(i, j, k)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    grid: Grid,
+    split: Split,
+}
+
+impl Lattice {
+    /// Most points a lattice may have: they are numbered in 32 bits, and `u32::MAX` means "none".
+    pub const MAX_POINTS: usize = (u32::MAX - 1) as usize;
+
+    /// A lattice over the points of `grid`.
+    ///
+    /// # Errors
+    /// [`MeshError::LatticeSize`] if an axis has fewer than 2 points or there are more than [`Lattice::MAX_POINTS`];
+    /// [`MeshError::LatticeExtent`] if positions or steps vanish or overflow in 32-bit metres.
+    pub fn new(grid: Grid, split: Split) -> Result<Self, MeshError> {
+        let shape = grid.shape;
+        let points = shape[0].checked_mul(shape[1]).and_then(|n| n.checked_mul(shape[2]));
+        if shape.iter().any(|&n| n < 2) || points.is_none_or(|n| n > Self::MAX_POINTS) {
+            return Err(MeshError::LatticeSize { shape, max: Self::MAX_POINTS });
+        }
+        let spacing_mm = grid.affine.spacing_mm();
+        let extent = shape.iter().zip(spacing_mm).map(|(&n, step)| n as f64 * step / 1000.0).sum::<f64>();
+        // Volumes are products of three lengths: keep the cubes of step and extent within f32's normal range.
+        let smallest = spacing_mm.iter().fold(f64::INFINITY, |a, &b| a.min(b)) / 1000.0;
+        let holds = |length: f64| (1e-12..=1e12).contains(&length);
+        if !holds(smallest) || !holds(extent) {
+            return Err(MeshError::LatticeExtent { spacing_mm, shape });
+        }
+        Ok(Self { grid, split })
+    }
+
+    /// The points.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The split.
+    pub fn split(&self) -> Split {
+        self.split
+    }
+
+    /// Cells per axis.
+    pub fn cells(&self) -> [usize; 3] {
+        self.grid.shape.map(|n| n - 1)
+    }
+
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.cells().iter().product()
+    }
+
+    /// Number of tets, tissue or not.
+    pub fn tet_count(&self) -> usize {
+        self.cell_count() * self.stencil().tets[0].len()
+    }
+
+    /// The tets of a cell as corner numbers `di + 2 dj + 4 dk`, positively oriented in world space.
+    ///
+    /// A tet `(a, b, c, d)` is positive if `(b − a) · ((c − a) × (d − a)) > 0`; for an affine that mirrors, the last two
+    /// corners change places.
+    ///
+    /// ```
+    /// use cutis_mesh::{Lattice, Split};
+    /// use cutis_volume::{Affine, Grid};
+    /// let affine = Affine::from_spacing([1.0, 1.0, 1.0], [0.0; 3])?;
+    /// let lattice = Lattice::new(Grid { shape: [3, 3, 3], affine }, Split::Kuhn6)?;
+    /// assert_eq!(lattice.cell_tets(0, 1, 0)[0], [0, 1, 3, 7]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn cell_tets(&self, i: usize, j: usize, k: usize) -> &'static [[u8; 4]] {
+        &self.stencil().tets[(i + j + k) & 1]
+    }
+
+    /// The point at a corner of a cell.
+    pub fn corner([i, j, k]: [usize; 3], corner: u8) -> [usize; 3] {
+        let c = usize::from(corner);
+        [i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)]
+    }
+
+    /// Longest of the three lattice steps, mm.
+    pub fn longest_step_mm(&self) -> f64 {
+        self.grid.affine.spacing_mm().into_iter().fold(0.0, f64::max)
+    }
+
+    pub(crate) fn stencil(&self) -> &'static Stencil {
+        Stencil::of(self.split, self.grid.affine.voxel_volume_mm3() < 0.0)
+    }
+}

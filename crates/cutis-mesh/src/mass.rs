@@ -1,0 +1,52 @@
+//! Volumes of tets, shares of edges in them, and lumped masses.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::TetMesh;
+
+impl TetMesh {
+    /// Rest volume of each tet, m³.
+    pub fn tet_volumes(&self) -> Vec<f32> {
+        self.tets.par_iter().map(|tet| self.volume(tet) as f32).collect()
+    }
+
+    /// Each edge's share of the tets around it, m³: a sixth of each. The shares add up to the mesh's volume.
+    pub fn edge_volumes(&self) -> Vec<f32> {
+        let vertices = self.positions.len();
+        let mut starts = vec![0usize; vertices + 1];
+        self.edges.iter().for_each(|edge| starts[edge[0] as usize + 1] += 1);
+        (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
+        let mut shares = vec![0f64; self.edges.len()];
+        for tet in &self.tets {
+            let sixth = self.volume(tet) / 6.0;
+            for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+                let (low, high) = (tet[a].min(tet[b]), tet[a].max(tet[b]));
+                let own = starts[low as usize]..starts[low as usize + 1];
+                if let Some(edge) = own.clone().find(|&edge| self.edges[edge][1] == high) {
+                    shares[edge] += sixth;
+                }
+            }
+        }
+        shares.into_iter().map(|share| share as f32).collect()
+    }
+
+    /// Lumped mass of each vertex, kg: a quarter of each tet's mass, whose density comes from the mean HU of its corners.
+    ///
+    /// A vertex without a tet (in an incision) has mass 0.
+    pub fn masses(&self, density_kg_m3: &dyn Fn(f32) -> f32) -> Vec<f32> {
+        let mut masses = vec![0f64; self.positions.len()];
+        for tet in &self.tets {
+            let hu = tet.iter().map(|&v| self.hu[v as usize]).sum::<f32>() / 4.0;
+            let quarter = self.volume(tet) * f64::from(density_kg_m3(hu)) / 4.0;
+            tet.iter().for_each(|&v| masses[v as usize] += quarter);
+        }
+        masses.into_iter().map(|mass| mass as f32).collect()
+    }
+
+    fn volume(&self, tet: &[u32; 4]) -> f64 {
+        let [a, b, c, d] = tet.map(|v| self.positions[v as usize]);
+        let from_a = |p: Point3<f32>| -> Vector3<f64> { p.coords.cast::<f64>() - a.coords.cast::<f64>() };
+        from_a(b).dot(&from_a(c).cross(&from_a(d))) / 6.0
+    }
+}
