@@ -43,7 +43,7 @@ fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
     let requirements = workspace.root.join("tests/python/requirements.txt");
     let wanted =
         std::fs::read_to_string(&requirements).with_context(|| requirements.display().to_string())?;
-    let version = require_python(workspace)?;
+    let version = require(workspace)?;
     let stamp = folder.join("requirements.stamp");
     let wanted_stamp = format!("{version}\n{wanted}");
     let bin = if cfg!(windows) { "Scripts" } else { "bin" };
@@ -75,8 +75,8 @@ fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
 
 const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 
-/// The version of the system's Python, or what to install.
-fn require_python(workspace: &Workspace) -> Result<String> {
+/// The version of the system's Python, such as `Python 3.13.5`; an error says what to install.
+pub fn require(workspace: &Workspace) -> Result<String> {
     let Ok(output) = workspace.command(PYTHON).arg("--version").output() else {
         bail!("{PYTHON} is missing; on Debian: apt-get install -y python3 python3-venv");
     };

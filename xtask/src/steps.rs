@@ -15,6 +15,7 @@ struct Step {
 }
 
 const STEPS: &[Step] = &[
+    Step { name: "tools", quick: true, run: tools },
     Step { name: "format", quick: true, run: format },
     Step { name: "tidy", quick: true, run: tidy::run },
     Step { name: "licences", quick: true, run: deny::run },
@@ -67,14 +68,28 @@ fn summary(outcomes: &[(&str, &str, Option<Duration>)], total: Duration) -> Stri
     table + &format!("{:<20}{:<22}{:8.1} s\n", "total", "", total.as_secs_f64())
 }
 
+/// Everything that later steps need, asked for before the long ones begin.
+fn tools(workspace: &Workspace) -> Result<()> {
+    for (subcommand, component) in [("fmt", "rustfmt"), ("clippy", "clippy")] {
+        let found = workspace
+            .command(workspace.cargo(subcommand).get_program())
+            .args([subcommand, "--version"])
+            .output();
+        if !found.is_ok_and(|output| output.status.success()) {
+            bail!("`cargo {subcommand}` is missing; install it with `rustup component add {component}`");
+        }
+    }
+    let python = python::require(workspace)?;
+    println!("rustfmt, clippy and {python} are there");
+    Ok(())
+}
+
 fn format(workspace: &Workspace) -> Result<()> {
-    require_component(workspace, "fmt", "rustfmt")?;
     execute(workspace.cargo("fmt").args(["--all", "--check"]))?;
     execute(workspace.cargo("fmt").arg("--manifest-path").arg(workspace.xtask_manifest()).arg("--check"))
 }
 
 fn xtask(workspace: &Workspace) -> Result<()> {
-    require_component(workspace, "clippy", "clippy")?;
     let manifest = workspace.xtask_manifest();
     execute(
         workspace
@@ -90,7 +105,6 @@ fn xtask(workspace: &Workspace) -> Result<()> {
 const DENY: [&str; 3] = ["--", "-D", "warnings"];
 
 fn clippy(workspace: &Workspace) -> Result<()> {
-    require_component(workspace, "clippy", "clippy")?;
     execute(workspace.cargo("clippy").args(["--workspace", "--all-targets", "--quiet"]).args(DENY))
 }
 
@@ -118,15 +132,6 @@ pub fn publish_dry_run(workspace: &Workspace) -> Result<()> {
         command.arg("--allow-dirty");
     }
     execute(&mut command)
-}
-
-fn require_component(workspace: &Workspace, subcommand: &str, component: &str) -> Result<()> {
-    let found =
-        workspace.command(workspace.cargo(subcommand).get_program()).args([subcommand, "--version"]).output();
-    if !found.is_ok_and(|output| output.status.success()) {
-        bail!("`cargo {subcommand}` is missing; install it with `rustup component add {component}`");
-    }
-    Ok(())
 }
 
 #[cfg(test)]
