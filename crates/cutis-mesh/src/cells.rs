@@ -51,7 +51,7 @@ impl CellMasks {
 
     /// Number of tets present.
     pub fn tet_count(&self) -> usize {
-        self.bytes.par_iter().map(|mask| mask.count_ones() as usize).sum()
+        self.tets_per_layer().iter().sum()
     }
 
     /// Number of tets present in each layer of cells.

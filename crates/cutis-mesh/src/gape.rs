@@ -1,0 +1,147 @@
+//! Wound gape: the distance between the two lips of a slit.
+
+use std::ops::Range;
+
+use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::slit::Slit;
+use crate::{MeshError, TetMesh};
+
+/// Most bins along one slit.
+const MOST_BINS: f64 = 1024.0;
+
+/// Which vertices are measured, and along which axis.
+///
+/// The lips are the skin vertices left of the skin triangles that the slit opens, between start and end of the segment: left of its middle surface
+/// and right of it. The segment is divided into equal bins of at least one lattice step. In a bin, and in the middle tenth of the segment (or one
+/// lattice step, if that is longer), the opening is the difference between the mean position of the right lip's vertices and that of the
+/// left lip's, taken along the lateral axis of the slit at rest. Which vertices these are is fixed at rest, so that openings
+/// before and after differ by motion alone. At rest the opening is at least the distance between the nearest vertices left standing: width
+/// rounded up to the lattice.
+#[derive(Clone, Debug)]
+pub struct Gape {
+    lateral: Vector3<f64>,
+    /// The bins within the middle 80 % of the segment that have vertices on both sides.
+    bins: Vec<Sides>,
+    middle: Sides,
+    vertices: Vec<u32>,
+    left: usize,
+}
+
+/// Vertices of both lips in a part of the segment, as ranges of `Gape::vertices`.
+#[derive(Clone, Debug)]
+struct Sides {
+    left: Range<usize>,
+    right: Range<usize>,
+}
+
+/// Openings of one wound, mm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WoundGape {
+    /// Mean opening over the bins, without the first and last tenth of the segment.
+    pub mean_mm: f64,
+    /// Opening in the middle tenth.
+    pub mid_mm: f64,
+    /// As `mean_mm`, with the full distance between the mean positions instead of its lateral part.
+    pub mean_distance_mm: f64,
+    /// As `mid_mm`, with the full distance.
+    pub mid_distance_mm: f64,
+    /// Number of bins measured.
+    pub bins: usize,
+}
+
+impl Gape {
+    pub(crate) fn new(
+        mesh: &TetMesh,
+        incision: usize,
+        slit: &Slit,
+        lips: &[u32],
+        step: f64,
+    ) -> Result<Self, MeshError> {
+        let at = |&vertex: &u32| (vertex, slit.coordinates(mesh.positions[vertex as usize].cast()));
+        let mut placed: Vec<_> = lips.iter().map(at).collect();
+        placed.retain(|(_, point)| (0.0..=slit.length).contains(&point.along));
+        placed.sort_by(|(a, p), (b, q)| {
+            (p.lateral >= 0.0).cmp(&(q.lateral >= 0.0)).then(p.along.total_cmp(&q.along)).then(a.cmp(b))
+        });
+        let left = placed.partition_point(|(_, point)| point.lateral < 0.0);
+        let right = placed.len() - left;
+        if left == 0 || right == 0 {
+            return Err(MeshError::IncisionWithoutLips { incision, left, right });
+        }
+        let between = |from: f64, to: f64| {
+            let find = |part: Range<usize>, limit: f64| {
+                part.start + placed[part].partition_point(|(_, point)| point.along < limit)
+            };
+            Sides {
+                left: find(0..left, from)..find(0..left, to),
+                right: find(left..placed.len(), from)..find(left..placed.len(), to),
+            }
+        };
+        let count = (slit.length / step).floor().clamp(1.0, MOST_BINS);
+        let width = slit.length / count;
+        let inner = |bin: &f64| count < 10.0 / 8.0 || (0.1..=0.9).contains(&((bin + 0.5) / count));
+        let bins = (0..count as usize).map(|bin| bin as f64).filter(inner);
+        let bins: Vec<Sides> =
+            bins.map(|bin| between(bin * width, (bin + 1.0) * width)).filter(Sides::complete).collect();
+        // Widen the middle until both lips have a vertex in it; the whole segment has.
+        let mut half = (slit.length / 20.0).max(step / 2.0);
+        let mut middle = between(slit.length / 2.0 - half, slit.length / 2.0 + half);
+        while !middle.complete() {
+            half *= 2.0;
+            middle = between(slit.length / 2.0 - half, slit.length / 2.0 + half);
+        }
+        let bins = if bins.is_empty() { vec![middle.clone()] } else { bins };
+        let vertices = placed.iter().map(|(vertex, _)| *vertex).collect();
+        Ok(Self { lateral: slit.lateral, bins, middle, vertices, left })
+    }
+
+    /// Skin vertices of the left lip, from start to end.
+    pub fn left(&self) -> &[u32] {
+        &self.vertices[..self.left]
+    }
+
+    /// Skin vertices of the right lip, from start to end.
+    pub fn right(&self) -> &[u32] {
+        &self.vertices[self.left..]
+    }
+
+    /// Measures positions in local metres, one per mesh vertex.
+    ///
+    /// # Panics
+    /// If there are fewer positions than mesh vertices.
+    pub fn measure(&self, positions: &[Point3<f32>]) -> WoundGape {
+        self.measure_by(&|vertex| positions[vertex as usize].cast())
+    }
+
+    /// As [`Gape::measure`], asking for each vertex's position, in local metres.
+    pub fn measure_by(&self, position: &dyn Fn(u32) -> Point3<f64>) -> WoundGape {
+        let mean = |part: &Range<usize>| {
+            let sum =
+                self.vertices[part.clone()].iter().fold(Vector3::zeros(), |sum, &v| sum + position(v).coords);
+            sum / part.len() as f64
+        };
+        let opening = |sides: &Sides| {
+            let apart = (mean(&sides.right) - mean(&sides.left)) * 1000.0;
+            (apart.dot(&self.lateral), apart.norm())
+        };
+        let bins = self.bins.len();
+        let (lateral, distance) =
+            self.bins.iter().map(opening).fold((0.0, 0.0), |sum, (l, d)| (sum.0 + l, sum.1 + d));
+        let (mid_mm, mid_distance_mm) = opening(&self.middle);
+        WoundGape {
+            mean_mm: lateral / bins as f64,
+            mid_mm,
+            mean_distance_mm: distance / bins as f64,
+            mid_distance_mm,
+            bins,
+        }
+    }
+}
+
+impl Sides {
+    fn complete(&self) -> bool {
+        !self.left.is_empty() && !self.right.is_empty()
+    }
+}

@@ -1,0 +1,245 @@
+//! Where an incision lies: a frame on the skin, and the skin's height along it.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::incision::Incision;
+use crate::{MeshError, TetMesh};
+
+/// Most stations and bins along one slit; bounds the work for absurdly long segments.
+const MOST_BINS: f64 = 1024.0;
+
+/// An incision placed on the skin of a mesh at rest. All lengths in metres, positions in the mesh's local frame.
+///
+/// Axes: *along* from start to end; *inward* against the mean outward skin normal near the segment, made orthogonal to it; *lateral* =
+/// inward × along, with the left lip at negative and the right lip at positive lateral coordinate. *Depth* is counted along the inward axis from
+/// the local skin, whose height follows the skin near the slit, so that curved skin is cut evenly.
+#[derive(Clone, Debug)]
+pub struct Slit {
+    start: Point3<f64>,
+    pub(crate) along: Vector3<f64>,
+    pub(crate) lateral: Vector3<f64>,
+    pub(crate) inward: Vector3<f64>,
+    pub(crate) length: f64,
+    half_width: f64,
+    depth: f64,
+    /// How far above the local skin the slit still removes things.
+    above: f64,
+    /// Height of the skin along the inward axis, relative to the segment, in the middle of equal bins over the length.
+    skin: Vec<f64>,
+}
+
+/// Coordinates in the frame of a slit, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SlitPoint {
+    pub along: f64,
+    pub lateral: f64,
+    /// Below the local skin.
+    pub depth: f64,
+}
+
+impl Slit {
+    /// Finds the slit's frame and the skin's height along it.
+    ///
+    /// The segment must come within `reach` = max(depth, a quarter of the length, two lattice steps) of the centre of a skin triangle: enough for
+    /// the chord of a strongly curved belly.
+    pub(crate) fn place(
+        mesh: &TetMesh,
+        skin: &[[u32; 3]],
+        number: usize,
+        cut: &Incision,
+    ) -> Result<Self, MeshError> {
+        let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - mesh.frame.origin_mm) / 1000.0);
+        let (start, end) = (local(cut.from_mm), local(cut.to_mm));
+        let length = (end - start).norm();
+        let sizes = [("length", length * 1000.0), ("depth_mm", cut.depth_mm), ("width_mm", cut.width_mm)];
+        if let Some(&(key, value)) = sizes.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+            return Err(MeshError::IncisionSize { incision: number, key, value });
+        }
+        let along = (end - start) / length;
+        let (depth, half_width) = (cut.depth_mm / 1000.0, cut.width_mm / 2000.0);
+        let step = mesh.lattice.longest_step_mm() / 1000.0;
+        let reach = depth.max(length / 4.0).max(2.0 * step);
+
+        let facets: Vec<Facet> = skin.iter().map(|triangle| Facet::of(mesh, triangle)).collect();
+        let from_segment = |facet: &Facet| {
+            let s = (facet.center - start).dot(&along).clamp(0.0, length);
+            (facet.center - (start + along * s)).norm()
+        };
+        let distance = facets.iter().map(from_segment).fold(f64::INFINITY, f64::min);
+        if distance > reach {
+            return Err(MeshError::IncisionOffSkin {
+                incision: number,
+                from_mm: cut.from_mm,
+                to_mm: cut.to_mm,
+                distance_mm: distance * 1000.0,
+                reach_mm: reach * 1000.0,
+            });
+        }
+        let near: Vec<&Facet> =
+            facets.iter().filter(|facet| from_segment(facet) <= reach + 2.0 * step).collect();
+        let stations = (length / step).ceil().clamp(1.0, MOST_BINS) as usize;
+        let places = (0..stations).map(|n| start + along * (length * (n as f64 + 0.5) / stations as f64));
+        let normal = mean_normal(&near, places, 2.0 * step);
+        let outward = normal - along * normal.dot(&along);
+        // An unsteady direction: the skin is steeper than about 84° to the segment, or its two sides face away from each other.
+        if outward.norm() < 0.1 {
+            return Err(MeshError::IncisionThroughSkin {
+                incision: number,
+                from_mm: cut.from_mm,
+                to_mm: cut.to_mm,
+                normal: normal.into(),
+            });
+        }
+        let inward = -outward.normalize();
+        let lateral = inward.cross(&along);
+        let mut slit =
+            Self { start, along, lateral, inward, length, half_width, depth, above: reach, skin: Vec::new() };
+        slit.skin = slit.heights(mesh, skin, &facets, step);
+        Ok(slit)
+    }
+
+    /// Mean height of the skin in bins of about two lattice steps; bins without skin take theirs from their neighbours.
+    fn heights(&self, mesh: &TetMesh, skin: &[[u32; 3]], facets: &[Facet], step: f64) -> Vec<f64> {
+        let count = (self.length / (2.0 * step)).floor().clamp(1.0, MOST_BINS) as usize;
+        let mut bins: Vec<Vec<f64>> = vec![Vec::new(); count];
+        let facing = skin.iter().zip(facets).filter(|(_, facet)| facet.area_vector.dot(&self.inward) < 0.0);
+        let mut vertices: Vec<u32> = facing.flat_map(|(triangle, _)| *triangle).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        for vertex in vertices {
+            let from_start = mesh.positions[vertex as usize].cast::<f64>() - self.start;
+            let (s, t, q) =
+                (from_start.dot(&self.along), from_start.dot(&self.lateral), from_start.dot(&self.inward));
+            let beside = t.abs() <= self.half_width + 1.5 * step && (-step..=self.length + step).contains(&s);
+            if beside && q.abs() <= self.above + step {
+                bins[((s / self.length * count as f64).max(0.0) as usize).min(count - 1)].push(q);
+            }
+        }
+        let known: Vec<(f64, f64)> = bins
+            .iter_mut()
+            .enumerate()
+            .filter(|(_, heights)| !heights.is_empty())
+            .map(|(bin, heights)| (bin as f64, steady_mean(heights, 2.0 * step)))
+            .collect();
+        (0..count).map(|bin| interpolate(&known, bin as f64)).collect()
+    }
+
+    /// Coordinates of a position at rest.
+    pub(crate) fn coordinates(&self, position: Point3<f64>) -> SlitPoint {
+        let from_start = position - self.start;
+        let along = from_start.dot(&self.along);
+        let bin = along / self.length * self.skin.len() as f64 - 0.5;
+        let last = self.skin.len() - 1;
+        let low = bin.clamp(0.0, last as f64).floor();
+        let (low, part) = (low as usize, (bin - low).clamp(0.0, 1.0));
+        let skin = self.skin[low] + part * (self.skin[(low + 1).min(last)] - self.skin[low]);
+        SlitPoint {
+            along,
+            lateral: from_start.dot(&self.lateral),
+            depth: from_start.dot(&self.inward) - skin,
+        }
+    }
+
+    /// True in the volume cut out: along the segment, within half the width, down to the depth, and above the skin.
+    pub(crate) fn holds(&self, position: Point3<f32>) -> bool {
+        let point = self.coordinates(position.cast());
+        point.lateral.abs() <= self.half_width && self.in_middle_surface(point)
+    }
+
+    /// True if the straight line between two positions meets the surface in the middle of the slit (lateral = 0).
+    pub(crate) fn crosses(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
+        let (a, b) = (a.cast::<f64>(), b.cast::<f64>());
+        let (left, right) = ((a - self.start).dot(&self.lateral), (b - self.start).dot(&self.lateral));
+        // A position in the surface itself belongs to the right, so that every line has one answer.
+        if (left < 0.0) == (right < 0.0) {
+            return false;
+        }
+        let meeting = a + (b - a) * (left / (left - right));
+        self.in_middle_surface(self.coordinates(meeting))
+    }
+
+    fn in_middle_surface(&self, point: SlitPoint) -> bool {
+        (0.0..=self.length).contains(&point.along) && (-self.above..=self.depth).contains(&point.depth)
+    }
+
+    /// True if a position is within `margin` of the box around everything the slit can touch.
+    pub(crate) fn near(&self, position: Point3<f32>, margin: f64) -> bool {
+        let point = self.coordinates(position.cast());
+        (-margin..=self.length + margin).contains(&point.along)
+            && point.lateral.abs() <= self.half_width + margin
+            && (-self.above - margin..=self.depth + margin).contains(&point.depth)
+    }
+
+    /// Distance from a position at rest to the surface in the middle of the slit, m.
+    pub fn distance(&self, position: Point3<f32>) -> f64 {
+        let point = self.coordinates(position.cast());
+        let beyond = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
+        let (s, d) = (beyond(point.along, 0.0, self.length), beyond(point.depth, 0.0, self.depth));
+        Vector3::new(s, point.lateral, d).norm()
+    }
+
+    /// Unit vector across the slit, from the left lip to the right one.
+    pub fn lateral(&self) -> Vector3<f64> {
+        self.lateral
+    }
+
+    /// Unit vector into the body.
+    pub fn inward(&self) -> Vector3<f64> {
+        self.inward
+    }
+}
+
+/// A skin triangle's centre, and its outward normal times its area.
+pub(crate) struct Facet {
+    center: Point3<f64>,
+    pub area_vector: Vector3<f64>,
+}
+
+impl Facet {
+    pub fn of(mesh: &TetMesh, triangle: &[u32; 3]) -> Self {
+        let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].cast::<f64>());
+        Self {
+            center: Point3::from((a.coords + b.coords + c.coords) / 3.0),
+            area_vector: (b - a).cross(&(c - a)) / 2.0,
+        }
+    }
+}
+
+/// Mean over places of the area-weighted normal of the skin that is closest to each place, give or take `spread`.
+///
+/// Its length is below 1 where normals differ, and near 0 where they cancel.
+fn mean_normal(facets: &[&Facet], places: impl Iterator<Item = Point3<f64>>, spread: f64) -> Vector3<f64> {
+    let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+    for place in places {
+        let nearest = facets.iter().map(|facet| (facet.center - place).norm()).fold(f64::INFINITY, f64::min);
+        let (mut normal, mut area) = (Vector3::zeros(), 0.0);
+        for facet in facets.iter().filter(|facet| (facet.center - place).norm() <= nearest + spread) {
+            normal += facet.area_vector;
+            area += facet.area_vector.norm();
+        }
+        if area > 0.0 {
+            sum += normal / area;
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { sum / count } else { sum }
+}
+
+/// Mean of the values within `spread` of the median: a second surface above or below does not pull it away.
+fn steady_mean(values: &mut [f64], spread: f64) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let median = values[values.len() / 2];
+    let close = values.iter().filter(|v| (*v - median).abs() <= spread);
+    let (sum, count) = close.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    sum / count
+}
+
+/// Piecewise linear through `known` (ascending), constant beyond its ends, 0 without any.
+fn interpolate(known: &[(f64, f64)], at: f64) -> f64 {
+    let next = known.partition_point(|(x, _)| *x < at);
+    match (next.checked_sub(1).and_then(|n| known.get(n)), known.get(next)) {
+        (Some((x, y)), Some((u, v))) => y + (v - y) * (at - x) / (u - x),
+        (Some((_, y)), None) | (None, Some((_, y))) => *y,
+        (None, None) => 0.0,
+    }
+}
