@@ -1,7 +1,7 @@
 //! Gradients against finite differences; they conserve momentum; the energy form is what it says.
 
 use cutis_constraints::{Constraint, Distance, Eval, SkinTension, SkinTensionPaper, Volume};
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
 use crate::checks::{gradient_error, gradient_size, momentum_error, torque_error, with};
@@ -12,15 +12,12 @@ const EXACT: f64 = 1e-6;
 /// Bound on the momentum that rounding creates.
 const ROUNDING: f64 = 1e-12;
 
-fn area(x: &[nalgebra::Point3<f64>; 3]) -> f64 {
+fn area(x: &[Point3<f64>; 3]) -> f64 {
     (x[1] - x[0]).cross(&(x[2] - x[0])).norm() / 2.0
 }
 
 /// Whether `eval` has the gradient of its value and conserves momentum, and whether the checks see it if not.
-fn check<const N: usize>(
-    eval: impl Fn(&[nalgebra::Point3<f64>; N]) -> Eval<f64, N> + Copy,
-    shape: &Shape<N>,
-) {
+fn check<const N: usize>(eval: &impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shape: &Shape<N>) {
     let grad = eval(&shape.x).grad;
     let error = gradient_error(eval, shape);
     assert!(error < EXACT, "gradient is off by {error}");
@@ -35,8 +32,7 @@ fn check<const N: usize>(
         alter(&mut eval.grad);
         eval.grad
     };
-    let replaced =
-        |grad: [Vector3<f64>; N]| move |x: &[nalgebra::Point3<f64>; N]| Eval { c: eval(x).c, grad };
+    let replaced = |grad: [Vector3<f64>; N]| move |x: &[Point3<f64>; N]| Eval { c: eval(x).c, grad };
     let longest = (0..N).max_by(|&a, &b| grad[a].norm().total_cmp(&grad[b].norm())).unwrap_or(0);
     let flipped = altered(&|g| g[longest] = -g[longest]);
     assert!(gradient_error(replaced(flipped), shape) > 1.0);
@@ -87,7 +83,7 @@ proptest! {
     ) {
         let rest_area = ratio * area(&shape.x);
         let force = |eval: Eval<f64, 3>| eval.grad.map(|g| g * eval.c);
-        let energy = |x: &[nalgebra::Point3<f64>; 3]| {
+        let energy = |x: &[Point3<f64>; 3]| {
             let c = area(x) - rest_area;
             let u = 0.5 * c * c + beta * c.max(0.0).powi(3) / (3.0 * rest_area);
             Eval { c: u, grad: force(SkinTension::eval(x, &[rest_area, beta])) }
@@ -101,7 +97,7 @@ proptest! {
 
         // Negative control: without the derivative of q the force is another one, wherever there is amplification.
         if ratio < 1.0 && beta > 0.1 {
-            let without = |x: &[nalgebra::Point3<f64>; 3]| {
+            let without = |x: &[Point3<f64>; 3]| {
                 let c = SkinTension::eval(x, &[rest_area, beta]).c;
                 let grad = SkinTension::eval(x, &[rest_area, 0.0]).grad;
                 Eval { c: energy(x).c, grad: grad.map(|g| g * c) }

@@ -1,4 +1,5 @@
 //! Tests of the constraints: gradients, conservation, precision, lanes, degenerate shapes, stability, materials.
+#![allow(clippy::print_stdout)] // figures for whoever runs the test with --nocapture
 
 mod checks;
 mod degenerate;

@@ -112,7 +112,7 @@ fn without_the_clamp_the_paper_form_diverges() {
     let outcomes = cases().map(|case| run::<f64>(&case, 0.0, unclamped));
     let diverged = outcomes.filter(|outcome| !outcome.finite || outcome.largest > 10.0).count();
     println!("{diverged} of {TRIANGLES} triangles diverge without the clamp");
-    assert!(diverged > TRIANGLES / 2, "{diverged}");
+    assert!(diverged > TRIANGLES * 4 / 5, "{diverged}");
 }
 
 /// With its clamp, at stiffness 1, the paper form takes a Newton step at most and stays finite.
