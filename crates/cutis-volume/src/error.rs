@@ -218,7 +218,7 @@ pub enum VolumeError {
         /// The first that is wrong.
         point: usize,
         /// Its HU and value.
-        value: Option<[f32; 2]>,
+        value: Option<(f32, f32)>,
     },
     /// The text is no table.
     #[error(

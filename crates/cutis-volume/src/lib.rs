@@ -7,10 +7,13 @@ mod grid;
 pub mod nifti;
 mod partial_file;
 pub mod phantom;
+pub mod sample;
+mod table;
 mod volume;
 
 pub use affine::Affine;
 pub use error::VolumeError;
 pub use grid::Grid;
 pub use partial_file::PartialFile;
+pub use table::{Table, TableKind};
 pub use volume::{AIR_HU, Volume};

@@ -18,7 +18,7 @@ fn data() -> Option<PathBuf> {
         return Some(folder);
     }
     assert!(std::env::var_os("CI").is_none(), "the test data is missing: {}", folder.display());
-    println!("skipped: no test data at {} (set CUTIS_TEST_DATA)", folder.display());
+    eprintln!("skipped: no test data at {} (set CUTIS_TEST_DATA)", folder.display());
     None
 }
 
