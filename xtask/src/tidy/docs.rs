@@ -1,4 +1,5 @@
-//! Rules about pages: links lead somewhere, named paths exist, examples are not switched off.
+//! Rules about pages: the needed ones are there, links lead somewhere, named paths exist, every crate has its place on the
+//! page of the architecture, and examples are not switched off.
 
 use super::Finding;
 use super::files::Files;
@@ -6,6 +7,32 @@ use super::rules::is_ignored_fence;
 
 /// Endings by which a word in backticks is taken for a file of the repository.
 const FILE_ENDINGS: [&str; 6] = [".rs", ".md", ".toml", ".py", ".wgsl", ".sh"];
+
+/// The page that describes the workspace.
+pub const ARCHITECTURE: &str = "docs/ARCHITECTURE.md";
+
+/// Files without which the checkout is not complete.
+const REQUIRED: [&str; 6] =
+    ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE-MIT", "LICENSE-APACHE", ARCHITECTURE];
+
+/// Required files that are missing.
+pub fn required(files: &Files) -> Vec<Finding> {
+    REQUIRED
+        .iter()
+        .filter(|path| !files.exists(path))
+        .map(|path| Finding::failure(path, 0, "is missing"))
+        .collect()
+}
+
+/// Crates of the workspace that the page does not name.
+pub fn crates_named<'a>(page: &str, text: &str, names: impl Iterator<Item = &'a str>) -> Vec<Finding> {
+    let in_name = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
+    let words: std::collections::BTreeSet<&str> = text.split(|character| !in_name(character)).collect();
+    names
+        .filter(|name| !words.contains(name))
+        .map(|name| Finding::failure(page, 0, format!("does not name the crate `{name}`")))
+        .collect()
+}
 
 /// Relative links and pictures of a page whose target does not exist.
 pub fn links(page: &str, text: &str, files: &Files) -> Vec<Finding> {
@@ -124,6 +151,23 @@ mod tests {
             "crates/cutis/src/lib.rs",
             "deny.toml",
         ])
+    }
+
+    #[test]
+    fn missing_files_are_caught() {
+        let missing: Vec<String> = required(&files()).into_iter().map(|finding| finding.place).collect();
+        assert_eq!(missing, ["CHANGELOG.md", "CONTRIBUTING.md", "LICENSE-MIT", "LICENSE-APACHE"]);
+    }
+
+    #[test]
+    fn crates_without_a_place_are_caught() {
+        let findings = crates_named(
+            "a.md",
+            "`cutis-mesh` and cutis-solver-cpu.\n",
+            ["cutis-mesh", "cutis-solver"].into_iter(),
+        );
+        assert_eq!(findings.len(), 1);
+        assert!(findings[0].message.contains("`cutis-solver`"));
     }
 
     #[test]

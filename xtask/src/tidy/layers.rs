@@ -50,6 +50,13 @@ pub struct Package {
     dependencies: Vec<String>,
 }
 
+impl Package {
+    /// Name of the crate.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
 /// The members of the workspace, from `cargo metadata --no-deps`.
 pub fn packages(metadata: &Value) -> Result<Vec<Package>> {
     let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;

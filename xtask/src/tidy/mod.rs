@@ -59,7 +59,9 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     let files = Files::list(&workspace.root)?;
     let metadata = workspace.metadata(&workspace.root.join("Cargo.toml"), false)?;
 
-    let mut findings = layers::check(&layers::packages(&metadata)?);
+    let packages = layers::packages(&metadata)?;
+    let mut findings = layers::check(&packages);
+    findings.extend(docs::required(&files));
     let mut sources = 0;
     for path in files.with_extension("rs") {
         let source = Source::parse(path, &files.read(path)?);
@@ -71,8 +73,9 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         let text = files.read(path)?;
         findings.extend(docs::links(path, &text, &files));
         findings.extend(docs::ignored_examples(path, &text));
-        if path == "docs/ARCHITECTURE.md" {
+        if path == docs::ARCHITECTURE {
             findings.extend(docs::named_paths(path, &text, &files));
+            findings.extend(docs::crates_named(path, &text, packages.iter().map(layers::Package::name)));
         }
         pages += 1;
     }
