@@ -6,7 +6,7 @@ use crate::{ColoringError, Groups};
 impl Groups {
     /// Checks that each constraint is in exactly one group and that no two constraints of a group share a vertex.
     ///
-    /// Needs 8 bytes per vertex and 1 byte per constraint, and one pass.
+    /// Needs 4 bytes per vertex and 1 byte per constraint, and one pass.
     ///
     /// # Errors
     /// [`ColoringError::Clash`] names the two constraints and the vertex; [`ColoringError::WrongLength`],
@@ -25,27 +25,30 @@ impl Groups {
 
         let mut seen = filled(false, count)?;
         // For each vertex, one more than the position in the order of the last constraint that has it.
-        let mut last = filled(0usize, vertex_count)?;
-        for group in 0..self.len() {
-            let start = self.offsets[group] as usize;
-            for position in start..self.offsets[group + 1] as usize {
-                let constraint = self.order[position];
+        let mut last = filled(0u32, vertex_count)?;
+        for (group, range) in self.offsets.windows(2).enumerate() {
+            let (start, end) = (range[0], range[1]);
+            for position in start..end {
+                let constraint = self.order[position as usize];
                 match seen.get_mut(constraint as usize) {
                     Some(seen) if !*seen => *seen = true,
-                    _ => return Err(ColoringError::NotAPermutation { position, constraint, count }),
+                    _ => {
+                        let position = position as usize;
+                        return Err(ColoringError::NotAPermutation { position, constraint, count });
+                    }
                 }
                 for &vertex in &constraints[constraint as usize] {
                     let Some(last) = last.get_mut(vertex as usize) else {
                         let constraint = constraint as usize;
                         return Err(ColoringError::VertexOutOfRange { constraint, vertex, vertex_count });
                     };
-                    if *last == position + 1 {
-                        let constraint = constraint as usize;
-                        return Err(ColoringError::RepeatedVertex { constraint, vertex });
-                    }
                     if *last > start {
-                        let first = self.order[*last - 1];
-                        return Err(ColoringError::Clash { group, first, second: constraint, vertex });
+                        let first = self.order[*last as usize - 1];
+                        return Err(if first == constraint {
+                            ColoringError::RepeatedVertex { constraint: constraint as usize, vertex }
+                        } else {
+                            ColoringError::Clash { group, first, second: constraint, vertex }
+                        });
                     }
                     *last = position + 1;
                 }

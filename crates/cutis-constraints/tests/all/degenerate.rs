@@ -3,7 +3,8 @@
 use cutis_constraints::{Constraint, Distance, Eval, Params, Scalar, SkinTension, SkinTensionPaper, Volume};
 use nalgebra::{Point3, Vector3};
 
-use crate::shapes::SCALES;
+/// The documented range of lengths, in m.
+const SCALES: [f64; 5] = [1e-7, 1e-3, 1.0, 1e3, 1e7];
 
 fn eval<const N: usize, C: Constraint<N>, T: Scalar>(
     x: [[f64; 3]; N],
