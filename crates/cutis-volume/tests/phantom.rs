@@ -159,7 +159,11 @@ fn body_and_table_are_two_separate_components() {
             ys.fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
         };
         let ((back, belly), (_, edge)) = (heights(body), heights(table));
-        assert!(body.len() > 300_000 && belly > 80.0 && back > -105.0, "body of {}: {back} to {belly}", body.len());
+        assert!(
+            body.len() > 300_000 && belly > 80.0 && back > -105.0,
+            "body of {}: {back} to {belly}",
+            body.len()
+        );
         assert!(table.len() > 15_000 && edge < -75.0, "table of {}, up to {edge} mm", table.len());
         // The rest are ends of lung vessels.
         assert!(total - body.len() - table.len() < total / 200, "stray: {:?}", rest.iter().map(Vec::len));
@@ -182,7 +186,8 @@ fn lungs_and_bowel_gas_are_closed_to_the_sides() {
         left
     };
     let litres = |voxels: &[bool], low_mm: f64, high_mm: f64| {
-        let counted = (0..grid.len()).filter(|&n| voxels[n] && (low_mm..high_mm).contains(&grid.mm(grid.point(n)).z));
+        let counted =
+            (0..grid.len()).filter(|&n| voxels[n] && (low_mm..high_mm).contains(&grid.mm(grid.point(n)).z));
         counted.count() as f64 * grid.affine.voxel_volume_mm3() * 1e-6
     };
     let from_the_sides = unreached_from(&[0, 1]);

@@ -1,0 +1,299 @@
+//! Damaged, hostile and unusual files, made here byte by byte.
+
+use std::fs;
+use std::io::Write;
+
+use cutis_volume::{VolumeError, nifti};
+use flate2::{Compression, write::GzEncoder};
+use proptest::prelude::*;
+
+/// A NIfTI-1 file of `voxels` bytes, 2 × 3 × 4 voxels unless changed.
+#[derive(Clone)]
+struct Image {
+    bytes: Vec<u8>,
+}
+
+impl Image {
+    fn new(datatype: i16, voxels: &[u8]) -> Self {
+        let mut image = Self { bytes: vec![0; 352] };
+        image.put(0, &348i32.to_le_bytes());
+        image.dim(&[3, 2, 3, 4]);
+        image.put(70, &datatype.to_le_bytes());
+        for (n, size) in [1.0, 2.0, 3.0, 4.0].into_iter().enumerate() {
+            image.f32(76 + 4 * n, size);
+        }
+        image.f32(108, 352.0);
+        image.f32(112, 1.0);
+        image.put(123, &[2]);
+        image.put(254, &1i16.to_le_bytes());
+        for (at, value) in [(280, 2.0), (300, 3.0), (320, 4.0)] {
+            image.f32(at, value);
+        }
+        image.put(344, b"n+1\0");
+        image.bytes.extend(voxels);
+        image
+    }
+
+    fn int16() -> Self {
+        Self::new(4, &[0; 48])
+    }
+
+    fn put(&mut self, at: usize, bytes: &[u8]) -> &mut Self {
+        self.bytes[at..at + bytes.len()].copy_from_slice(bytes);
+        self
+    }
+
+    fn f32(&mut self, at: usize, value: f32) -> &mut Self {
+        self.put(at, &value.to_le_bytes())
+    }
+
+    fn dim(&mut self, dim: &[i16]) -> &mut Self {
+        for (n, size) in dim.iter().enumerate() {
+            self.put(40 + 2 * n, &size.to_le_bytes());
+        }
+        self
+    }
+
+    fn read(&self) -> Result<nifti::Loaded, VolumeError> {
+        read("scan.nii", &self.bytes)
+    }
+
+    /// The message, which must name the file.
+    fn refused(&self) -> VolumeError {
+        let error = self.read().unwrap_err();
+        assert!(error.to_string().contains("scan.nii"), "{error}");
+        error
+    }
+}
+
+fn read(name: &str, bytes: &[u8]) -> Result<nifti::Loaded, VolumeError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).unwrap();
+    nifti::read(path)
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn headers_that_cannot_be_right_are_refused_by_field() {
+    assert!(Image::int16().read().is_ok());
+    let cases: [(&str, fn(&mut Image) -> &mut Image); 15] = [
+        ("dim[0]", |i| i.dim(&[0])),
+        ("dim[0]", |i| i.dim(&[8])),
+        ("dim[1]", |i| i.dim(&[3, -2])),
+        ("dim[3]", |i| i.dim(&[3, 2, 3, 0])),
+        ("dim[4]", |i| i.dim(&[4, 2, 3, 4, 0])),
+        ("vox_offset", |i| i.f32(108, 0.0)),
+        ("vox_offset", |i| i.f32(108, -352.0)),
+        ("vox_offset", |i| i.f32(108, f32::NAN)),
+        ("vox_offset", |i| i.f32(108, 352.5)),
+        ("vox_offset", |i| i.f32(108, 1e30)),
+        ("scl_inter", |i| i.f32(116, f32::INFINITY)),
+        ("srow", |i| i.f32(280, 0.0)),
+        ("srow", |i| i.f32(280, f32::NAN)),
+        ("pixdim[2]", |i| i.put(252, &[1, 0, 0, 0]).f32(84, 0.0)),
+        ("magic", |i| i.put(344, b"ni1\0")),
+    ];
+    for (field, change) in cases {
+        let error = change(&mut Image::int16()).refused();
+        assert!(
+            matches!(error, VolumeError::Header { .. }) && error.to_string().contains(field),
+            "{field}: {error}"
+        );
+    }
+    for bytes in [&b""[..], b"348", b"not a NIfTI file", &Image::int16().bytes[..300]] {
+        assert!(matches!(read("scan.nii", bytes), Err(VolumeError::NotNifti { .. })));
+    }
+    assert!(matches!(Image::int16().put(344, &[0; 4]).refused(), VolumeError::NotNifti { .. }));
+    for code in [0, 1, 32, 128, 1536, 1792, 2048, 2304, -7] {
+        let error = Image::int16().put(70, &i16::to_le_bytes(code)).refused();
+        assert!(matches!(error, VolumeError::VoxelType { .. }), "{error}");
+    }
+}
+
+#[test]
+fn a_small_file_cannot_promise_a_large_volume() {
+    let mut image = Image::int16();
+    image.dim(&[3, 32767, 32767, 32767]);
+    assert!(matches!(image.refused(), VolumeError::Truncated { .. }));
+    let packed = gzip(&image.bytes);
+    assert!(packed.len() < 1024);
+    assert!(matches!(read("scan.nii.gz", &packed), Err(VolumeError::Truncated { .. })));
+    // Overflow of the product is possible in NIfTI-2 alone.
+    let mut large = vec![0; 600];
+    large[..4].copy_from_slice(&540i32.to_le_bytes());
+    large[4..12].copy_from_slice(b"n+2\0\r\n\x1a\n");
+    large[12..14].copy_from_slice(&4i16.to_le_bytes());
+    for (n, size) in [3, i64::MAX, i64::MAX, 9].into_iter().enumerate() {
+        large[16 + 8 * n..24 + 8 * n].copy_from_slice(&size.to_le_bytes());
+    }
+    for n in 0..4 {
+        large[104 + 8 * n..112 + 8 * n].copy_from_slice(&1f64.to_le_bytes());
+    }
+    large[168..176].copy_from_slice(&544i64.to_le_bytes());
+    large[344] = 1;
+    assert!(matches!(read("scan.nii", &large), Err(VolumeError::TooLarge { .. })));
+}
+
+#[test]
+fn of_a_gzip_bomb_no_more_is_unpacked_than_the_header_says() {
+    let mut bytes = Image::int16().bytes;
+    bytes.resize(4 << 20, 0);
+    let mut packed = gzip(&bytes);
+    // Whoever unpacks to the end finds the checksum wrong.
+    let checksum = packed.len() - 8;
+    packed[checksum] ^= 1;
+    let loaded = read("scan.nii.gz", &packed).unwrap();
+    assert_eq!(loaded.volume.voxels().len(), 24);
+    assert!(
+        loaded.warnings.iter().any(|warning| warning.contains("after the last voxel")),
+        "{:?}",
+        loaded.warnings
+    );
+}
+
+#[test]
+fn damaged_gzip_is_refused() {
+    let voxels: Vec<u8> = (0..48).map(|n| n * 5).collect();
+    let packed = gzip(&Image::new(4, &voxels).bytes);
+    let whole = read("scan.nii.gz", &packed).unwrap();
+    assert!(whole.warnings.is_empty());
+    for cut in 1..packed.len() - 2 {
+        assert!(read("scan.nii.gz", &packed[..packed.len() - cut]).is_err(), "{cut} bytes short");
+    }
+    let mut wrong_checksum = packed.clone();
+    let at = packed.len() - 7;
+    wrong_checksum[at] ^= 1;
+    assert!(matches!(read("scan.nii.gz", &wrong_checksum), Err(VolumeError::Io { .. })));
+    // A name without .gz does not matter, the content does.
+    assert_eq!(read("scan.nii", &packed).unwrap().volume, whole.volume);
+}
+
+#[test]
+fn pairs_need_both_halves() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut image = Image::new(4, &[7; 48]);
+    image.put(344, b"ni1\0").f32(108, 0.0);
+    let [header, voxels] = ["Scan.HDR", "Scan.IMG"].map(|name| folder.path().join(name));
+    fs::write(&header, &image.bytes[..348]).unwrap();
+    let error = nifti::read(&header).unwrap_err();
+    assert!(
+        matches!(error, VolumeError::MissingPartner { .. }) && error.to_string().contains("Scan.IMG"),
+        "{error}"
+    );
+    fs::write(&voxels, &image.bytes[352..]).unwrap();
+    let loaded = nifti::read(&voxels).unwrap();
+    assert_eq!(loaded.volume, nifti::read(&header).unwrap().volume);
+    assert_eq!(loaded.volume.voxels(), [0x0707; 24]);
+    fs::write(&voxels, &image.bytes[353..]).unwrap();
+    assert!(matches!(
+        nifti::read(&header),
+        Err(VolumeError::Truncated { expected_bytes: 48, found_bytes: 47, .. })
+    ));
+    fs::remove_file(&header).unwrap();
+    assert!(matches!(nifti::read(&voxels), Err(VolumeError::MissingPartner { .. })));
+    assert!(matches!(nifti::read(folder.path().join("none.hdr")), Err(VolumeError::Io { .. })));
+    assert!(matches!(nifti::read(folder.path()), Err(VolumeError::Io { .. })));
+}
+
+fn bytes_of<const N: usize, T: Copy>(values: &[T], encode: fn(T) -> [u8; N]) -> Vec<u8> {
+    (0..24).flat_map(|n| encode(values[n % values.len()])).collect()
+}
+
+#[test]
+fn uint16_above_int16_is_shifted() {
+    let loaded = Image::new(512, &bytes_of(&[0u16, 65535, 1024, 40000], u16::to_le_bytes)).read().unwrap();
+    let volume = &loaded.volume;
+    let hu: Vec<f32> = volume.voxels()[..4].iter().map(|&stored| volume.hu(stored)).collect();
+    assert_eq!(hu, [0.0, 65535.0, 1024.0, 40000.0]);
+    assert_eq!((volume.slope(), volume.intercept()), (1.0, 32768.0));
+    assert_eq!((loaded.stats.min, loaded.stats.max, loaded.stats.sum), (0.0, 65535.0, 6.0 * 106559.0));
+    assert_eq!(loaded.dtype, "uint16");
+}
+
+#[test]
+fn wide_types_become_whole_hu() {
+    let mut image = Image::new(16, &bytes_of(&[-1000.25f32, 40.5, f32::NAN, 3000.0], f32::to_le_bytes));
+    let loaded = image.read().unwrap();
+    assert_eq!(loaded.volume.voxels()[..4], [-1000, 41, -1024, 3000]);
+    assert_eq!(loaded.stats.nan_count, 6);
+    assert_eq!(loaded.stats.sum, 6.0 * 2040.25);
+    assert!(loaded.warnings[0].contains("5.000e-1 HU"), "{:?}", loaded.warnings);
+    assert!(loaded.warnings[1].contains("6 voxels are NaN"), "{:?}", loaded.warnings);
+
+    image.put(352 + 4 * 7, &f32::NEG_INFINITY.to_le_bytes());
+    assert!(matches!(
+        image.refused(),
+        VolumeError::Infinite { index: [1, 0, 1], value: f64::NEG_INFINITY, .. }
+    ));
+    image.put(352 + 4 * 7, &40000f32.to_le_bytes());
+    assert!(matches!(image.refused(), VolumeError::Range { max: 40000.0, .. }));
+
+    let all_nan = Image::new(16, &bytes_of(&[f32::NAN], f32::to_le_bytes)).read().unwrap();
+    assert!(all_nan.stats.min.is_nan() && all_nan.stats.nan_count == 24);
+
+    for (code, bytes) in [
+        (8, bytes_of(&[-1024i32, 3071], i32::to_le_bytes)),
+        (1024, bytes_of(&[-1024i64, 3071], i64::to_le_bytes)),
+        (64, bytes_of(&[-1024f64, 3071.0], f64::to_le_bytes)),
+    ] {
+        let loaded = Image::new(code, &bytes).read().unwrap();
+        assert_eq!(loaded.volume.voxels()[..2], [-1024, 3071]);
+        assert!(loaded.warnings.is_empty());
+    }
+    for (code, bytes) in [
+        (768, bytes_of(&[5u32, u32::MAX], u32::to_le_bytes)),
+        (1280, bytes_of(&[u64::MAX], u64::to_le_bytes)),
+    ] {
+        assert!(matches!(Image::new(code, &bytes).refused(), VolumeError::Range { .. }));
+    }
+    let loaded = Image::new(256, &bytes_of(&[-128i8, 127], i8::to_le_bytes)).read().unwrap();
+    assert_eq!((loaded.stats.min, loaded.stats.max, loaded.dtype), (-128.0, 127.0, "int8"));
+}
+
+#[test]
+fn units_and_missing_axes() {
+    let spacing = |image: &mut Image| image.read().unwrap().volume.grid().affine.spacing_mm();
+    assert_eq!(spacing(Image::int16().put(123, &[0])), [2.0, 3.0, 4.0]);
+    assert_eq!(spacing(Image::int16().put(123, &[1 | 8])), [2000.0, 3000.0, 4000.0]);
+    assert_eq!(spacing(Image::int16().put(123, &[3])), [0.002, 0.003, 0.004]);
+    assert!(Image::int16().put(123, &[5]).read().unwrap().warnings[0].contains("xyzt_units"));
+    let flat = Image::int16().dim(&[2, 6, 4, -9]).read().unwrap();
+    assert_eq!(flat.volume.grid().shape, [6, 4, 1]);
+    let mirrored = Image::int16().put(252, &[1, 0, 0, 0]).f32(76, -1.0).read().unwrap();
+    assert!(mirrored.volume.grid().affine.voxel_volume_mm3() < 0.0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    #[test]
+    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..700), magic in 0usize..4) {
+        let mut bytes = bytes;
+        let start: &[u8] = [&[][..], &[0x5c, 1, 0, 0], &[0, 0, 2, 0x1c], &[0x1f, 0x8b, 8]][magic];
+        let len = start.len().min(bytes.len());
+        bytes[..len].copy_from_slice(&start[..len]);
+        let _ = read("scan.nii", &bytes);
+        let _ = read("scan.nii.gz", &gzip(&bytes));
+    }
+
+    #[test]
+    fn mutated_headers_never_panic(
+        changes in prop::collection::vec((0usize..352, any::<u8>()), 1..12),
+        datatype in prop::sample::select(vec![2i16, 4, 8, 16, 64, 256, 512, 768, 1024, 1280]),
+        gz: bool,
+    ) {
+        let mut image = Image::new(datatype, &[3; 24 * 8]);
+        for (at, byte) in changes {
+            image.bytes[at] = byte;
+        }
+        let bytes = if gz { gzip(&image.bytes) } else { image.bytes };
+        if let Ok(loaded) = read("scan.nii", &bytes) {
+            prop_assert!(loaded.volume.voxels().len() <= 24 * 8);
+        }
+    }
+}
