@@ -25,7 +25,7 @@ impl Buckets {
             let tets = chunk * CHUNK..count.min((chunk + 1) * CHUNK);
             let touched: Vec<(u32, u32)> = tets
                 .clone()
-                .map(|tet| slabs_of(tet))
+                .map(&slabs_of)
                 .map(|range| (range.start as u32, range.end as u32))
                 .collect();
             let mut offsets = vec![0_u32; slabs + 1];

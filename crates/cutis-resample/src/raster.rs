@@ -131,12 +131,10 @@ fn covered(low: f64, high: f64, within: &Range<usize>) -> Range<usize> {
     let last = within.end as f64 - 1.0;
     let low = if low > first { low } else { first };
     let high = if high < last { high } else { last };
-    if !(low <= high) {
-        return within.start..within.start;
-    }
-    // Both are non-negative here, so that the conversion's truncation is a floor.
+    // Both are non-negative where there is something to cover, so that the conversion's truncation is a floor.
     let floor = low as usize;
-    floor + usize::from((floor as f64) < low)..high as usize + 1
+    let start = floor + usize::from((floor as f64) < low);
+    if low <= high { start..high as usize + 1 } else { start..start }
 }
 
 #[cfg(test)]
