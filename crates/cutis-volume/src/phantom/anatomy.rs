@@ -19,8 +19,9 @@ impl Anatomy {
         let mut parts = vec![habitus::table()];
         parts.extend(person.walls());
         parts.extend(chest::parts(&person, &mut Random::new(seed, 1)));
-        parts.extend(bowel::parts(&person, &mut Random::new(seed, 2)));
-        parts.extend(organs::parts(&person, &mut Random::new(seed, 3)));
+        parts.extend(organs::parts(&person, &mut Random::new(seed, 2)));
+        parts.extend(bowel::parts(&person, &mut Random::new(seed, 3)));
+        parts.extend(organs::rear_parts(&person));
         parts.extend(skeleton::parts(&person, &mut Random::new(seed, 4)));
         let surroundings = Surroundings {
             cavity: person.cavity,

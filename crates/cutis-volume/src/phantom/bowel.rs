@@ -9,7 +9,7 @@ use super::tube;
 
 const GAS_HU: f32 = -955.0;
 /// Distance between neighbouring loops of small bowel, mm.
-const LOOP_MM: f32 = 27.0;
+const LOOP_MM: f32 = 26.0;
 
 /// Stomach, small bowel and colon, in painting order.
 pub(super) fn parts(person: &Habitus, random: &mut Random) -> Vec<Part> {
@@ -77,12 +77,12 @@ fn colon(person: &Habitus, random: &mut Random) -> Vec<Part> {
 /// Loops through a jittered lattice of points, each joined to its nearest free neighbour.
 fn small_bowel(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let mut free = Vec::new();
-    for k in -3..=3 {
+    for k in -4..=4 {
         for j in -2..=2 {
             for i in -3..=3 {
                 let offset = [i, j, k].map(|c| LOOP_MM * c as f32);
-                let inside = norm([offset[0] / 88.0, offset[1] / 50.0, offset[2] / 84.0]) < 1.0;
-                let point = random.near([offset[0], offset[1] + 20.0, offset[2] - 112.0], 8.0);
+                let inside = norm([offset[0] / 88.0, offset[1] / 60.0, offset[2] / 84.0]) < 1.0;
+                let point = random.near([offset[0], offset[1] + 24.0, offset[2] - 112.0], 8.0);
                 if inside {
                     free.push(person.place(point));
                 }
@@ -92,7 +92,7 @@ fn small_bowel(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let mut parts = Vec::new();
     let (mut walls, mut pockets) = (Vec::new(), Vec::new());
     for course in chains(free, 1.7 * LOOP_MM) {
-        let radius = random.between(10.5, 13.0);
+        let radius = random.between(11.5, 14.0);
         let knots: Vec<_> =
             course.iter().map(|&[x, y, z]| [x, y, z, radius * random.between(0.85, 1.1)]).collect();
         let path = smooth_path(&knots, 5);

@@ -32,20 +32,20 @@ fn vessel_tree(person: &Habitus, side: f32, random: &mut Random) -> Vec<Solid> {
     let middle = person.place([side * 78.0, -8.0, 150.0]);
     let mut solids = Vec::new();
     let mut tips: Vec<([f32; 4], [f32; 3])> =
-        (0..7).map(|_| ([x, y, z, 5.0], random.near([side * 1.1, 0.0, -0.1], 1.1))).collect();
+        (0..12).map(|_| ([x, y, z, 4.5], random.near([side * 0.9, 0.0, 0.0], 1.2))).collect();
     for generation in 0..GENERATIONS {
-        let length = 34.0 - 4.0 * generation as f32;
+        let length = 25.0 - 2.5 * generation as f32;
         let mut next = Vec::new();
         for ([x, y, z, r], heading) in tips {
             let reach = length / norm(heading).max(0.2) * random.between(0.75, 1.2);
             let end = [x + reach * heading[0], y + reach * heading[1], z + reach * heading[2]];
-            let tip = [end[0], end[1], end[2], 0.76 * r];
+            let tip = [end[0], end[1], end[2], 0.78 * r];
             solids.extend(tube(&[[x, y, z, r], tip]));
             // Onwards, bent at random and a little away from the middle of the lung.
             let outward = subtract(end, middle).map(|c| 0.006 * c);
             let straight = heading.map(|c| c / norm(heading).max(0.2));
             for _ in 0..2 {
-                let bent = random.near([0, 1, 2].map(|c| straight[c] + outward[c]), 0.75);
+                let bent = random.near([0, 1, 2].map(|c| straight[c] + outward[c]), 0.85);
                 next.push((tip, bent));
             }
         }
@@ -77,7 +77,7 @@ fn mediastinum(person: &Habitus, random: &mut Random) -> Vec<Part> {
         [x, y, z, r]
     };
     let beside = |x: f32, gap: f32, z: f32, r: f32| [x, person.spine(z) + gap, z, r];
-    let fat = Blob::new(person.place([0.0, 5.0, 215.0]), [26.0, 82.0, 150.0]).squared(0.5);
+    let fat = Blob::new(person.place([0.0, 5.0, 215.0]), [30.0, 84.0, 170.0]);
     let sac = Blob::new(person.place([-20.0, 26.0, 122.0]), [60.0, 47.0, 52.0].map(|r| r * size))
         .turned(1, -0.2)
         .turned(2, 0.18);
@@ -100,7 +100,7 @@ fn mediastinum(person: &Habitus, random: &mut Random) -> Vec<Part> {
         .chain(tube(&[fork, at(-32.0, -12.0, 166.0, 6.0), at(-50.0, -14.0, 148.0, 4.5)]));
     vec![
         Part::new([Solid::Blob(fat)], [grainy(0.0, -80.0, 30.0)]).wobbly(5.0).in_cavity(0.0),
-        Part::new([Solid::Blob(sac)], [layer(0.0, 20.0), layer(1.5, -85.0), grainy(7.0, 44.0, 8.0)])
+        Part::new([Solid::Blob(sac)], [grainy(0.0, -75.0, 30.0), grainy(3.5, 44.0, 8.0)])
             .wobbly(3.0)
             .in_cavity(2.0),
         Part::new(

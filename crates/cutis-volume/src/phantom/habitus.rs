@@ -2,13 +2,23 @@
 //!
 //! RAS+ millimetres: x to the right, y to the front, z to the head; the lowest rib arch is near z = 0.
 
-use super::part::{Part, grainy, layer};
+use super::part::{Layer, Part, grainy, layer};
 use super::profile::Profile;
 use super::random::Random;
 use super::solid::{Board, Outline, Solid};
 
 /// Height of the skin of the back, mm: flat, as the person lies on it.
 const BACK_MM: f32 = 100.0;
+/// Between an ellipse and a rounded box.
+const SQUARENESS: f32 = 0.3;
+/// Planes of fat between sheets of muscle.
+const MUSCLE: [Layer; 5] = [
+    grainy(0.0, 52.0, 14.0),
+    layer(5.0, -45.0),
+    grainy(6.0, 54.0, 14.0),
+    layer(10.0, -30.0),
+    grainy(10.8, 54.0, 14.0),
+];
 /// Free distance between the skin of the back and the table, mm.
 const TABLE_GAP_MM: f32 = 12.0;
 
@@ -31,9 +41,9 @@ impl Habitus {
 
         // Knots from z = −300 (hips) to 300 (upper chest), every 100 mm.
         let side = Profile::new([172.0, 170.0, 161.0, 154.0, 158.0, 163.0, 158.0]).scaled(width);
-        let front = Profile::new([84.0, 92.0, 100.0, 101.0, 102.0, 101.0, 90.0]).scaled(depth);
+        let front = Profile::new([92.0, 101.0, 109.0, 109.0, 109.0, 107.0, 95.0]).scaled(depth);
         let back = Profile::new([BACK_MM; 7]);
-        let skin = Outline { side, front, back, squareness: 0.45 };
+        let skin = Outline { side, front, back, squareness: SQUARENESS };
 
         let fat_side = Profile::new([28.0, 27.0, 25.0, 18.0, 12.0, 10.0, 10.0]);
         let fat_front = Profile::new([18.0, 24.0, 25.0, 20.0, 13.0, 11.0, 11.0]);
@@ -42,17 +52,17 @@ impl Habitus {
             side: side.plus(&fat_side, -fatness),
             front: front.plus(&fat_front, -fatness),
             back: back.plus(&fat_back, -1.0),
-            squareness: 0.45,
+            squareness: SQUARENESS,
         };
 
         let wall_side = Profile::new([58.0, 46.0, 17.0, 14.0, 15.0, 16.0, 20.0]);
-        let wall_front = Profile::new([16.0, 11.0, 10.0, 11.0, 14.0, 16.0, 18.0]);
+        let wall_front = Profile::new([18.0, 13.0, 12.0, 12.0, 15.0, 17.0, 20.0]);
         let wall_back = Profile::new([20.0, 22.0, 30.0, 26.0, 15.0, 15.0, 18.0]);
         let cavity = Outline {
             side: muscle.side.plus(&wall_side, -1.0),
             front: muscle.front.plus(&wall_front, -1.0),
             back: muscle.back.plus(&wall_back, -1.0),
-            squareness: 0.45,
+            squareness: SQUARENESS,
         };
 
         let spine = Profile::new([-66.0, -58.0, -34.0, -36.0, -46.0, -50.0, -46.0]);
@@ -73,7 +83,7 @@ impl Habitus {
     pub(super) fn walls(&self) -> Vec<Part> {
         vec![
             Part::new([Solid::Outline(self.skin)], [layer(0.0, 25.0), grainy(2.0, -102.0, 12.0)]),
-            Part::new([Solid::Outline(self.muscle)], [grainy(0.0, 52.0, 14.0)]).wobbly(1.5),
+            Part::new([Solid::Outline(self.muscle)], MUSCLE).wobbly(1.5),
             Part::new([Solid::Outline(self.cavity)], [grainy(0.0, -98.0, 14.0)]).wobbly(1.0),
         ]
     }
@@ -82,7 +92,7 @@ impl Habitus {
 /// The scanner table: a carbon shell around foam.
 pub(super) fn table() -> Part {
     let board = Board { top: -BACK_MM - TABLE_GAP_MM, thickness: 26.0, half_width: 185.0, bend: 620.0 };
-    Part::new([Solid::Board(board)], [layer(0.0, -60.0), layer(3.0, -925.0)])
+    Part::new([Solid::Board(board)], [layer(0.0, -20.0), layer(4.5, -925.0)])
 }
 
 #[cfg(test)]

@@ -6,13 +6,19 @@ use super::random::Random;
 use super::solid::{Blob, Solid};
 use super::tube;
 
-/// All solid organs, in painting order.
+/// Thickness of the fat around a kidney, mm.
+const CAPSULE_MM: f32 = 6.0;
+
+/// The organs, in painting order: the fat around the kidneys makes room in what lies before them.
 pub(super) fn parts(person: &Habitus, random: &mut Random) -> Vec<Part> {
-    let mut parts = psoas(person);
-    parts.extend(vessels(person));
+    let mut parts = upper_organs(person, random);
     parts.extend([-1.0, 1.0].into_iter().flat_map(|side| kidney(person, side, random)));
-    parts.extend(upper_organs(person, random));
     parts
+}
+
+/// Muscles and vessels beside the spine, which nothing pushes aside.
+pub(super) fn rear_parts(person: &Habitus) -> Vec<Part> {
+    vec![psoas(person), vessels(person)]
 }
 
 /// Liver with gallbladder, spleen, pancreas and the bladder.
@@ -22,7 +28,7 @@ fn upper_organs(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let blob = |centre: [f32; 3], radii: [f32; 3]| {
         Blob::new(person.place([centre[0], centre[1], centre[2] + shift]), radii.map(|r| r * size))
     };
-    let right_lobe = blob([74.0, -2.0, 38.0], [76.0, 84.0, 62.0]).squared(0.3).turned(1, 0.16);
+    let right_lobe = blob([74.0, 4.0, 44.0], [76.0, 82.0, 57.0]).squared(0.3).turned(1, 0.16);
     let left_lobe = blob([8.0, 48.0, 58.0], [74.0, 36.0, 32.0]).turned(1, 0.2);
     let spleen = blob([-106.0, -44.0, 42.0], [25.0, 44.0, 52.0]).turned(2, 0.2).turned(0, 0.15);
     let gallbladder = blob([52.0, 50.0, 0.0], [14.0, 17.0, 27.0]).turned(0, 0.2);
@@ -69,21 +75,23 @@ fn liver_vessels(person: &Habitus, shift: f32) -> Vec<Solid> {
 
 /// A kidney with the fat of its sinus; the right one (`side` 1) lies lower.
 fn kidney(person: &Habitus, side: f32, random: &mut Random) -> Vec<Part> {
-    let z = if side > 0.0 { -28.0 } else { -12.0 } + random.between(-7.0, 7.0);
+    let z = -22.0 - 9.0 * side + random.between(-7.0, 7.0);
     let size = random.between(0.94, 1.08);
     let at = |x: f32, y: f32| person.place([side * x, y, z]);
-    let body = Blob::new(at(66.0, -32.0), [27.0, 23.0, 53.0].map(|r| r * size))
+    let body = Blob::new(at(66.0, -32.0), [27.0, 23.0, 53.0].map(|r| r * size + CAPSULE_MM))
         .turned(1, -side * 0.1)
         .turned(2, side * 0.2);
     let sinus = Blob::new(at(55.0, -26.0), [15.0, 9.0, 26.0]);
     vec![
-        Part::new([Solid::Blob(body)], [grainy(0.0, 36.0, 6.0)]).wobbly(2.0),
+        Part::new([Solid::Blob(body)], [grainy(0.0, -100.0, 10.0), grainy(CAPSULE_MM, 36.0, 6.0)])
+            .wobbly(2.0)
+            .in_cavity(0.0),
         Part::new([Solid::Blob(sinus)], [grainy(0.0, -70.0, 50.0)]).wobbly(4.0),
     ]
 }
 
 /// The psoas muscles, from the lumbar spine to the groin.
-fn psoas(person: &Habitus) -> Vec<Part> {
+fn psoas(person: &Habitus) -> Part {
     let sides = [-1.0, 1.0].map(|side| {
         tube(&[
             [side * 26.0, person.spine(10.0) - 2.0, 10.0, 8.0],
@@ -94,11 +102,11 @@ fn psoas(person: &Habitus) -> Vec<Part> {
             [side * 96.0, 20.0, -310.0, 15.0],
         ])
     });
-    vec![Part::new(sides.into_iter().flatten(), [grainy(0.0, 54.0, 12.0)]).wobbly(2.0)]
+    Part::new(sides.into_iter().flatten(), [grainy(0.0, 54.0, 12.0)]).wobbly(2.0)
 }
 
 /// Abdominal aorta and vena cava with their forks.
-fn vessels(person: &Habitus) -> Vec<Part> {
+fn vessels(person: &Habitus) -> Part {
     let before_spine = |x: f32, gap: f32, z: f32, r: f32| [x, person.spine(z) + gap, z, r];
     let mut solids = Vec::new();
     for (side, radius, top) in [(-1.0, 10.0, 80.0), (1.0, 12.0, 95.0)] {
@@ -120,5 +128,5 @@ fn vessels(person: &Habitus) -> Vec<Part> {
             ]));
         }
     }
-    vec![Part::new(solids, [layer(0.0, 43.0)])]
+    Part::new(solids, [layer(0.0, 43.0)])
 }
