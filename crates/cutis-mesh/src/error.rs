@@ -158,6 +158,29 @@ pub enum MeshError {
         /// The file.
         path: PathBuf,
     },
+    /// A point array of a mesh file does not fit the mesh.
+    #[error("{path}: the array `{array}` has {found} values; the mesh has {expected} points")]
+    PointData {
+        /// The file.
+        path: PathBuf,
+        /// Name of the array.
+        array: String,
+        /// Points of the mesh.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+    /// A name cannot stand in a mesh file.
+    #[error("{path}: `{name}` cannot name an array; use letters, digits, `_`, `-` and `.`")]
+    ArrayName {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        name: String,
+    },
+    /// A mesh file could not be created or put in its place.
+    #[error(transparent)]
+    File(#[from] cutis_volume::VolumeError),
     /// A mesh file could not be written.
     #[error("{path}: cannot be written: {source}")]
     Write {

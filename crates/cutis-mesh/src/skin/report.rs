@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::SkinMode;
-use super::exterior::{Exterior, Neighbors};
+use super::exterior::Exterior;
 use super::paper::Count;
 use crate::Lattice;
+use crate::neighbors::Neighbors;
 use crate::surface::Topology;
 
 /// Counts and quality of a detected skin.

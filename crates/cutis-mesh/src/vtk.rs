@@ -1,0 +1,277 @@
+//! VTU (tets or triangles) and VTP (triangles) files, for ParaView, PyVista and 3D Slicer.
+//!
+//! XML with appended raw little-endian data: `Float32` points in world mm, `UInt32` connectivity, `UInt64` block lengths. The frame the
+//! coordinates are in stands in the field data as `SPACE` (3D Slicer reads it).
+
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use cutis_volume::PartialFile;
+use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+
+use crate::{Frame, MeshError};
+
+/// World frame of the coordinates in a mesh file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Space {
+    /// Left, posterior, superior: 3D Slicer's and DICOM's. The first two coordinates are the negatives of RAS.
+    #[default]
+    Lps,
+    /// Right, anterior, superior: NIfTI's, and ours inside.
+    Ras,
+}
+
+/// Values at the points; one per position. The name carries the unit: `hu`, `displacement_mm`.
+#[derive(Clone, Copy, Debug)]
+pub struct PointData<'a> {
+    /// Letters, digits, `_`, `-` and `.`.
+    pub name: &'a str,
+    /// The values.
+    pub values: PointValues<'a>,
+}
+
+/// One value or vector per position.
+#[derive(Clone, Copy, Debug)]
+pub enum PointValues<'a> {
+    /// Numbers.
+    Scalars(&'a [f32]),
+    /// Vectors in RAS+ axes; turned into the space of the file.
+    Vectors(&'a [[f32; 3]]),
+}
+
+/// Cells over the positions.
+#[derive(Clone, Copy, Debug)]
+pub enum Cells<'a> {
+    /// Tetrahedra.
+    Tets(&'a [[u32; 4]]),
+    /// Triangles.
+    Triangles(&'a [[u32; 3]]),
+}
+
+/// What is written. Positions that no cell uses are left out, with their data.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<'a> {
+    /// Where the positions lie in the world.
+    pub frame: &'a Frame,
+    /// Local metres.
+    pub positions: &'a [Point3<f32>],
+    /// The cells.
+    pub cells: Cells<'a>,
+    /// Values at the positions.
+    pub data: &'a [PointData<'a>],
+}
+
+/// Writes an unstructured grid (`.vtu`) of tets or triangles.
+///
+/// The file appears under its name once it is complete.
+///
+/// ```
+/// use cutis_mesh::{Frame, vtk};
+/// use nalgebra::Point3;
+/// let folder = tempfile::tempdir()?;
+/// let piece = vtk::Piece {
+///     frame: &Frame { origin_mm: Point3::origin() },
+///     positions: &[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]].map(Point3::from),
+///     cells: vtk::Cells::Triangles(&[[0, 1, 2]]),
+///     data: &[vtk::PointData { name: "hu", values: vtk::PointValues::Scalars(&[40.0, 50.0, 60.0]) }],
+/// };
+/// vtk::write_vtu(&folder.path().join("skin.vtu"), vtk::Space::Lps, &piece)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`MeshError::VertexIndex`], [`MeshError::PointData`] or [`MeshError::ArrayName`] for a piece that does not fit together,
+/// [`MeshError::TooManyCells`] beyond 32-bit offsets, [`MeshError::File`] or [`MeshError::Write`] for what the file system says.
+pub fn write_vtu(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), MeshError> {
+    File::new(path, space, piece, Kind::UnstructuredGrid)?.write()
+}
+
+/// Writes a surface (`.vtp`) of triangles.
+///
+/// # Errors
+/// As [`write_vtu`], and [`MeshError::NotASurface`] for tets.
+pub fn write_vtp(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), MeshError> {
+    if let Cells::Tets(_) = piece.cells {
+        return Err(MeshError::NotASurface { path: path.to_path_buf() });
+    }
+    File::new(path, space, piece, Kind::PolyData)?.write()
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    UnstructuredGrid,
+    PolyData,
+}
+
+/// A checked piece, its points numbered.
+struct File<'a> {
+    path: &'a Path,
+    space: Space,
+    piece: &'a Piece<'a>,
+    kind: Kind,
+    connectivity: &'a [u32],
+    corners: usize,
+    /// Positions that are written, ascending.
+    used: Vec<u32>,
+}
+
+impl<'a> File<'a> {
+    fn new(path: &'a Path, space: Space, piece: &'a Piece<'a>, kind: Kind) -> Result<Self, MeshError> {
+        let (connectivity, corners) = match piece.cells {
+            Cells::Tets(tets) => (bytemuck::cast_slice(tets), 4),
+            Cells::Triangles(triangles) => (bytemuck::cast_slice(triangles), 3),
+        };
+        let points = piece.positions.len();
+        for data in piece.data {
+            let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+            if data.name.is_empty() || !data.name.chars().all(plain) {
+                return Err(MeshError::ArrayName { path: path.to_path_buf(), name: data.name.to_owned() });
+            }
+            let found = match data.values {
+                PointValues::Scalars(values) => values.len(),
+                PointValues::Vectors(vectors) => vectors.len(),
+            };
+            if found != points {
+                let array = data.name.to_owned();
+                return Err(MeshError::PointData {
+                    path: path.to_path_buf(),
+                    array,
+                    expected: points,
+                    found,
+                });
+            }
+        }
+        if connectivity.len() > u32::MAX as usize {
+            let cells = connectivity.len() / corners;
+            return Err(MeshError::TooManyCells { path: path.to_path_buf(), cells });
+        }
+        let mut is_used = vec![false; points];
+        for (position, &vertex) in connectivity.iter().enumerate() {
+            match is_used.get_mut(vertex as usize) {
+                Some(used) => *used = true,
+                None => {
+                    let position = position / corners;
+                    return Err(MeshError::VertexIndex {
+                        array: "cells",
+                        position,
+                        vertex,
+                        vertices: points,
+                    });
+                }
+            }
+        }
+        let used = (0..points as u32).filter(|&point| is_used[point as usize]).collect();
+        Ok(Self { path, space, piece, kind, connectivity, corners, used })
+    }
+
+    fn write(&self) -> Result<(), MeshError> {
+        let mut file = PartialFile::create(self.path)?;
+        let failed = |source| MeshError::Write { path: self.path.to_path_buf(), source };
+        let mut out = BufWriter::with_capacity(1 << 16, &mut file);
+        self.header(&mut out)
+            .and_then(|()| self.blocks(&mut out))
+            .and_then(|()| out.flush())
+            .map_err(failed)?;
+        drop(out);
+        Ok(file.commit()?)
+    }
+
+    fn header(&self, out: &mut impl Write) -> io::Result<()> {
+        let (points, cells) = (self.used.len(), self.connectivity.len() / self.corners);
+        let (kind, name) = match self.kind {
+            Kind::UnstructuredGrid => ("UnstructuredGrid", "Cells"),
+            Kind::PolyData => ("PolyData", "Polys"),
+        };
+        let space = match self.space {
+            Space::Lps => "LPS",
+            Space::Ras => "RAS",
+        };
+        let codes: Vec<String> = space.bytes().chain([0]).map(|byte| byte.to_string()).collect();
+        let mut offset = 0usize;
+        let mut array = |kind: &str, name: &str, components: usize, count: usize, size: usize| {
+            let tag = format!(
+                r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="appended" offset="{offset}"/>"#
+            );
+            offset += 8 + count * components * size;
+            tag
+        };
+        writeln!(out, r#"<?xml version="1.0"?>"#)?;
+        writeln!(
+            out,
+            r#"<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
+        )?;
+        writeln!(out, "<{kind}>\n<FieldData>")?;
+        writeln!(
+            out,
+            r#"<Array type="String" Name="SPACE" NumberOfTuples="1" format="ascii">{}</Array>"#,
+            codes.join(" ")
+        )?;
+        writeln!(out, "</FieldData>")?;
+        match self.kind {
+            Kind::UnstructuredGrid => {
+                writeln!(out, r#"<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">"#)?;
+            }
+            Kind::PolyData => writeln!(
+                out,
+                r#"<Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{cells}">"#
+            )?,
+        }
+        writeln!(out, "<PointData>")?;
+        for data in self.piece.data {
+            let components = if matches!(data.values, PointValues::Scalars(_)) { 1 } else { 3 };
+            writeln!(out, "{}", array("Float32", data.name, components, points, 4))?;
+        }
+        writeln!(out, "</PointData>\n<Points>\n{}\n</Points>", array("Float32", "Points", 3, points, 4))?;
+        writeln!(out, "<{name}>\n{}", array("UInt32", "connectivity", 1, self.connectivity.len(), 4))?;
+        writeln!(out, "{}", array("UInt32", "offsets", 1, cells, 4))?;
+        if self.kind == Kind::UnstructuredGrid {
+            writeln!(out, "{}", array("UInt8", "types", 1, cells, 1))?;
+        }
+        write!(out, "</{name}>\n</Piece>\n</{kind}>\n<AppendedData encoding=\"raw\">\n_")
+    }
+
+    /// The arrays, in the order of the header, each behind its length in bytes.
+    fn blocks(&self, out: &mut impl Write) -> io::Result<()> {
+        let (points, cells) = (self.used.len(), self.connectivity.len() / self.corners);
+        let length = |out: &mut dyn Write, bytes: usize| out.write_all(&(bytes as u64).to_le_bytes());
+        let vector = |out: &mut dyn Write, v: [f32; 3]| {
+            let [x, y, z] = if self.space == Space::Lps { [-v[0], -v[1], v[2]] } else { v };
+            [x, y, z].iter().try_for_each(|c| out.write_all(&c.to_le_bytes()))
+        };
+        let used = || self.used.iter().map(|&point| point as usize);
+        for data in self.piece.data {
+            match data.values {
+                PointValues::Scalars(values) => {
+                    length(out, 4 * points)?;
+                    used().try_for_each(|point| out.write_all(&values[point].to_le_bytes()))?;
+                }
+                PointValues::Vectors(vectors) => {
+                    length(out, 12 * points)?;
+                    used().try_for_each(|point| vector(out, vectors[point]))?;
+                }
+            }
+        }
+        length(out, 12 * points)?;
+        used().try_for_each(|point| {
+            let mm = self.piece.frame.to_mm(self.piece.positions[point]);
+            vector(out, [mm.x as f32, mm.y as f32, mm.z as f32])
+        })?;
+        let mut number = vec![0u32; self.piece.positions.len()];
+        self.used.iter().enumerate().for_each(|(n, &point)| number[point as usize] = n as u32);
+        length(out, 4 * self.connectivity.len())?;
+        self.connectivity
+            .iter()
+            .try_for_each(|&point| out.write_all(&number[point as usize].to_le_bytes()))?;
+        length(out, 4 * cells)?;
+        (1..=cells).try_for_each(|cell| out.write_all(&((cell * self.corners) as u32).to_le_bytes()))?;
+        if self.kind == Kind::UnstructuredGrid {
+            // VTK_TRIANGLE is 5, VTK_TETRA is 10.
+            let code = if self.corners == 3 { 5 } else { 10 };
+            length(out, cells)?;
+            (0..cells).try_for_each(|_| out.write_all(&[code]))?;
+        }
+        out.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+    }
+}
