@@ -1,0 +1,59 @@
+//! The largest HU in every block of cells, to skip empty space.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::field::Field;
+
+/// Cells per block and axis.
+const SIDE: usize = 8;
+
+/// Which blocks of 8 × 8 × 8 cells may hold a value at or above a threshold.
+pub struct Blocks {
+    shape: [usize; 3],
+    full: Vec<bool>,
+}
+
+impl Blocks {
+    /// Looks at all voxels once, in parallel.
+    pub fn new(field: &Field<'_>, threshold_hu: f32) -> Self {
+        let voxels = field.shape();
+        let shape = voxels.map(|n| n.saturating_sub(1).div_ceil(SIDE).max(1));
+        let mut full = vec![false; shape.iter().product()];
+        full.par_chunks_mut(shape[0] * shape[1]).enumerate().for_each(|(block_k, full)| {
+            // A block needs the voxels at its far faces too, so those belong to two blocks.
+            let span = |block: usize, axis: usize| block * SIDE..(block * SIDE + SIDE + 1).min(voxels[axis]);
+            for k in span(block_k, 2) {
+                for block_j in 0..shape[1] {
+                    for j in span(block_j, 1) {
+                        let row = voxels[0] * (j + voxels[1] * k);
+                        for block_i in 0..shape[0] {
+                            let flag = &mut full[block_i + shape[0] * block_j];
+                            *flag = *flag || span(block_i, 0).any(|i| field.voxel(row + i) >= threshold_hu);
+                        }
+                    }
+                }
+            }
+        });
+        Self { shape, full }
+    }
+
+    /// How far, in units of `step`, a ray at `position` (within the grid) may go before it enters a block that is not empty
+    /// or another block; `None` if the block at `position` is not empty.
+    #[inline]
+    pub fn skip(&self, position: Point3<f64>, step: &Vector3<f64>) -> Option<f64> {
+        let mut flat = 0;
+        let mut stride = 1;
+        let mut exit = f64::INFINITY;
+        for axis in 0..3 {
+            let block = ((position[axis].max(0.0) as usize) / SIDE).min(self.shape[axis] - 1);
+            flat += block * stride;
+            stride *= self.shape[axis];
+            if step[axis] != 0.0 {
+                let wall = if step[axis] > 0.0 { (block + 1) * SIDE } else { block * SIDE };
+                exit = exit.min((wall as f64 - position[axis]) / step[axis]);
+            }
+        }
+        (!self.full[flat]).then_some(exit.max(0.0))
+    }
+}

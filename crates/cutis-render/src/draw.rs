@@ -1,0 +1,75 @@
+//! Text, boxes and lines on an [`Image`].
+
+use crate::font;
+use crate::image::{Image, Rgb};
+
+/// Width of a text in pixels.
+pub fn text_width(text: &str, scale: usize) -> usize {
+    (text.chars().count() * font::ADVANCE).saturating_sub(1) * scale
+}
+
+impl Image {
+    /// Draws a text with its top left corner at `(x, y)`, `scale` pixels to one of the font, with a dark rim around it.
+    pub(crate) fn text(&mut self, x: usize, y: usize, text: &str, scale: usize, color: Rgb) {
+        let rim = scale.div_ceil(2);
+        for (grow, color, opacity) in [(rim, [0, 0, 0], 0.6), (0, color, 1.0)] {
+            for (number, character) in text.chars().enumerate() {
+                let glyph = font::glyph(character);
+                let left = x + number * font::ADVANCE * scale;
+                for (row, bits) in glyph.iter().enumerate() {
+                    for column in
+                        (0..font::WIDTH).filter(|column| bits >> (font::WIDTH - 1 - column) & 1 == 1)
+                    {
+                        let (dot_x, dot_y) = (left + column * scale, y + row * scale);
+                        let (from_x, from_y) = (dot_x.saturating_sub(grow), dot_y.saturating_sub(grow));
+                        let (to_x, to_y) = (dot_x + scale + grow, dot_y + scale + grow);
+                        self.fill(from_x..to_x, from_y..to_y, color, opacity);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Fills a box of pixels.
+    pub(crate) fn fill(
+        &mut self,
+        columns: std::ops::Range<usize>,
+        rows: std::ops::Range<usize>,
+        color: Rgb,
+        opacity: f32,
+    ) {
+        for y in rows.start..rows.end.min(self.height) {
+            for x in columns.start..columns.end.min(self.width) {
+                self.blend(x, y, color, opacity);
+            }
+        }
+    }
+
+    /// Draws a smooth line between two points in pixels; the centre of the first pixel is at (0, 0).
+    pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], thickness: f64, color: Rgb) {
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let squared = along[0] * along[0] + along[1] * along[1];
+        if !squared.is_finite() {
+            return;
+        }
+        let reach = thickness / 2.0 + 1.0;
+        let span = |axis: usize, length: usize| {
+            let low = (from[axis].min(to[axis]) - reach).ceil().clamp(0.0, length as f64);
+            let high = (from[axis].max(to[axis]) + reach).floor().clamp(-1.0, length as f64 - 1.0);
+            low as usize..(high + 1.0) as usize
+        };
+        for y in span(1, self.height) {
+            for x in span(0, self.width) {
+                let to_point = [x as f64 - from[0], y as f64 - from[1]];
+                let part = if squared > 0.0 {
+                    ((to_point[0] * along[0] + to_point[1] * along[1]) / squared).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+                let distance = (to_point[0] - part * along[0]).hypot(to_point[1] - part * along[1]);
+                let cover = (thickness / 2.0 + 0.5 - distance).clamp(0.0, 1.0);
+                self.blend(x, y, color, cover as f32);
+            }
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Hounsfield units of a volume at any position, by trilinear interpolation.
+
+use cutis_volume::{AIR_HU, Volume};
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::RenderError;
+
+/// A volume as a continuous field. Padding below air counts as air.
+pub struct Field<'a> {
+    volume: &'a Volume,
+    voxels: &'a [i16],
+    shape: [usize; 3],
+    slope: f32,
+    intercept: f32,
+    floor_hu: f32,
+}
+
+impl<'a> Field<'a> {
+    /// # Errors
+    /// [`RenderError::EmptyVolume`].
+    pub fn new(volume: &'a Volume) -> Result<Self, RenderError> {
+        let shape = volume.grid().shape;
+        if volume.grid().is_empty() {
+            return Err(RenderError::EmptyVolume { shape });
+        }
+        let (slope, intercept) = (volume.slope(), volume.intercept());
+        Ok(Self { volume, voxels: volume.voxels(), shape, slope, intercept, floor_hu: AIR_HU })
+    }
+
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
+
+    /// HU of one voxel, padding as air.
+    #[inline]
+    pub fn voxel(&self, index: usize) -> f32 {
+        (self.slope * f32::from(self.voxels[index]) + self.intercept).max(self.floor_hu)
+    }
+
+    /// HU at a continuous index, clamped to the grid.
+    #[inline]
+    pub fn at(&self, position: Point3<f64>) -> f32 {
+        let (mut base, mut stride) = (0, 1);
+        let mut step = [0; 3];
+        let mut fraction = [0.0; 3];
+        for axis in 0..3 {
+            let last = self.shape[axis] - 1;
+            let clamped = position[axis].max(0.0).min(last as f64);
+            let low = clamped as usize;
+            fraction[axis] = (clamped - low as f64) as f32;
+            step[axis] = if low < last { stride } else { 0 };
+            base += low * stride;
+            stride *= self.shape[axis];
+        }
+        let [sx, sy, sz] = step;
+        let [fx, fy, fz] = fraction;
+        let mix = |a: f32, b: f32, part: f32| a + part * (b - a);
+        let along_x = |at: usize| mix(self.voxel(at), self.voxel(at + sx), fx);
+        let along_y = |at: usize| mix(along_x(at), along_x(at + sy), fy);
+        mix(along_y(base), along_y(base + sz), fz)
+    }
+
+    /// HU at a world position, mm.
+    pub fn at_mm(&self, mm: Point3<f64>) -> f32 {
+        self.at(self.volume.grid().affine.to_index(mm))
+    }
+
+    /// ∂HU/∂index by central differences over one voxel to either side.
+    pub fn index_gradient(&self, position: Point3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|axis, _| {
+            let mut step = Vector3::zeros();
+            step[axis] = 1.0;
+            f64::from(self.at(position + step) - self.at(position - step)) / 2.0
+        })
+    }
+
+    /// Index per mm: the linear part of world → index.
+    pub fn index_per_mm(&self) -> Matrix3<f64> {
+        let affine = &self.volume.grid().affine;
+        let zero = affine.to_index(Point3::origin());
+        // A power of two, so that the division is exact.
+        let reach = 1024.0;
+        let column = |axis: usize| {
+            let mut end = Point3::origin();
+            end[axis] = reach;
+            (affine.to_index(end) - zero) / reach
+        };
+        Matrix3::from_columns(&[column(0), column(1), column(2)])
+    }
+
+    /// Smallest distance between two voxels along an index axis, mm.
+    pub fn finest_mm(&self) -> f64 {
+        self.volume.grid().affine.spacing_mm().into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Corners of the box of voxels, outer faces included, world mm.
+    pub fn corners_mm(&self) -> [Point3<f64>; 8] {
+        std::array::from_fn(|corner| {
+            let index =
+                |axis: usize| if corner >> axis & 1 == 1 { self.shape[axis] as f64 - 0.5 } else { -0.5 };
+            self.volume.grid().affine.to_mm(Point3::new(index(0), index(1), index(2)))
+        })
+    }
+
+    /// World mm → continuous index.
+    pub fn to_index(&self, mm: Point3<f64>) -> Point3<f64> {
+        self.volume.grid().affine.to_index(mm)
+    }
+
+    /// Continuous index → world mm.
+    pub fn to_mm(&self, index: Point3<f64>) -> Point3<f64> {
+        self.volume.grid().affine.to_mm(index)
+    }
+}

@@ -1,0 +1,92 @@
+//! An RGB picture and its PNG file.
+
+use std::io::Write;
+use std::path::Path;
+
+use cutis_volume::PartialFile;
+
+use crate::RenderError;
+
+/// A colour: red, green, blue.
+pub type Rgb = [u8; 3];
+
+/// An RGB picture, 8 bits per channel, row by row from the top left.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels along a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `3 · width · height` bytes.
+    pub rgb: Vec<u8>,
+}
+
+impl Image {
+    /// The largest number of pixels: 2²⁷, three times as many bytes.
+    pub const MAX_PIXELS: usize = 1 << 27;
+
+    /// A picture of one colour.
+    ///
+    /// # Errors
+    /// [`RenderError::ImageSize`] for no pixels or more than [`Image::MAX_PIXELS`]; nothing is allocated then.
+    pub fn new(width: usize, height: usize, color: Rgb) -> Result<Self, RenderError> {
+        let limit = Self::MAX_PIXELS;
+        match width.checked_mul(height) {
+            Some(pixels) if (1..=limit).contains(&pixels) => {
+                Ok(Self { width, height, rgb: color.repeat(pixels) })
+            }
+            _ => Err(RenderError::ImageSize { width, height, limit }),
+        }
+    }
+
+    /// The colour of a pixel, column `x` of row `y`; `None` outside the picture.
+    pub fn pixel(&self, x: usize, y: usize) -> Option<Rgb> {
+        let at = self.offset(x, y)?;
+        Some([self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]])
+    }
+
+    /// Mixes a colour into a pixel: 0 leaves it, 1 replaces it. Outside the picture nothing happens.
+    pub fn blend(&mut self, x: usize, y: usize, color: Rgb, opacity: f32) {
+        if let Some(at) = self.offset(x, y) {
+            for (channel, new) in self.rgb[at..at + 3].iter_mut().zip(color) {
+                let old = f32::from(*channel);
+                *channel = (old + (f32::from(new) - old) * opacity.clamp(0.0, 1.0)).round() as u8;
+            }
+        }
+    }
+
+    fn offset(&self, x: usize, y: usize) -> Option<usize> {
+        (x < self.width && y < self.height).then(|| 3 * (y * self.width + x))
+    }
+
+    /// Writes an 8-bit RGB PNG, beside the target and renamed, so that no half-written picture is ever there.
+    ///
+    /// # Errors
+    /// [`RenderError::Write`] or [`RenderError::Volume`] with the path: no such folder, no space, not writable.
+    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<(), RenderError> {
+        let path = path.as_ref();
+        let mut file = PartialFile::create(path)?;
+        let written = self.encode().and_then(|bytes| file.write_all(&bytes));
+        written.map_err(|source| RenderError::Write { path: path.to_path_buf(), source })?;
+        Ok(file.commit()?)
+    }
+
+    /// The bytes of [`Image::write_png`]'s file, to embed them elsewhere.
+    ///
+    /// # Errors
+    /// [`RenderError::ImageSize`] if the fields, which are public, do not fit together.
+    pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
+        let (width, height) = (self.width, self.height);
+        self.encode().map_err(|_| RenderError::ImageSize { width, height, limit: Self::MAX_PIXELS })
+    }
+
+    fn encode(&self) -> std::io::Result<Vec<u8>> {
+        let side = |length: usize| u32::try_from(length).map_err(std::io::Error::other);
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, side(self.width)?, side(self.height)?);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.write_header()?.write_image_data(&self.rgb)?;
+        Ok(bytes)
+    }
+}

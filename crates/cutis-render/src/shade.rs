@@ -1,0 +1,163 @@
+//! Colour of a surface point: skin, or tissue by HU where it was deep, with light and ambient occlusion.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::field::Field;
+use crate::raymarch::Hit;
+use crate::{Axes, RenderError, Rgb, View};
+
+/// Behind the body.
+pub const BACKGROUND: Rgb = [24, 26, 32];
+const SKIN: Rgb = [232, 186, 160];
+/// Where little light comes, skin and tissue turn to this.
+const CLEFT: Rgb = [96, 22, 18];
+/// Tissue of a wound by HU: fat, connective tissue, muscle, bone.
+const TISSUE: [(f32, Rgb); 6] = [
+    (-180.0, [246, 214, 128]),
+    (-70.0, [240, 190, 110]),
+    (-20.0, [214, 92, 74]),
+    (60.0, [168, 38, 34]),
+    (160.0, [190, 90, 74]),
+    (400.0, [238, 228, 206]),
+];
+/// Directions in which ambient light is looked for, spread over a sphere.
+const DIRECTIONS: usize = 24;
+/// Parts of the occlusion's reach at which tissue is looked for.
+const REACHES: [f64; 4] = [0.12, 0.3, 0.6, 1.0];
+
+/// Linear light, 0 to 1.
+type Light = Vector3<f32>;
+
+/// Colours the surface of one field under one view.
+pub struct Shader<'a> {
+    field: &'a Field<'a>,
+    depth: Option<(Field<'a>, f64)>,
+    threshold_hu: f32,
+    skin_mm: f64,
+    occlusion_mm: f64,
+    directions: [Vector3<f64>; DIRECTIONS],
+    index_per_mm: Matrix3<f64>,
+    finest_mm: f64,
+    toward: Vector3<f64>,
+    light: Vector3<f64>,
+}
+
+impl<'a> Shader<'a> {
+    pub fn new(field: &'a Field<'a>, view: &View<'a>, axes: &Axes) -> Result<Self, RenderError> {
+        let depth = view.depth.map(Field::new).transpose()?.map(|depth| {
+            let spacing = depth.finest_mm();
+            (depth, spacing)
+        });
+        // Fibonacci points: equal areas, no two on one meridian.
+        let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+        let directions = std::array::from_fn(|n| {
+            let z = 1.0 - (2 * n + 1) as f64 / DIRECTIONS as f64;
+            let (sin, cos) = (golden * n as f64).sin_cos();
+            let radius = (1.0 - z * z).sqrt();
+            Vector3::new(radius * cos, radius * sin, z)
+        });
+        Ok(Self {
+            field,
+            depth,
+            threshold_hu: view.threshold_hu,
+            skin_mm: view.skin_mm,
+            occlusion_mm: view.occlusion_mm,
+            directions,
+            index_per_mm: field.index_per_mm(),
+            finest_mm: field.finest_mm(),
+            toward: axes.toward,
+            light: (axes.toward * 0.75 + axes.up * 0.55 - axes.right * 0.4).normalize(),
+        })
+    }
+
+    pub fn background(&self) -> Light {
+        decode(BACKGROUND)
+    }
+
+    pub fn color(&self, hit: &Hit) -> Light {
+        if hit.on_cut {
+            let grey = (self.field.at(hit.index) + 160.0) / 400.0;
+            return Light::repeat(grey.clamp(0.0, 1.0).powi(2)) * 0.8;
+        }
+        let normal = self.normal(hit.index);
+        let base = self.albedo(hit.index, &normal);
+        let open = self.openness(hit.index, &normal);
+        let cleft = decode(CLEFT) * base.max();
+        let surface = base * open + cleft * ((1.0 - open) * 0.35);
+        let diffuse = normal.dot(&self.light).max(0.0) as f32;
+        let facing = normal.dot(&self.toward).max(0.0) as f32;
+        let half = (self.light + self.toward).normalize();
+        let gloss = (normal.dot(&half).max(0.0) as f32).powi(24) * 0.06 * open;
+        surface * (0.16 + 0.64 * diffuse * (0.25 + 0.75 * open) + 0.24 * facing) + Light::repeat(gloss)
+    }
+
+    /// Outward unit normal in world space.
+    fn normal(&self, index: Point3<f64>) -> Vector3<f64> {
+        let gradient = -(self.index_per_mm.transpose() * self.field.index_gradient(index));
+        gradient.try_normalize(0.0).unwrap_or(self.toward)
+    }
+
+    /// Skin, or tissue by its HU where the surface was deep at rest.
+    fn albedo(&self, index: Point3<f64>, normal: &Vector3<f64>) -> Light {
+        let skin = decode(SKIN);
+        let Some((depth, spacing)) = &self.depth else { return skin };
+        let surface = self.field.to_mm(index);
+        let below = f64::from(depth.at_mm(surface - normal * *spacing)) - spacing;
+        let exposed = smooth_step((below / self.skin_mm - 1.0) as f32);
+        if exposed == 0.0 {
+            return skin;
+        }
+        let inward = self.index_per_mm * normal * -self.finest_mm;
+        let hu = (1..=2).map(|n| self.field.at(index + inward * n as f64)).sum::<f32>() / 2.0;
+        skin.lerp(&tissue(hu), exposed)
+    }
+
+    /// Share of the ambient light that reaches the point: 1 on a convex body, less in a cleft.
+    fn openness(&self, index: Point3<f64>, normal: &Vector3<f64>) -> f32 {
+        if self.occlusion_mm == 0.0 {
+            return 1.0;
+        }
+        let start = index + self.index_per_mm * normal * self.finest_mm;
+        let (mut lit, mut all) = (0.0, 0.0);
+        for direction in &self.directions {
+            let cosine = direction.dot(normal);
+            if cosine <= 0.0 {
+                continue;
+            }
+            all += cosine;
+            let far = self.index_per_mm * direction * self.occlusion_mm;
+            let free = REACHES
+                .iter()
+                .take_while(|&&part| self.field.at(start + far * part) < self.threshold_hu)
+                .count();
+            lit += cosine * free as f64 / REACHES.len() as f64;
+        }
+        if all > 0.0 { (lit / all) as f32 } else { 1.0 }
+    }
+}
+
+/// Colour of tissue by HU.
+fn tissue(hu: f32) -> Light {
+    let after = TISSUE.partition_point(|(at, _)| *at < hu);
+    match (TISSUE.get(after.wrapping_sub(1)), TISSUE.get(after)) {
+        (Some((low, a)), Some((high, b))) => decode(*a).lerp(&decode(*b), (hu - low) / (high - low)),
+        (Some((_, only)), None) | (None, Some((_, only))) => decode(*only),
+        (None, None) => Light::zeros(),
+    }
+}
+
+/// 0 up to 0, 1 from 1, smooth between.
+fn smooth_step(x: f32) -> f32 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
+/// Stored colour → linear light, with a gamma of 2.
+fn decode(color: Rgb) -> Light {
+    Light::from(color.map(|c| (f32::from(c) / 255.0).powi(2)))
+}
+
+/// Linear light → stored colour.
+pub fn encode(light: Light) -> Rgb {
+    light.map(|c| (c.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8).into()
+}

@@ -1,0 +1,153 @@
+//! Axial, coronal and sagittal slices in the patient's own planes.
+
+use cutis_volume::Volume;
+use nalgebra::Point3;
+use rayon::prelude::*;
+
+use crate::annotate::{annotate, extent, frame};
+use crate::contour::Contour;
+use crate::field::Field;
+use crate::view::Focus;
+use crate::{Axes, Image, RenderError, Side};
+
+/// A plane of the patient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plane {
+    /// Across the body; position is mm towards superior.
+    Axial,
+    /// Parallel to the chest; position is mm towards anterior.
+    Coronal,
+    /// From front to back; position is mm towards the right.
+    Sagittal,
+}
+
+/// A slice and how to show it.
+#[derive(Clone, Copy, Debug)]
+pub struct SliceView<'a> {
+    /// Which plane.
+    pub plane: Plane,
+    /// Where it cuts, world mm along the plane's normal.
+    pub at_mm: f64,
+    /// Patient's right on the left of the picture (default); mirrored if false.
+    pub radiological: bool,
+    /// Width of the grey scale, HU. Default 400.
+    pub window_hu: f32,
+    /// Its centre, HU. Default 40.
+    pub level_hu: f32,
+    /// Pixels along the longer side; `None`: a pixel is as large as the finest voxel spacing.
+    pub long_side: Option<usize>,
+    /// Part to look at; the whole slice if `None`.
+    pub focus: Option<Focus>,
+    /// Surfaces whose cut is drawn as lines.
+    pub contours: &'a [Contour<'a>],
+    /// Orientation letters and a scale bar.
+    pub annotate: bool,
+}
+
+impl SliceView<'_> {
+    /// The whole slice, one pixel per voxel, window 400, level 40, radiological.
+    pub fn new(plane: Plane, at_mm: f64) -> Self {
+        Self {
+            plane,
+            at_mm,
+            radiological: true,
+            window_hu: 400.0,
+            level_hu: 40.0,
+            long_side: None,
+            focus: None,
+            contours: &[],
+            annotate: true,
+        }
+    }
+
+    fn axes(&self) -> Result<Axes, RenderError> {
+        Axes::new(match (self.plane, self.radiological) {
+            (Plane::Axial, true) => Side::Inferior,
+            (Plane::Axial, false) => Side::Superior,
+            (Plane::Coronal, true) => Side::Anterior,
+            (Plane::Coronal, false) => Side::Posterior,
+            (Plane::Sagittal, true) => Side::Left,
+            (Plane::Sagittal, false) => Side::Right,
+        })
+    }
+
+    fn validate(&self) -> Result<(), RenderError> {
+        let bad = |key, value, expected| Err(RenderError::Setting { key, value, expected });
+        if !self.at_mm.is_finite() {
+            return bad("at_mm", self.at_mm, "finite");
+        }
+        if !(self.window_hu.is_finite() && self.window_hu > 0.0) {
+            return bad("window_hu", self.window_hu.into(), "a width above zero");
+        }
+        if !self.level_hu.is_finite() {
+            return bad("level_hu", self.level_hu.into(), "finite");
+        }
+        if let Some(focus) = &self.focus {
+            focus.validate()?;
+        }
+        self.contours.iter().enumerate().try_for_each(|(number, contour)| contour.validate(number))
+    }
+
+    /// Grey of a HU value: black at `level − window/2` and below, white at `level + window/2` and above, linear between
+    /// (DICOM PS3.3 C.11.2.1.3.2, LINEAR_EXACT).
+    pub fn grey(&self, hu: f32) -> u8 {
+        let part = (hu - (self.level_hu - self.window_hu / 2.0)) / self.window_hu;
+        (part.clamp(0.0, 1.0) * 255.0).round() as u8
+    }
+}
+
+/// The picture of a slice, resampled to the patient's plane, so that an oblique volume is shown upright and voxels that are
+/// not cubes keep their aspect. Outside the volume it is black.
+///
+/// # Errors
+/// [`RenderError::ImageSize`], [`RenderError::Setting`] with the key, [`RenderError::VertexOutOfRange`],
+/// [`RenderError::EmptyVolume`].
+pub fn slice(volume: &Volume, view: &SliceView<'_>) -> Result<Image, RenderError> {
+    view.validate()?;
+    let field = Field::new(volume)?;
+    let axes = view.axes()?;
+    let corners = field.corners_mm();
+    let [width_mm, height_mm] = match view.focus {
+        Some(focus) => [focus.size_mm; 2],
+        None => [axes.right, axes.up].map(|axis| extent(&corners, &axis)),
+    };
+    let pixel = view.long_side.map_or(field.finest_mm(), |long| width_mm.max(height_mm) / long as f64);
+    let [width, height] = [width_mm, height_mm].map(|length| (length / pixel).round().max(1.0) as usize);
+    let mut image = Image::new(width, height, [0; 3])?;
+    let (mut centre, _) = frame(&axes, &corners, view.focus, [width, height]);
+    let axis = match view.plane {
+        Plane::Axial => 2,
+        Plane::Coronal => 1,
+        Plane::Sagittal => 0,
+    };
+    centre[axis] = view.at_mm;
+
+    let shape = field.shape();
+    image.rgb.par_chunks_mut(3 * width).enumerate().for_each(|(y, row)| {
+        let v = (height as f64 - 1.0) / 2.0 - y as f64;
+        for (x, out) in row.chunks_exact_mut(3).enumerate() {
+            let u = x as f64 - (width as f64 - 1.0) / 2.0;
+            let index = field.to_index(centre + (axes.right * u + axes.up * v) * pixel);
+            let inside = (0..3).all(|axis| index[axis] >= -0.5 && index[axis] <= shape[axis] as f64 - 0.5);
+            if inside {
+                out.fill(view.grey(field.at(index)));
+            }
+        }
+    });
+
+    let thickness = (width.max(height) as f64 / 400.0).max(1.0);
+    for contour in view.contours {
+        for segment in contour.cut(centre, &axes.toward) {
+            let [from, to] = segment.map(|p: Point3<f64>| {
+                let from_centre = (p - centre) / pixel;
+                let u = from_centre.dot(&axes.right) + (width as f64 - 1.0) / 2.0;
+                [u, (height as f64 - 1.0) / 2.0 - from_centre.dot(&axes.up)]
+            });
+            image.line(from, to, thickness, contour.color);
+        }
+    }
+    if view.annotate {
+        annotate(&mut image, &axes, pixel);
+    }
+    Ok(image)
+}
