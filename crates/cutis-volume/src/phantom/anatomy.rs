@@ -31,3 +31,30 @@ impl Anatomy {
         Self { person, parts, surroundings }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::VolumeError;
+    use crate::phantom::Phantom;
+
+    #[test]
+    fn nothing_sticks_out_of_the_skin() -> Result<(), VolumeError> {
+        for seed in 0..8 {
+            let phantom = Phantom::new([32, 32, 48], seed)?;
+            let volume = phantom.volume()?;
+            let mut met = 0;
+            for (index, &hu) in volume.voxels().iter().enumerate() {
+                let at = volume.grid().mm(volume.grid().point(index)).map(|c| c as f32);
+                let mut distance = [f32::INFINITY];
+                phantom.anatomy.person.skin.lower_row(&[at.x], at.y, at.z, &mut distance);
+                // Farther out than half the diagonal of a voxel, and above the edges of the table.
+                if distance[0] > 12.0 && at.y > -70.0 {
+                    met += 1;
+                    assert!(hu < -900, "seed {seed}: {hu} HU at {at}");
+                }
+            }
+            assert!(met > 5000, "only {met} voxels are outside");
+        }
+        Ok(())
+    }
+}

@@ -67,6 +67,12 @@ pub(super) struct Active<'a> {
     solids: Vec<&'a (Solid, Bounds)>,
 }
 
+impl Active<'_> {
+    fn meets_row(&self, y: f32, blend_mm: f32) -> bool {
+        self.solids.iter().any(|(_, bounds)| bounds.covers(1, y, self.part.wobble_mm + blend_mm))
+    }
+}
+
 /// The parts that meet the plane at height `z`, in painting order.
 pub(super) fn active(parts: &[Part], z: f32, blend_mm: f32) -> Vec<Active<'_>> {
     let meets = |part: &Part, bounds: &Bounds| bounds.covers(2, z, part.wobble_mm + blend_mm);
@@ -124,6 +130,9 @@ impl<'a> Row<'a> {
         background_hu: f32,
     ) -> &[f32] {
         self.hu.fill(background_hu);
+        if !actives.iter().any(|active| active.meets_row(y, self.blend_mm)) {
+            return &self.hu;
+        }
         self.cavity.fill(f32::INFINITY);
         around.cavity.lower_row(self.xs, y, z, &mut self.cavity);
         around.wobble.fill_row(self.xs, y, z, &mut self.columns, &mut self.wobble);
