@@ -2,6 +2,7 @@
 
 use cutis_constraints::Scalar;
 use cutis_solver::{Settings, Simulation, Solver, SolverError, System};
+use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::CpuError;
@@ -65,7 +66,20 @@ impl<T: Scalar> Solver<T> for SolverCpu<T> {
         }
     }
 
+    fn restore(
+        &mut self,
+        positions: &[Point3<T>],
+        velocities: &[Vector3<T>],
+        frame: u64,
+    ) -> Result<(), SolverError> {
+        self.simulation.restore(positions, velocities, frame)
+    }
+
     fn simulation(&self) -> &Simulation<T> {
         &self.simulation
+    }
+
+    fn simulation_mut(&mut self) -> &mut Simulation<T> {
+        &mut self.simulation
     }
 }

@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::batch::Batch;
 use crate::handle::Carried;
+use crate::system::check_finite;
 use crate::{Handle, SolverError, Stiffness, System, Vertex};
 
 /// Collects vertices, kinds of constraints and handles into a [`System`].
@@ -72,14 +73,7 @@ impl<T: Scalar> SystemBuilder<T> {
         if found != expected {
             return Err(SolverError::VertexLength { what: "velocities", found, expected });
         }
-        for (vertex, velocity) in velocities.iter().enumerate() {
-            for value in velocity.iter().map(|value| value.to_f64()) {
-                if !value.is_finite() {
-                    let (what, expected) = ("velocity", "a finite number");
-                    return Err(SolverError::Vertex { vertex, what, value, expected });
-                }
-            }
-        }
+        check_finite("velocity", velocities.iter())?;
         self.system.velocities.copy_from_slice(velocities);
         Ok(self)
     }

@@ -1,6 +1,7 @@
 //! The reference solver: one constraint after the other, safe scalar code, no thread.
 
 use cutis_constraints::Scalar;
+use nalgebra::{Point3, Vector3};
 
 use crate::{
     ConstraintSet, Execute, Settings, Simulation, Solver, SolverError, Step, Sweep, System, Vertex,
@@ -58,7 +59,20 @@ impl<T: Scalar> Solver<T> for SolverReference<T> {
         self.simulation.run(frames, &Serial)
     }
 
+    fn restore(
+        &mut self,
+        positions: &[Point3<T>],
+        velocities: &[Vector3<T>],
+        frame: u64,
+    ) -> Result<(), SolverError> {
+        self.simulation.restore(positions, velocities, frame)
+    }
+
     fn simulation(&self) -> &Simulation<T> {
         &self.simulation
+    }
+
+    fn simulation_mut(&mut self) -> &mut Simulation<T> {
+        &mut self.simulation
     }
 }

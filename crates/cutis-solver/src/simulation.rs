@@ -1,6 +1,8 @@
 //! The stepping loop, written once: what runs in which order is here, how a pass is spread over threads is not.
 
 use cutis_constraints::Scalar;
+use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use crate::passes::Integrator;
 use crate::{
@@ -99,6 +101,22 @@ impl<T: Scalar> Simulation<T> {
         self.multipliers.iter().map(|kind| size_of_val(kind.as_slice())).sum()
     }
 
+    /// Puts the body into a state that it was in after `frame` frames: positions in the caller's coordinates (m) and
+    /// velocities in m/s, one of each per vertex. Going on from there gives the same bits as never having stopped.
+    ///
+    /// # Errors
+    /// Lengths that differ from the number of vertices, a number that is not finite; nothing is changed then.
+    pub fn restore(
+        &mut self,
+        positions: &[Point3<T>],
+        velocities: &[Vector3<T>],
+        frame: u64,
+    ) -> Result<(), SolverError> {
+        self.system.restore(positions, velocities)?;
+        (self.frame, self.substep) = (frame, 0);
+        Ok(())
+    }
+
     /// Runs `frames` frames. Running them one by one gives the same bits. Nothing is allocated.
     ///
     /// # Errors
@@ -125,6 +143,24 @@ impl<T: Scalar> Simulation<T> {
         if motion == Motion::FinishAndPredict {
             self.move_vertices(Motion::Finish, execute);
         }
+        Ok(())
+    }
+
+    /// Goes on from a saved state: positions in the caller's coordinates, velocities, frames done so far.
+    ///
+    /// What [`System::positions`] and [`System::velocities`] gave after `frame` frames leads to the same bits as a run
+    /// without interruption, as long as [`System::origin`] is zero.
+    ///
+    /// # Errors
+    /// Wrong lengths or values that are not finite; the state is then unchanged.
+    pub fn restore(
+        &mut self,
+        positions: &[Point3<T>],
+        velocities: &[Vector3<T>],
+        frame: u64,
+    ) -> Result<(), SolverError> {
+        self.system.restore(positions, velocities)?;
+        (self.frame, self.substep) = (frame, 0);
         Ok(())
     }
 

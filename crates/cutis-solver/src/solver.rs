@@ -16,8 +16,22 @@ pub trait Solver<T: Scalar>: Send {
     /// [`SolverError::NotFinite`]: see [`Simulation::run`].
     fn step(&mut self, frames: usize) -> Result<(), SolverError>;
 
+    /// Goes on from a saved state: positions in the caller's coordinates (m), velocities (m/s), frames done so far.
+    ///
+    /// # Errors
+    /// Wrong lengths or values that are not finite: see [`Simulation::restore`].
+    fn restore(
+        &mut self,
+        positions: &[Point3<T>],
+        velocities: &[Vector3<T>],
+        frame: u64,
+    ) -> Result<(), SolverError>;
+
     /// The simulation in its present state.
     fn simulation(&self) -> &Simulation<T>;
+
+    /// The same, to be changed: see [`Simulation::restore`].
+    fn simulation_mut(&mut self) -> &mut Simulation<T>;
 
     /// The body in its present state.
     fn system(&self) -> &System<T> {
