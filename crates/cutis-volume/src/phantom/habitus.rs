@@ -2,10 +2,11 @@
 //!
 //! RAS+ millimetres: x to the right, y to the front, z to the head; the lowest rib arch is near z = 0.
 
+use super::outline::Outline;
 use super::part::{Layer, Part, grainy, layer};
 use super::profile::Profile;
 use super::random::Random;
-use super::solid::{Board, Outline, Solid};
+use super::solid::{Board, Solid};
 
 /// Height of the skin of the back, mm: flat, as the person lies on it.
 const BACK_MM: f32 = 100.0;

@@ -10,6 +10,7 @@ mod bowel;
 mod chest;
 mod habitus;
 mod organs;
+mod outline;
 mod part;
 mod profile;
 mod random;

@@ -1,7 +1,8 @@
 //! Tissue: solids joined into one body with layers of Hounsfield units, painted over what lies below along rows of voxels.
 
+use super::outline::Outline;
 use super::random::Field;
-use super::solid::{Bounds, Outline, Solid};
+use super::solid::{Bounds, Solid};
 
 /// Material from `inset_mm` below the surface inwards, until the next layer.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 //! Ellipsoids and outlines use the first-order distance `(q − 1)/|∇q|` of their gauge `q`, which is exact on the surface
 //! and close to the true distance near it; capsules and the board are exact.
 
-use super::profile::Profile;
+use super::outline::Outline;
 
 /// An axis-aligned box, mm.
 #[derive(Clone, Copy)]
@@ -64,7 +64,12 @@ pub(super) fn norm(a: [f32; 3]) -> f32 {
 ///
 /// `gradient` maps the derivative by `u` to that by mm; `inradius` keeps the centre, where both vanish, well defined.
 #[inline(always)]
-fn gauge_distance(u: [f32; 3], s: f32, inradius: f32, gradient: impl Fn([f32; 3]) -> [f32; 3]) -> f32 {
+pub(super) fn gauge_distance(
+    u: [f32; 3],
+    s: f32,
+    inradius: f32,
+    gradient: impl Fn([f32; 3]) -> [f32; 3],
+) -> f32 {
     const TINY: f32 = 1e-12;
     let squares = u.map(|c| c * c);
     let quartic = dot(squares, squares).sqrt();
@@ -168,60 +173,6 @@ impl Capsule {
     }
 }
 
-/// A closed curve around the long axis whose half width and depths to the front and back follow profiles along z.
-#[derive(Clone, Copy)]
-pub(super) struct Outline {
-    pub(super) side: Profile,
-    pub(super) front: Profile,
-    pub(super) back: Profile,
-    pub(super) squareness: f32,
-}
-
-impl Outline {
-    fn radii(&self, y: f32, z: f32) -> [f32; 2] {
-        [self.side.at(z), if y > 0.0 { self.front.at(z) } else { self.back.at(z) }]
-    }
-
-    /// Where the ray from the axis along `(x, y)` leaves the outline at height `z`.
-    pub(super) fn exit(&self, [x, y]: [f32; 2], z: f32) -> [f32; 3] {
-        let [a, b] = self.radii(y, z);
-        let (u, v) = ((x / a) * (x / a), (y / b) * (y / b));
-        let q = ((1.0 - self.squareness) * (u + v) + self.squareness * (u * u + v * v).sqrt()).sqrt();
-        [x / q, y / q, z]
-    }
-
-    /// Height of the front surface above the axis at `(x, z)`, by bisection; 0 beside the outline.
-    pub(super) fn front_at(&self, x: f32, z: f32) -> f32 {
-        let (mut inside, mut outside) = (0.0, self.front.at(z));
-        for _ in 0..32 {
-            let middle = 0.5 * (inside + outside);
-            let mut d = [f32::INFINITY];
-            self.lower_row(&[x], middle, z, &mut d);
-            *(if d[0] < 0.0 { &mut inside } else { &mut outside }) = middle;
-        }
-        inside
-    }
-
-    fn bounds(&self) -> Bounds {
-        let side = self.side.highest();
-        Bounds {
-            low: [-side, -self.back.highest(), f32::NEG_INFINITY],
-            high: [side, self.front.highest(), f32::INFINITY],
-        }
-    }
-
-    /// Lowers each `distance` to that of the outline, measured within the axial plane.
-    pub(super) fn lower_row(&self, xs: &[f32], y: f32, z: f32, distance: &mut [f32]) {
-        let [a, b] = self.radii(y, z);
-        let (p, q) = (1.0 / a, 1.0 / b);
-        for (d, &x) in distance.iter_mut().zip(xs) {
-            let near =
-                gauge_distance([x * p, y * q, 0.0], self.squareness, a.min(b), |h| [p * h[0], q * h[1], 0.0]);
-            *d = d.min(near);
-        }
-    }
-}
-
 /// A board bent like a trough: an arc of a cylinder about an axis parallel to z, above the board.
 #[derive(Clone, Copy)]
 pub(super) struct Board {
@@ -307,21 +258,5 @@ mod tests {
             }
             assert!(inside > 100, "the scan met the solid {inside} times only");
         }
-    }
-
-    #[test]
-    fn outline_exits_and_front_lie_on_the_surface() {
-        let outline = Outline {
-            side: Profile::new([150.0; 7]),
-            front: Profile::new([90.0, 100.0, 110.0, 105.0, 100.0, 95.0, 90.0]),
-            back: Profile::new([80.0; 7]),
-            squareness: 0.4,
-        };
-        let solid = Solid::Outline(outline);
-        for (x, y) in [(1.0, 0.0), (0.3, 0.7), (-0.5, -0.5), (0.0, -2.0)] {
-            assert!(at(&solid, outline.exit([x, y], 33.0)).abs() < 1e-3);
-        }
-        assert!(at(&solid, [40.0, outline.front_at(40.0, -70.0), -70.0]).abs() < 1e-3);
-        assert_eq!(outline.front_at(160.0, 0.0), 0.0);
     }
 }
