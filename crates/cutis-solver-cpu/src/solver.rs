@@ -78,8 +78,4 @@ impl<T: Scalar> Solver<T> for SolverCpu<T> {
     fn simulation(&self) -> &Simulation<T> {
         &self.simulation
     }
-
-    fn simulation_mut(&mut self) -> &mut Simulation<T> {
-        &mut self.simulation
-    }
 }

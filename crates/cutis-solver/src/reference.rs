@@ -71,8 +71,4 @@ impl<T: Scalar> Solver<T> for SolverReference<T> {
     fn simulation(&self) -> &Simulation<T> {
         &self.simulation
     }
-
-    fn simulation_mut(&mut self) -> &mut Simulation<T> {
-        &mut self.simulation
-    }
 }

@@ -2,7 +2,6 @@
 
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
-use nalgebra::{Point3, Vector3};
 
 use crate::passes::Integrator;
 use crate::{
@@ -99,22 +98,6 @@ impl<T: Scalar> Simulation<T> {
     /// Bytes of the stored multipliers; 0 unless XPBD runs more than one iteration.
     pub fn multiplier_bytes(&self) -> usize {
         self.multipliers.iter().map(|kind| size_of_val(kind.as_slice())).sum()
-    }
-
-    /// Puts the body into a state that it was in after `frame` frames: positions in the caller's coordinates (m) and
-    /// velocities in m/s, one of each per vertex. Going on from there gives the same bits as never having stopped.
-    ///
-    /// # Errors
-    /// Lengths that differ from the number of vertices, a number that is not finite; nothing is changed then.
-    pub fn restore(
-        &mut self,
-        positions: &[Point3<T>],
-        velocities: &[Vector3<T>],
-        frame: u64,
-    ) -> Result<(), SolverError> {
-        self.system.restore(positions, velocities)?;
-        (self.frame, self.substep) = (frame, 0);
-        Ok(())
     }
 
     /// Runs `frames` frames. Running them one by one gives the same bits. Nothing is allocated.

@@ -30,9 +30,6 @@ pub trait Solver<T: Scalar>: Send {
     /// The simulation in its present state.
     fn simulation(&self) -> &Simulation<T>;
 
-    /// The same, to be changed: see [`Simulation::restore`].
-    fn simulation_mut(&mut self) -> &mut Simulation<T>;
-
     /// The body in its present state.
     fn system(&self) -> &System<T> {
         self.simulation().system()

@@ -78,35 +78,6 @@ impl<T: Scalar> System<T> {
         Ok(())
     }
 
-    /// Takes positions (caller's coordinates) and velocities as the present state.
-    pub(crate) fn restore(
-        &mut self,
-        positions: &[Point3<T>],
-        velocities: &[Vector3<T>],
-    ) -> Result<(), SolverError> {
-        let expected = self.vertices.len();
-        for (what, found) in [("positions", positions.len()), ("velocities", velocities.len())] {
-            if found != expected {
-                return Err(SolverError::VertexLength { what, found, expected });
-            }
-        }
-        let not_finite = |value: &&T| !value.to_f64().is_finite();
-        for (what, vertex, value) in positions
-            .iter()
-            .enumerate()
-            .filter_map(|(n, p)| Some(("coordinate", n, p.iter().find(not_finite)?)))
-            .chain(velocities.iter().enumerate().filter_map(|(n, v)| Some(("velocity", n, v.iter().find(not_finite)?))))
-        {
-            let (value, expected) = (value.to_f64(), "a finite number");
-            return Err(SolverError::Vertex { vertex, what, value, expected });
-        }
-        for (vertex, position) in self.vertices.iter_mut().zip(positions) {
-            vertex.set_position(position - self.origin);
-        }
-        self.velocities.copy_from_slice(velocities);
-        Ok(())
-    }
-
     pub(crate) fn carry_handles(&mut self, time_s: f64) {
         for handle in &self.handles {
             handle.carry(&mut self.vertices, time_s);
