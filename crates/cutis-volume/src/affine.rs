@@ -91,3 +91,59 @@ impl Affine {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn linear(columns: [[f64; 3]; 3]) -> Affine {
+        let row = |r: usize| [columns[0][r], columns[1][r], columns[2][r], 5.0];
+        Affine::from_rows([row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]).unwrap()
+    }
+
+    #[test]
+    fn orientation_names_the_nearest_direction() {
+        assert_eq!(
+            linear([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]).orientation(),
+            ['R', 'A', 'S']
+        );
+        assert_eq!(
+            linear([[-2.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 3.0]]).orientation(),
+            ['L', 'P', 'S']
+        );
+        assert_eq!(
+            linear([[0.1, -9.0, 0.3], [0.2, 0.1, -1.0], [3.0, 0.5, 1.0]]).orientation(),
+            ['P', 'I', 'R']
+        );
+        // Two axes lean the same way: each direction is named once all the same.
+        assert_eq!(
+            linear([[1.0, 0.9, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).orientation(),
+            ['A', 'R', 'S']
+        );
+    }
+
+    #[test]
+    fn shear_is_the_cosine_between_axes_whatever_the_spacing() {
+        for scale in [1e-3, 1.0, 1e3] {
+            let axes =
+                |lean: f64| linear([[scale, 0.0, 0.0], [0.0, scale, 0.0], [0.0, lean * scale, 5.0 * scale]]);
+            assert!((axes(0.5).shear() - 0.5 / 25.25f64.sqrt()).abs() < 1e-12);
+            assert!(axes(0.5).is_sheared() && axes(-0.001).is_sheared() && !axes(1e-6).is_sheared());
+        }
+        let turned = linear([[0.8, 0.6, 0.0], [-1.2, 1.6, 0.0], [0.0, 0.0, -7.0]]);
+        assert!(turned.shear() < 1e-15 && turned.voxel_volume_mm3() < 0.0);
+    }
+
+    #[test]
+    fn a_map_without_an_inverse_is_refused() {
+        for spacing in [[1.0, 0.0, 1.0], [1.0, f64::NAN, 1.0], [1.0, f64::INFINITY, 1.0]] {
+            assert!(matches!(
+                Affine::from_spacing(spacing, [0.0; 3]),
+                Err(VolumeError::SingularAffine { .. })
+            ));
+        }
+        let small = Affine::from_spacing([1e-60, 1e-60, 1e-60], [0.0; 3]).unwrap();
+        let back = small.to_index(small.to_mm(Point3::new(1.0, 2.0, 3.0)));
+        assert!((back - Point3::new(1.0, 2.0, 3.0)).norm() < 1e-14, "{back:?}");
+    }
+}

@@ -1,4 +1,6 @@
 //! CT volumes: geometry, NIfTI in and out, Hounsfield-unit tables, resampling to lattice points, a synthetic phantom.
+#![doc = ""]
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod affine;

@@ -1,6 +1,5 @@
 //! A file that appears under its name only when it is complete.
 
-use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -26,13 +25,15 @@ impl PartialFile {
     /// [`VolumeError::Io`] with the target's path if the folder is missing or read-only.
     pub fn create(target: impl AsRef<Path>) -> Result<Self, VolumeError> {
         let target = target.as_ref().to_path_buf();
-        let mut name = OsString::from(".");
-        name.push(target.file_name().unwrap_or_default());
-        name.push(format!(".{}-{}.part", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed)));
-        let beside = target.with_file_name(name);
-        match OpenOptions::new().write(true).create_new(true).open(&beside) {
-            Ok(file) => Ok(Self { file: Some(file), beside, target }),
-            Err(source) => Err(VolumeError::Io { path: target, action: "create", source }),
+        loop {
+            let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+            let beside = target.with_file_name(format!(".cutis-{}-{number}.part", std::process::id()));
+            match OpenOptions::new().write(true).create_new(true).open(&beside) {
+                Ok(file) => return Ok(Self { file: Some(file), beside, target }),
+                // Left by a process of the same number that was killed.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(source) => return Err(VolumeError::Io { path: target, action: "create", source }),
+            }
         }
     }
 

@@ -82,7 +82,8 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 #[test]
 fn headers_that_cannot_be_right_are_refused_by_field() {
     assert!(Image::int16().read().is_ok());
-    let cases: [(&str, fn(&mut Image) -> &mut Image); 15] = [
+    type Change = fn(&mut Image) -> &mut Image;
+    let cases: [(&str, Change); 15] = [
         ("dim[0]", |i| i.dim(&[0])),
         ("dim[0]", |i| i.dim(&[8])),
         ("dim[1]", |i| i.dim(&[3, -2])),
@@ -267,6 +268,23 @@ fn units_and_missing_axes() {
     assert_eq!(flat.volume.grid().shape, [6, 4, 1]);
     let mirrored = Image::int16().put(252, &[1, 0, 0, 0]).f32(76, -1.0).read().unwrap();
     assert!(mirrored.volume.grid().affine.voxel_volume_mm3() < 0.0);
+}
+
+#[test]
+fn forms_that_disagree_are_named() {
+    let both = || Image::int16().put(252, &[1, 0, 2, 0]).clone();
+    let warnings = |image: &Image| image.read().unwrap().warnings;
+    assert_eq!(warnings(&both()), Vec::<String>::new());
+    let moved = warnings(both().f32(292, 5.0));
+    assert!(moved.len() == 1 && moved[0].contains("sform and qform disagree by up to 5.000 mm"), "{moved:?}");
+    let resized = warnings(Image::int16().f32(80, 2.5));
+    assert!(resized.len() == 1 && resized[0].contains("pixdim[1] says 2.5 mm"), "{resized:?}");
+    let broken = warnings(both().f32(268, f32::NAN));
+    assert!(broken.len() == 1 && broken[0].contains("the qform is not valid"), "{broken:?}");
+    let neither = warnings(Image::int16().put(254, &[0]));
+    assert!(neither.len() == 1 && neither[0].contains("neither sform nor qform"), "{neither:?}");
+    let negative = warnings(Image::int16().put(252, &[1, 0, 0, 0]).f32(84, -3.0));
+    assert!(negative.len() == 1 && negative[0].contains("pixdim[2] is -3"), "{negative:?}");
 }
 
 proptest! {
