@@ -153,6 +153,10 @@ fn verify_names_what_clashes() {
     assert_eq!(groups.verify(&edges, 7), Err(clash));
     let groups = Groups::from_colors(&[0, 0, 0, 1]).unwrap();
     assert_eq!(groups.verify(&edges, 7), Ok(()));
+    // The first constraint of a later group clashes with the next one, not with the group before.
+    let groups = Groups::from_colors(&[0, 1, 0, 1]).unwrap();
+    let clash = ColoringError::Clash { group: 1, first: 1, second: 3, vertex: 3 };
+    assert_eq!(groups.verify(&edges, 7), Err(clash));
 }
 
 #[test]
