@@ -1,1 +1,5 @@
 //! Scenes shared by tests and benches.
+
+#[path = "../../crates/cutis-solver-cpu/tests/lattice/mod.rs"]
+pub mod lattice;
+pub mod sheet;

@@ -1,0 +1,78 @@
+//! A clamped beam against independent programs: where its tip is after 21 frames.
+//!
+//! Vertices 0.1 m apart, the face x = 0 fixed, unit masses, PBD with stiffness 1 on every edge, then on every
+//! tetrahedron. Three independent programs give the last vertex the same height to five digits in the lattice's order
+//! of colours; a fourth, in another order of the constraints, differs by less than 2 mm.
+
+use cutis_coloring::{Groups, greedy};
+use cutis_constraints::{Distance, Scalar, Volume};
+use cutis_solver::{Formulation, Settings, Solver, Stiffness, SystemBuilder};
+use cutis_solver_cpu::SolverCpu;
+use cutis_tests::lattice::Kuhn;
+
+/// Size in vertices, height of the tip.
+const REFERENCE: [([usize; 3], f64); 2] = [([20, 5, 5], 0.33157), ([40, 10, 10], 0.84273)];
+
+fn tip<T: Scalar>(size: [usize; 3], edges: &Groups, tets: &Groups, iterations: u32) -> f64 {
+    let lattice = Kuhn::new(size, 0.1);
+    let masses: Vec<f64> = lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 }).collect();
+    let rigid = || Stiffness::pbd(T::one());
+    let system = SystemBuilder::<T>::new(&lattice.positions, &masses)
+        .unwrap()
+        .add_from_rest::<Distance, 2>(&lattice.edges, &Default::default(), rigid(), edges)
+        .unwrap()
+        .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), rigid(), tets)
+        .unwrap()
+        .build();
+    let settings = Settings {
+        formulation: Formulation::Pbd,
+        dt_s: 0.005,
+        substeps: 1,
+        iterations,
+        gravity_m_s2: [0.0, -9.81, 0.0],
+        damping_per_s: 0.0,
+    };
+    let mut solver = SolverCpu::new(system, settings, Some(2)).unwrap();
+    solver.step(21).unwrap();
+    solver.positions().last().unwrap().y.to_f64()
+}
+
+fn in_lattice_order<T: Scalar>(size: [usize; 3], iterations: u32) -> f64 {
+    let lattice = Kuhn::new(size, 0.1);
+    let edges = Groups::from_colors(&lattice.edge_colors).unwrap();
+    let tets = Groups::from_colors(&lattice.tet_colors).unwrap();
+    tip::<T>(size, &edges, &tets, iterations)
+}
+
+/// Five digits: half a unit of the fifth.
+fn to_five_digits(found: f64, expected: f64) -> Result<(), String> {
+    if (found - expected).abs() <= 0.5e-5 { Ok(()) } else { Err(format!("{found} instead of {expected}")) }
+}
+
+#[test]
+fn lattice_order_agrees_to_five_digits() {
+    for (size, height) in REFERENCE {
+        to_five_digits(in_lattice_order::<f64>(size, 5), height).unwrap();
+        to_five_digits(in_lattice_order::<f32>(size, 5), height).unwrap();
+    }
+}
+
+#[test]
+fn any_other_order_agrees_to_two_millimetres() {
+    for (size, height) in REFERENCE {
+        let lattice = Kuhn::new(size, 0.1);
+        let count = lattice.positions.len();
+        let edges = greedy(&lattice.edges, count).unwrap();
+        let tets = greedy(&lattice.tets, count).unwrap();
+        for found in [tip::<f64>(size, &edges, &tets, 5), tip::<f32>(size, &edges, &tets, 5)] {
+            assert!((found - height).abs() < 2e-3, "{found} instead of {height}");
+        }
+    }
+}
+
+#[test]
+fn control_another_number_of_iterations_is_refused() {
+    let (size, height) = REFERENCE[0];
+    to_five_digits(in_lattice_order::<f64>(size, 4), height).unwrap_err();
+    to_five_digits(in_lattice_order::<f64>(size, 6), height).unwrap_err();
+}

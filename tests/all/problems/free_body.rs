@@ -1,0 +1,157 @@
+//! P2: a body of all kinds, free in space. Its linear momentum stays to rounding, a single projection makes no torque,
+//! and its angular momentum drifts only by the order of the step.
+
+use cutis_coloring::greedy;
+use cutis_constraints::{Constraint, Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
+use cutis_solver::{
+    Formulation, Momentum, Pbd, Settings, Solver, SolverReference, Stiffness, SystemBuilder, project,
+};
+use cutis_tests::lattice::Kuhn;
+use nalgebra::{Point3, Vector3};
+
+use super::{SCALES, at_most, scaled};
+
+/// A number from −1 to 1 that depends on `n` without pattern.
+fn noise(n: usize) -> f64 {
+    let mixed = (n as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    ((mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 11) as f64 / 2f64.powi(52) - 1.0
+}
+
+fn noise_vector(n: usize) -> Vector3<f64> {
+    Vector3::new(noise(3 * n), noise(3 * n + 1), noise(3 * n + 2))
+}
+
+struct Run {
+    before: Momentum,
+    after: Momentum,
+    /// `Σ m|v|`, what the linear momentum is compared with.
+    flow: f64,
+}
+
+/// A deformed, spinning block after one second. `pinned` holds one vertex: the negative control.
+fn run<T: Scalar>(formulation: Formulation, substeps: u32, scale: f64, pinned: bool) -> Run {
+    let lattice = Kuhn::new([4, 4, 4], 1.0);
+    let count = lattice.positions.len();
+    let deformed: Vec<Point3<f64>> =
+        lattice.positions.iter().enumerate().map(|(n, p)| p + noise_vector(n) * 0.05).collect();
+    let spin = Vector3::new(0.3, 0.8, -0.5);
+    let velocities: Vec<Vector3<T>> = deformed
+        .iter()
+        .map(|p| ((spin.cross(&p.coords) + Vector3::new(0.2, 0.0, 0.1)) * scale).map(T::constant))
+        .collect();
+    let mut masses: Vec<f64> = (0..count).map(|n| 1.0 / (1.5 + noise(n + 1000))).collect();
+    if pinned {
+        masses[0] = 0.0;
+    }
+    let skin: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(7).collect();
+    let (stiffness, soft) = match formulation {
+        Formulation::Pbd => (Stiffness::pbd(T::constant(0.5)), [T::constant(0.5); 2]),
+        Formulation::Xpbd => (
+            Stiffness::compliance(T::constant(0.05)),
+            [T::constant(0.05 * scale.powi(4)), T::constant(0.05 * scale.powi(2))],
+        ),
+    };
+    let same = |value| match formulation {
+        Formulation::Pbd => Stiffness::pbd(value),
+        Formulation::Xpbd => Stiffness::compliance(value),
+    };
+    let lengths = vec![[T::constant(1.2 * scale)]; lattice.edges.len()];
+    let volumes = vec![[T::constant(scale.powi(3) / 6.0)]; lattice.tets.len()];
+    let material = SkinTensionMaterial { rest_area_scale: 0.8, amplification: 2.0 };
+    let system = SystemBuilder::<T>::new(&scaled(&deformed, scale), &masses)
+        .unwrap()
+        .velocities(&velocities)
+        .unwrap()
+        .add::<Distance, 2>(&lattice.edges, &lengths, stiffness, &greedy(&lattice.edges, count).unwrap())
+        .unwrap()
+        .add::<Volume, 4>(&lattice.tets, &volumes, same(soft[0]), &greedy(&lattice.tets, count).unwrap())
+        .unwrap()
+        .add_from_rest::<SkinTension, 3>(&skin, &material, same(soft[1]), &greedy(&skin, count).unwrap())
+        .unwrap()
+        .build();
+    let settings = Settings { formulation, dt_s: 1.0, substeps, iterations: 2, ..Settings::default() };
+    let mut solver = SolverReference::new(system, settings).unwrap();
+    let before = solver.momentum();
+    solver.step(1).unwrap();
+    let speeds = solver.velocities().iter().map(|v| v.map(|x| x.to_f64()).norm());
+    let heavy = masses.iter().map(|&w| if w > 0.0 { 1.0 / w } else { 0.0 });
+    Run { before, after: solver.momentum(), flow: speeds.zip(heavy).map(|(speed, mass)| speed * mass).sum() }
+}
+
+fn linear_drift(run: &Run, bound: f64) -> Result<(), String> {
+    at_most("drift of the linear momentum", (run.after.linear - run.before.linear).norm() / run.flow, bound)
+}
+
+fn angular_drift(run: &Run) -> f64 {
+    (run.after.angular - run.before.angular).norm() / run.before.angular.norm()
+}
+
+#[test]
+fn linear_momentum_stays() {
+    for formulation in [Formulation::Pbd, Formulation::Xpbd] {
+        for scale in SCALES {
+            linear_drift(&run::<f64>(formulation, 50, scale, false), 1e-12).unwrap();
+            linear_drift(&run::<f32>(formulation, 50, scale, false), 1e-3).unwrap();
+        }
+    }
+}
+
+#[test]
+fn control_a_pinned_body_is_refused() {
+    linear_drift(&run::<f64>(Formulation::Xpbd, 50, 1.0, true), 1e-3).unwrap_err();
+}
+
+#[test]
+fn angular_momentum_drifts_less_with_smaller_steps() {
+    for scale in SCALES {
+        let drifts = [25, 100, 400].map(|n| angular_drift(&run::<f64>(Formulation::Xpbd, n, scale, false)));
+        assert!(drifts[1] < 0.5 * drifts[0] && drifts[2] < 0.5 * drifts[1], "{drifts:?}");
+        assert!(drifts[2] < 1e-2, "{drifts:?}");
+    }
+}
+
+/// Torque and force of one projection over the sum of the moments' and the impulses' sizes.
+fn leaks<C: Constraint<N>, const N: usize>(
+    params: &C::Params<f64>,
+    seed: usize,
+    scale: f64,
+    tilt: f64,
+) -> [f64; 2] {
+    let x: [Point3<f64>; N] = std::array::from_fn(|i| Point3::from(noise_vector(seed * N + i)) * scale);
+    let w: [f64; N] = std::array::from_fn(|i| 1.5 + noise(seed + i));
+    let done = project::<C, N, f64, Pbd>(&x, &w, params, Pbd, 1.0, 0.0);
+    let (mut force, mut torque, mut forces, mut torques) = (Vector3::zeros(), Vector3::zeros(), 0.0, 0.0);
+    for i in 0..N {
+        let mut impulse = done.corrections[i] / w[i];
+        if i == 0 {
+            impulse += Vector3::new(-impulse.y, impulse.x, impulse.z) * tilt;
+        }
+        force += impulse;
+        torque += x[i].coords.cross(&impulse);
+        forces += impulse.norm();
+        torques += x[i].coords.norm() * impulse.norm();
+    }
+    [force.norm() / forces, torque.norm() / torques]
+}
+
+fn no_leak(leaks: [f64; 2]) -> Result<(), String> {
+    at_most("force", leaks[0], 1e-13)?;
+    at_most("torque", leaks[1], 1e-13)
+}
+
+#[test]
+fn one_projection_makes_neither_force_nor_torque() {
+    for scale in SCALES {
+        for seed in 0..200 {
+            no_leak(leaks::<Distance, 2>(&[0.3 * scale], seed, scale, 0.0)).unwrap();
+            no_leak(leaks::<SkinTension, 3>(&[0.1 * scale.powi(2), 3.0], seed, scale, 0.0)).unwrap();
+            no_leak(leaks::<Volume, 4>(&[0.2 * scale.powi(3)], seed, scale, 0.0)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn control_a_tilted_correction_is_refused() {
+    no_leak(leaks::<Distance, 2>(&[0.3], 1, 1.0, 1e-9)).unwrap_err();
+    no_leak(leaks::<Volume, 4>(&[0.2], 1, 1.0, 1e-9)).unwrap_err();
+}

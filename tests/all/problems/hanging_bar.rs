@@ -1,0 +1,64 @@
+//! P3: a bar of `N` springs under its own weight: the tip sinks by `ρgL²/(2E)·(1 + 1/N)` with lumped masses.
+
+use cutis_coloring::greedy;
+use cutis_constraints::{Distance, Scalar};
+use cutis_solver::{Formulation, Settings, Solver, SolverReference, Stiffness, SystemBuilder};
+use nalgebra::Point3;
+
+use super::{SCALES, positions, within};
+
+const GRAVITY: f64 = 9.81;
+/// Sag of the continuous bar over its length, `ρgL/(2E)`; small, so that springs stay linear.
+const SAG: f64 = 0.02;
+
+/// Sag of the tip over the length of the bar.
+fn sag<T: Scalar>(springs: usize, softness: f64, scale: f64) -> f64 {
+    let count = springs + 1;
+    let length = scale / springs as f64;
+    let points: Vec<_> = (0..count).map(|i| Point3::new(0.0, -length * i as f64, 0.0)).collect();
+    let masses: Vec<f64> = (0..count).map(|i| if i == 0 { 0.0 } else { 1.0 }).collect();
+    let edges: Vec<[u32; 2]> = (1..count as u32).map(|i| [i - 1, i]).collect();
+    // Unit masses, ρAL = N. Spring k = EA·N/L, and ρgL/(2E) = SAG gives EA = N·g/(2·SAG).
+    let compliance = softness * 2.0 * SAG * scale / (GRAVITY * (springs * springs) as f64);
+    let groups = greedy(&edges, count).unwrap();
+    let system = SystemBuilder::<T>::new(&points, &masses)
+        .unwrap()
+        .add_from_rest::<Distance, 2>(
+            &edges,
+            &Default::default(),
+            Stiffness::compliance(T::constant(compliance)),
+            &groups,
+        )
+        .unwrap()
+        .build();
+    let wave = compliance.sqrt();
+    let slowest = std::f64::consts::FRAC_PI_2 / (springs as f64 * wave);
+    let substeps = (16.0 / (slowest * wave)).ceil() as u32;
+    let settings = Settings {
+        formulation: Formulation::Xpbd,
+        dt_s: f64::from(substeps) * wave,
+        substeps,
+        iterations: 20,
+        gravity_m_s2: [0.0, -GRAVITY, 0.0],
+        damping_per_s: 2.0 * slowest,
+    };
+    let mut solver = SolverReference::new(system, settings).unwrap();
+    solver.step(1).unwrap();
+    -1.0 - positions(&solver, scale)[springs].y
+}
+
+#[test]
+fn the_tip_sinks_as_the_closed_form_says() {
+    for springs in [4, 16, 64] {
+        let expected = SAG * (1.0 + 1.0 / springs as f64);
+        for scale in SCALES {
+            within(sag::<f64>(springs, 1.0, scale), expected, 1e-4).unwrap();
+            within(sag::<f32>(springs, 1.0, scale), expected, 2e-3).unwrap();
+        }
+    }
+}
+
+#[test]
+fn control_a_softer_bar_is_refused() {
+    within(sag::<f64>(16, 1.01, 1.0), SAG * (1.0 + 1.0 / 16.0), 1e-4).unwrap_err();
+}

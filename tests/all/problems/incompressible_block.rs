@@ -1,0 +1,75 @@
+//! P7: a block whose tetrahedra are incompressible is pulled at one end: its volume error vanishes as iterations grow.
+//!
+//! The block is one cube wide: its 36 tetrahedra leave free some of its 60 coordinates. A wide block of linear
+//! tetrahedra has more of them than coordinates and cannot be stretched without a change of volume (locking).
+
+use cutis_coloring::greedy;
+use cutis_constraints::{Distance, Scalar, Volume};
+use cutis_solver::{Formulation, Handle, Settings, Solver, SolverReference, Stiffness, SystemBuilder};
+use cutis_tests::lattice::Kuhn;
+
+use super::{SCALES, at_most, scaled};
+
+/// RMS of the volume error over the rest volume after the end has been pulled by 20 %. `softness` is the compliance of
+/// the volumes in units that fit the springs'.
+fn volume_error<T: Scalar>(iterations: u32, softness: f64, scale: f64) -> f64 {
+    let lattice = Kuhn::new([7, 2, 2], 1.0);
+    let count = lattice.positions.len();
+    let masses: Vec<f64> = lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 }).collect();
+    let end: Vec<u32> = (0..count as u32).filter(|&v| lattice.positions[v as usize].x == 6.0).collect();
+    let soft = Stiffness::compliance(T::one());
+    let rigid = Stiffness::compliance(T::constant(softness * scale.powi(4)));
+    let system = SystemBuilder::<T>::new(&scaled(&lattice.positions, scale), &masses)
+        .unwrap()
+        .add_from_rest::<Distance, 2>(
+            &lattice.edges,
+            &Default::default(),
+            soft,
+            &greedy(&lattice.edges, count).unwrap(),
+        )
+        .unwrap()
+        .add_from_rest::<Volume, 4>(
+            &lattice.tets,
+            &Default::default(),
+            rigid,
+            &greedy(&lattice.tets, count).unwrap(),
+        )
+        .unwrap()
+        .handle(Handle { vertices: end, move_m: [1.2 * scale, 0.0, 0.0], over_s: 20.0 })
+        .unwrap()
+        .build();
+    let settings = Settings {
+        formulation: Formulation::Xpbd,
+        dt_s: 40.0,
+        substeps: 80,
+        iterations,
+        gravity_m_s2: [0.0; 3],
+        damping_per_s: 0.5,
+    };
+    let mut solver = SolverReference::new(system, settings).unwrap();
+    solver.step(1).unwrap();
+    solver.residuals().iter().find(|residual| residual.name == "volume").unwrap().rms
+}
+
+/// The error must fall whenever the iterations are taken sixteenfold, and be below `bound` at last.
+fn check<T: Scalar>(softness: f64, scale: f64, bound: f64) -> Result<(), String> {
+    let errors = [1, 16, 256, 2048].map(|iterations| volume_error::<T>(iterations, softness, scale));
+    for pair in errors.windows(2) {
+        at_most("error with more iterations", pair[1], (0.7 * pair[0]).max(bound))
+            .map_err(|e| format!("{e}: {errors:?}"))?;
+    }
+    at_most("last error", errors[3], bound)
+}
+
+#[test]
+fn volume_error_vanishes_with_iterations() {
+    for scale in SCALES {
+        check::<f64>(0.0, scale, 1e-4).unwrap();
+        check::<f32>(0.0, scale, 1e-4).unwrap();
+    }
+}
+
+#[test]
+fn control_compressible_tetrahedra_are_refused() {
+    check::<f64>(0.1, 1.0, 1e-4).unwrap_err();
+}
