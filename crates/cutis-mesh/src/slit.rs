@@ -178,6 +178,22 @@ impl Slit {
         Vector3::new(s, point.lateral, d).norm()
     }
 
+    /// Length of the segment, m.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Unit vector from start to end.
+    pub fn along(&self) -> Vector3<f64> {
+        self.along
+    }
+
+    /// The point of the skin above the middle of the slit, local metres, at rest.
+    pub fn middle(&self) -> Point3<f64> {
+        let height = self.skin.get(self.skin.len() / 2).copied().unwrap_or(0.0);
+        self.start + self.along * (self.length / 2.0) + self.inward * height
+    }
+
     /// Unit vector across the slit, from the left lip to the right one.
     pub fn lateral(&self) -> Vector3<f64> {
         self.lateral

@@ -52,7 +52,9 @@ pub(super) fn triangles(lattice: &Lattice, tissue: &[bool]) -> Vec<[u32; 3]> {
                             && (grid.index(other), usize::from(neighbor.tet)) < (grid.index(cell), t)
                     });
                     if !given_before {
-                        out.push(FACES[f].map(|v| grid.index(Lattice::corner(cell, tet[v])) as u32));
+                        // The air is on the tet's own side of the face.
+                        let [a, b, c] = FACES[f].map(|v| grid.index(Lattice::corner(cell, tet[v])) as u32);
+                        out.push([a, c, b]);
                     }
                 }
             });

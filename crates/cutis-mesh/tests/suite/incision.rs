@@ -1,0 +1,241 @@
+//! Incisions: what they remove, that the lips are apart, and what the gape measures.
+
+use std::collections::BTreeSet;
+
+use cutis_mesh::{Cut, Incision, Lattice, MeshError, SkinMode, SkinOptions, Split, TetMesh, skin};
+use nalgebra::{Point3, Vector3};
+
+use crate::oracle::{air, lattice, mesh};
+
+/// A block of 60 × 40 × 20 mm whose upper face is the skin at z = 20.
+fn block(step: f64, split: Split) -> (TetMesh, Vec<[u32; 3]>) {
+    let count = |mm: f64| (mm / step).round() as usize + 5;
+    let affine = cutis_volume::Affine::from_spacing([step; 3], [-2.0 * step; 3]).unwrap();
+    let grid = cutis_volume::Grid { shape: [count(60.0), count(40.0), count(20.0)], affine };
+    let lattice = Lattice::new(grid, split).unwrap();
+    let within = |v: f64, high: f64| (-1e-9..=high + 1e-9).contains(&v);
+    body(&lattice, |p| within(p[0], 60.0) && within(p[1], 40.0) && within(p[2], 20.0))
+}
+
+fn body(lattice: &Lattice, is_tissue: impl Fn([f64; 3]) -> bool) -> (TetMesh, Vec<[u32; 3]>) {
+    let air = air(lattice, is_tissue);
+    let mesh = mesh(lattice, &air);
+    // The block is closed, and so are its ends in z.
+    let skin = skin::detect(lattice, &air, SkinMode::Boundary, &SkinOptions::default()).unwrap();
+    let (triangles, dropped) = skin.on_mesh(&mesh);
+    assert_eq!(dropped, 0);
+    (mesh, triangles)
+}
+
+fn incision(from_mm: [f64; 3], to_mm: [f64; 3], depth_mm: f64, width_mm: f64) -> Incision {
+    Incision { from_mm, to_mm, depth_mm, width_mm }
+}
+
+/// Vertices reached from a vertex over tets whose corners all satisfy a condition.
+fn reached(mesh: &TetMesh, start: u32, within: impl Fn(Point3<f64>) -> bool) -> BTreeSet<u32> {
+    let usable: Vec<&[u32; 4]> = mesh
+        .tets
+        .iter()
+        .filter(|tet| tet.iter().all(|&v| within(mesh.frame.to_mm(mesh.positions[v as usize]))))
+        .collect();
+    let mut seen = BTreeSet::from([start]);
+    loop {
+        let before = seen.len();
+        for tet in &usable {
+            if tet.iter().any(|v| seen.contains(v)) {
+                seen.extend(tet.iter());
+            }
+        }
+        if seen.len() == before {
+            return seen;
+        }
+    }
+}
+
+#[test]
+fn removes_exactly_the_slit_and_parts_its_lips() {
+    for split in [Split::Kuhn6, Split::Five] {
+        let (mesh, triangles) = block(2.0, split);
+        let cut = Cut::plan(&mesh, &triangles, &[incision([20.0, 20.0, 20.0], [40.0, 20.0, 20.0], 6.5, 4.5)])
+            .unwrap();
+        for (v, &removed) in cut.removed.iter().enumerate() {
+            let mm = mesh.frame.to_mm(mesh.positions[v]);
+            let inside = (19.99..=40.01).contains(&mm.x) && (mm.y - 20.0).abs() < 2.26 && mm.z >= 13.4;
+            assert_eq!(removed, inside, "{mm}");
+        }
+        let (mut opened, mut skin) = (mesh.clone(), triangles.clone());
+        let taken = cut.apply(&mut opened, &mut skin);
+        assert_eq!(opened.tets.len() + taken.tets.len(), mesh.tets.len());
+        assert_eq!(opened.edges.len() + taken.edges, mesh.edges.len());
+        assert_eq!(skin.len() + taken.triangles, triangles.len());
+        let gone = |v: &u32| cut.removed[*v as usize];
+        assert!(!opened.tets.iter().flatten().any(gone) && !opened.edges.iter().flatten().any(gone));
+        assert!(!skin.iter().flatten().any(gone));
+        // What is left is a mesh: its edges are those of its tets, so that each has a share of volume, and its surface is closed.
+        assert!(opened.edge_volumes().iter().all(|&share| share > 0.0));
+        assert_eq!(cutis_mesh::Topology::of(&opened.boundary()).open_edges.len(), 0);
+        // Width 4.5 mm at rows 2 mm apart: rows 18, 20 and 22 go, the lips are rows 16 and 24.
+        let gape = cut.gapes[0].measure(&mesh.positions);
+        assert!((gape.mean_mm - 8.0).abs() < 1e-4 && (gape.mid_mm - 8.0).abs() < 1e-4, "{gape:?}");
+        assert!((gape.mean_distance_mm - 8.0).abs() < 0.3, "{gape:?}");
+        let row = |v: &u32| mesh.frame.to_mm(mesh.positions[*v as usize]).y.round() as i32;
+        let sides = |lip: &[u32]| lip.iter().map(row).collect::<BTreeSet<_>>();
+        assert_eq!(&sides(cut.gapes[0].left()) | &sides(cut.gapes[0].right()), BTreeSet::from([16, 24]));
+    }
+}
+
+#[test]
+fn lips_are_apart_however_thin_or_oblique_the_slit() {
+    let (mesh, triangles) = block(2.0, Split::Kuhn6);
+    for (from, to) in
+        [([12.0, 20.0], [48.0, 20.0]), ([12.3, 12.1], [47.7, 28.9]), ([20.0, 8.0], [39.0, 33.0])]
+    {
+        let (from, to) = ([from[0], from[1], 20.0], [to[0], to[1], 20.0]);
+        let along = (Point3::from(to) - Point3::from(from)).normalize();
+        let lateral = Vector3::z().cross(&along);
+        for width in [0.01, 1.0, 3.0] {
+            let (mut opened, mut skin) = (mesh.clone(), triangles.clone());
+            let cut = Cut::plan(&mesh, &triangles, &[incision(from, to, 8.0, width)]).unwrap();
+            // In a window well inside the slit, the two sides have nothing in common. Before the cut they have.
+            let window = |mm: Point3<f64>| {
+                let from_start = mm - Point3::from(from);
+                let s = from_start.dot(&along);
+                let length = (Point3::from(to) - Point3::from(from)).norm();
+                mm.z > 13.0 && s > 4.0 && s < length - 4.0 && from_start.dot(&lateral).abs() < 7.0
+            };
+            let lip = cut.gapes[0].left();
+            let start = lip[lip.len() / 2];
+            let other: BTreeSet<u32> = cut.gapes[0].right().iter().copied().collect();
+            assert!(!reached(&mesh, start, window).is_disjoint(&other));
+            cut.apply(&mut opened, &mut skin);
+            assert!(reached(&opened, start, window).is_disjoint(&other), "{from:?} {to:?} {width}");
+            let joined: BTreeSet<[u32; 2]> = opened.edges.iter().copied().collect();
+            let both = |a: u32, b: u32| joined.contains(&[a.min(b), a.max(b)]);
+            assert!(!lip.iter().any(|&a| other.iter().any(|&b| both(a, b))));
+        }
+    }
+}
+
+#[test]
+fn gape_is_the_lateral_opening() {
+    let (mesh, triangles) = block(2.0, Split::Kuhn6);
+    let cut =
+        Cut::plan(&mesh, &triangles, &[incision([15.0, 20.0, 20.0], [45.0, 20.0, 20.0], 8.0, 3.0)]).unwrap();
+    let gape = &cut.gapes[0];
+    let rest = gape.measure(&mesh.positions);
+    let side = cut.slits[0].lateral().cast::<f32>();
+    let along = Vector3::new(1.0, 0.0, 0.0);
+    let right: BTreeSet<u32> = gape.right().iter().copied().collect();
+    // The right lip opens by 6 mm in the middle, less towards the ends, and slides along by 2 mm.
+    let moved: Vec<Point3<f32>> = mesh
+        .positions
+        .iter()
+        .enumerate()
+        .map(|(v, p)| {
+            let s = (mesh.frame.to_mm(*p).x - 30.0).abs() / 15.0;
+            let open = if right.contains(&(v as u32)) { 0.006 * (1.0 - s as f32) } else { 0.0 };
+            p + side * open + along * if open > 0.0 { 0.002 } else { 0.0 }
+        })
+        .collect();
+    let now = gape.measure(&moved);
+    assert!((now.mid_mm - rest.mid_mm - 6.0).abs() < 0.5, "{rest:?} {now:?}");
+    let mean = now.mean_mm - rest.mean_mm;
+    assert!(mean > 2.5 && mean < 4.0, "{rest:?} {now:?}");
+    assert!(now.mid_distance_mm > now.mid_mm + 0.1);
+    // A body that moves as a whole does not gape.
+    let shifted: Vec<Point3<f32>> =
+        mesh.positions.iter().map(|p| p + Vector3::new(0.01, 0.02, 0.03)).collect();
+    let shift = gape.measure(&shifted);
+    assert!((shift.mean_mm - rest.mean_mm).abs() < 1e-3 && (shift.mid_mm - rest.mid_mm).abs() < 1e-3);
+}
+
+#[test]
+fn curved_skin_is_cut_to_an_even_depth() {
+    // A cylinder along x of radius 40 mm around (0, 0), cut across its axis over an arc of some 60°: the chord dips far below the skin.
+    let lattice = lattice([12, 49, 49], [2.0; 3], Split::Kuhn6);
+    let (cy, cz) = (28.0, 58.0);
+    let radius = |p: [f64; 3]| ((p[1] - cy).powi(2) + (p[2] - cz).powi(2)).sqrt();
+    let (mesh, triangles) = body(&lattice, |p| radius(p) <= 40.0);
+    let (sin, cos) = (30f64.to_radians().sin(), 30f64.to_radians().cos());
+    let end = |sign: f64| [41.0, cy + sign * 40.0 * sin, cz + 40.0 * cos];
+    let cut = Cut::plan(&mesh, &triangles, &[incision(end(-1.0), end(1.0), 8.0, 5.0)]).unwrap();
+    let mut deepest = f64::INFINITY;
+    for (v, _) in cut.removed.iter().enumerate().filter(|(_, removed)| **removed) {
+        deepest = deepest.min(radius(mesh.frame.to_mm(mesh.positions[v]).into()));
+    }
+    // Depth is measured straight down, so that at 30° it is 8·cos 30° across the skin, and the lattice rounds.
+    assert!(deepest > 40.0 - 8.0 - 2.5 && deepest < 40.0 - 8.0 + 2.5, "{deepest}");
+    // Along the whole arc the skin itself is gone.
+    let gone: Vec<f64> = cut
+        .removed
+        .iter()
+        .enumerate()
+        .filter(|(_, removed)| **removed)
+        .map(|(v, _)| mesh.frame.to_mm(mesh.positions[v]))
+        .filter(|mm| radius((*mm).into()) > 37.5)
+        .map(|mm| mm.y - cy)
+        .collect();
+    assert!((-18..=18).all(|y| gone.iter().any(|g| (g - f64::from(y)).abs() <= 2.0)), "{gone:?}");
+    assert!(cut.gapes[0].measure(&mesh.positions).bins >= 10);
+}
+
+#[test]
+fn several_incisions_each_have_their_gape() {
+    let (mesh, triangles) = block(2.0, Split::Kuhn6);
+    let first = incision([10.0, 12.0, 20.0], [30.0, 12.0, 20.0], 6.0, 1.0);
+    let second = incision([40.0, 10.0, 20.0], [40.0, 30.0, 20.0], 6.0, 7.0);
+    let cut = Cut::plan(&mesh, &triangles, &[first, second]).unwrap();
+    let gapes: Vec<f64> = cut.gapes.iter().map(|gape| gape.measure(&mesh.positions).mean_mm).collect();
+    // A slit through the row at y = 12 takes that row; columns 38, 40 and 42 lie within 3.5 mm of x = 40.
+    assert!((gapes[0] - 4.0).abs() < 1e-3 && (gapes[1] - 8.0).abs() < 1e-3, "{gapes:?}");
+    let at = |x: f64, y: f64, z: f64| mesh.frame.to_local(Point3::new(x, y, z));
+    assert!((cut.distance_mm(at(20.0, 15.0, 18.0)) - 3.0).abs() < 1e-4);
+    assert!((cut.distance_mm(at(40.0, 33.0, 18.0)) - 3.0).abs() < 1e-4);
+    let none = Cut::plan(&mesh, &triangles, &[]).unwrap();
+    let (mut same, mut skin) = (mesh.clone(), triangles.clone());
+    assert_eq!(none.apply(&mut same, &mut skin), cutis_mesh::Taken::default());
+    assert!(
+        same.edges == mesh.edges && skin == triangles && none.distance_mm(at(0.0, 0.0, 0.0)).is_infinite()
+    );
+}
+
+#[test]
+fn unusable_incisions_are_refused_by_name() {
+    let (mesh, triangles) = block(2.0, Split::Kuhn6);
+    let (a, b) = ([20.0, 20.0, 20.0], [40.0, 20.0, 20.0]);
+    let refuse = |one: Incision| Cut::plan(&mesh, &triangles, &[incision(a, b, 6.0, 4.0), one]).unwrap_err();
+    for (depth, width, key) in [
+        (0.0, 4.0, "depth_mm"),
+        (-1.0, 4.0, "depth_mm"),
+        (6.0, f64::NAN, "width_mm"),
+        (6.0, f64::INFINITY, "width_mm"),
+    ] {
+        let error = refuse(incision(a, b, depth, width));
+        assert!(error.to_string().contains(key) && error.to_string().contains("incision 1"), "{error}");
+    }
+    assert!(matches!(refuse(incision(a, a, 6.0, 4.0)), MeshError::IncisionSize { key: "length", .. }));
+    assert!(matches!(
+        refuse(incision([f64::NAN; 3], b, 6.0, 4.0)),
+        MeshError::IncisionSize { key: "length", .. }
+    ));
+    let off = refuse(incision([20.0, 20.0, 70.0], [40.0, 20.0, 70.0], 6.0, 4.0));
+    assert!(
+        matches!(off, MeshError::IncisionOffSkin { distance_mm, .. } if (distance_mm - 50.0).abs() < 1.0),
+        "{off}"
+    );
+    let through = refuse(incision([20.0, 20.0, 24.0], [20.0, 20.0, 16.0], 6.0, 4.0));
+    assert!(matches!(through, MeshError::IncisionThroughSkin { .. }), "{through}");
+    let empty = refuse(incision([20.5, 20.6, 20.0], [20.6, 20.6, 20.0], 0.1, 0.1));
+    assert!(matches!(empty, MeshError::IncisionEmpty { .. }), "{empty}");
+    let all = refuse(incision(a, b, 6.0, 400.0));
+    assert!(matches!(all, MeshError::IncisionWithoutLips { left: 0, right: 0, .. }), "{all}");
+    // An absurd length is refused too, without taking for ever.
+    let long = Cut::plan(&mesh, &triangles, &[incision([-1e12, 20.0, 20.0], [1e12, 20.0, 20.0], 6.0, 4.0)]);
+    assert!(long.is_err());
+    let bad = Cut::plan(&mesh, &[[0, 1, u32::MAX]], &[]).unwrap_err();
+    assert!(matches!(bad, MeshError::VertexIndex { position: 0, vertex: u32::MAX, .. }));
+    assert!(matches!(
+        Cut::plan(&mesh, &[], &[incision(a, b, 6.0, 4.0)]),
+        Err(MeshError::IncisionOffSkin { .. })
+    ));
+}

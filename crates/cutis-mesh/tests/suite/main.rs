@@ -1,0 +1,9 @@
+//! Tests of lattices, meshes, skins, incisions and mesh files, against brute force and known answers.
+
+mod files;
+mod incision;
+mod lattice;
+mod oracle;
+mod real_data;
+mod shell;
+mod skin;
