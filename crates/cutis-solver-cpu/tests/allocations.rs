@@ -1,0 +1,103 @@
+//! Nothing is allocated inside a step, and what is left out has no storage. A binary of its own: it counts every
+//! allocation of the process.
+
+mod lattice;
+
+use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use cutis_coloring::greedy;
+use cutis_constraints::{Distance, Volume};
+use cutis_solver::{Formulation, Settings, Solver, SolverReference, Stiffness, System, SystemBuilder};
+use cutis_solver_cpu::SolverCpu;
+use lattice::Kuhn;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+struct Counting;
+
+// SAFETY: passes every call on to the system's allocator unchanged.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { SystemAllocator.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { SystemAllocator.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn body(volumes: bool) -> System<f32> {
+    let lattice = Kuhn::new([30, 20, 20], 0.1);
+    let count = lattice.positions.len();
+    let system = SystemBuilder::<f32>::new(&lattice.positions, &vec![1.0; count])
+        .unwrap()
+        .add_from_rest::<Distance, 2>(
+            &lattice.edges,
+            &Default::default(),
+            Stiffness::compliance(1e-4),
+            &greedy(&lattice.edges, count).unwrap(),
+        )
+        .unwrap();
+    if !volumes {
+        return system.build();
+    }
+    let groups = greedy(&lattice.tets, count).unwrap();
+    let compliance = Stiffness::compliance(1e-6);
+    system
+        .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), compliance, &groups)
+        .unwrap()
+        .build()
+}
+
+fn settings(iterations: u32) -> Settings {
+    Settings { formulation: Formulation::Xpbd, iterations, ..Settings::default() }
+}
+
+/// Allocations of `steps` calls of `step`, after a first one.
+fn allocations(solver: &mut dyn Solver<f32>, steps: usize) -> usize {
+    solver.step(1).unwrap();
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    for _ in 0..steps {
+        solver.step(1).unwrap();
+    }
+    ALLOCATIONS.load(Ordering::Relaxed) - before
+}
+
+/// One test, so that no other one allocates meanwhile.
+#[test]
+fn a_scene_pays_only_for_what_it_names() {
+    for iterations in [1, 2] {
+        let mut reference = SolverReference::new(body(true), settings(iterations)).unwrap();
+        assert_eq!(allocations(&mut reference, 3), 0);
+        for threads in [1, 2, 8] {
+            let mut solver = SolverCpu::new(body(true), settings(iterations), Some(threads)).unwrap();
+            assert_eq!(allocations(&mut solver, 3), 0, "{threads} threads");
+        }
+    }
+    // The control: the counter counts.
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    drop(std::hint::black_box(vec![1u8]));
+    assert!(ALLOCATIONS.load(Ordering::Relaxed) > before);
+
+    let names = |volumes, iterations| {
+        let solver = SolverReference::new(body(volumes), settings(iterations)).unwrap();
+        solver.bytes().iter().map(|part| part.name).collect::<Vec<_>>()
+    };
+    assert_eq!(names(false, 1), ["vertices", "distance"]);
+    assert_eq!(names(true, 1), ["vertices", "distance", "volume"]);
+    assert_eq!(names(true, 2), ["vertices", "distance", "volume", "multipliers"]);
+
+    // Four numbers, three and three of a vertex; indices, length and colour offsets of a spring.
+    let lattice = Kuhn::new([30, 20, 20], 0.1);
+    let solver = SolverReference::new(body(false), settings(1)).unwrap();
+    let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();
+    assert_eq!(bytes[0], lattice.positions.len() * 40);
+    assert_eq!(bytes[1], lattice.edges.len() * 12 + solver.system().kinds()[0].offsets().len() * 4);
+}

@@ -1,0 +1,119 @@
+//! The backend against the reference: equal bit for bit, for any number of threads.
+
+mod lattice;
+
+use cutis_coloring::greedy;
+use cutis_constraints::{Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
+use cutis_solver::{
+    Formulation, Handle, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
+    Values,
+};
+use cutis_solver_cpu::{CpuError, SolverCpu};
+use lattice::Kuhn;
+
+/// A block large enough for several chunks of every colour and several blocks of vertices: all kinds, one face fixed,
+/// an edge carried by a handle.
+fn body<T: Scalar>(formulation: Formulation) -> System<T> {
+    let lattice = Kuhn::new([40, 24, 20], 0.1);
+    let count = lattice.positions.len();
+    let masses: Vec<f64> = (0..count).map(|n| (n % 40).min(1) as f64 * (0.5 + (n % 7) as f64)).collect();
+    let carried = (0..count as u32).filter(|n| n % 40 == 39 && (n / 40) % 24 == 0).collect();
+    let skin: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(5).collect();
+    let each = |count: usize, unit: f64| {
+        let value = |n: usize| (1 + n % 3) as f64;
+        match formulation {
+            Formulation::Pbd => {
+                Stiffness::Pbd(Values::Each((0..count).map(|n| T::constant(0.3 * value(n))).collect()))
+            }
+            Formulation::Xpbd => Stiffness::Compliance(Values::Each(
+                (0..count).map(|n| T::constant(unit * value(n))).collect(),
+            )),
+        }
+    };
+    let material = SkinTensionMaterial { rest_area_scale: 0.8, amplification: 2.0 };
+    SystemBuilder::<T>::new(&lattice.positions, &masses)
+        .unwrap()
+        .add_from_rest::<Distance, 2>(
+            &lattice.edges,
+            &Default::default(),
+            each(lattice.edges.len(), 1e-3),
+            &greedy(&lattice.edges, count).unwrap(),
+        )
+        .unwrap()
+        .add_from_rest::<SkinTension, 3>(
+            &skin,
+            &material,
+            each(skin.len(), 1e-5),
+            &greedy(&skin, count).unwrap(),
+        )
+        .unwrap()
+        .add_from_rest::<Volume, 4>(
+            &lattice.tets,
+            &Default::default(),
+            each(lattice.tets.len(), 1e-7),
+            &greedy(&lattice.tets, count).unwrap(),
+        )
+        .unwrap()
+        .handle(Handle { vertices: carried, move_m: [0.1, 0.2, 0.0], over_s: 0.03 })
+        .unwrap()
+        .build()
+}
+
+fn settings(formulation: Formulation, iterations: u32) -> Settings {
+    let gravity_m_s2 = [0.0, -9.81, 0.0];
+    Settings { formulation, dt_s: 0.01, substeps: 2, iterations, gravity_m_s2, damping_per_s: 0.5 }
+}
+
+/// Positions and velocities after three frames, as bits.
+fn bits<T: Scalar>(mut solver: impl Solver<T>, calls: &[usize]) -> Vec<u64> {
+    for &frames in calls {
+        solver.step(frames).unwrap();
+    }
+    let positions = solver.positions();
+    let numbers = positions.iter().map(|p| p.coords).chain(solver.velocities().iter().copied());
+    numbers.flat_map(|v| [v.x, v.y, v.z].map(|x| x.to_f64().to_bits())).collect()
+}
+
+fn parity<T: Scalar>(formulation: Formulation, iterations: u32) {
+    let settings = settings(formulation, iterations);
+    let reference = bits(SolverReference::new(body::<T>(formulation), settings).unwrap(), &[3]);
+    for threads in [1, 2, 3, 8] {
+        let solver = SolverCpu::new(body::<T>(formulation), settings, Some(threads)).unwrap();
+        assert!(bits(solver, &[1, 2]) == reference, "{threads} threads, {formulation:?}");
+    }
+    // The control: another number of iterations must not be equal.
+    let other = Settings { iterations: iterations + 1, ..settings };
+    assert!(bits(SolverReference::new(body::<T>(formulation), other).unwrap(), &[3]) != reference);
+}
+
+#[test]
+fn equal_to_the_reference_for_any_number_of_threads() {
+    parity::<f32>(Formulation::Pbd, 2);
+    parity::<f32>(Formulation::Xpbd, 1);
+    parity::<f32>(Formulation::Xpbd, 3);
+    parity::<f64>(Formulation::Xpbd, 2);
+}
+
+#[test]
+fn going_on_from_a_saved_state_gives_the_same_bits() {
+    let settings = settings(Formulation::Xpbd, 1);
+    let new = || SolverCpu::new(body::<f32>(Formulation::Xpbd), settings, Some(2)).unwrap();
+    let whole = bits(new(), &[3]);
+    let mut first = new();
+    first.step(2).unwrap();
+    let mut second = new();
+    second.restore(&first.positions(), first.velocities(), 2).unwrap();
+    assert_eq!(second.time_s(), first.time_s());
+    assert!(bits(second, &[1]) == whole);
+    let error = new().restore(&first.positions()[1..], first.velocities(), 2).unwrap_err();
+    assert!(matches!(error, SolverError::VertexLength { what: "positions", .. }), "{error}");
+}
+
+#[test]
+fn a_number_of_threads_that_makes_no_sense_is_refused() {
+    for threads in [0, 1_000_000] {
+        let solver =
+            SolverCpu::new(body::<f32>(Formulation::Pbd), settings(Formulation::Pbd, 1), Some(threads));
+        assert!(matches!(solver.err(), Some(CpuError::Threads { .. })));
+    }
+}
