@@ -1,2 +1,20 @@
-//! The `cutis` program.
-fn main() {}
+//! The `cutis` program: arguments in, exit code out (0 done, 1 failed while running, 2 bad input or usage).
+
+mod args;
+mod commands;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let args = args::Args::parse();
+    match commands::run(args.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            terminal::error(&error);
+            ExitCode::from(if error.is_bad_input() { 2 } else { 1 })
+        }
+    }
+}

@@ -1,5 +1,7 @@
 //! Building a system: everything is checked here, so that nothing has to be checked in a step.
 
+use std::collections::HashSet;
+
 use cutis_coloring::Groups;
 use cutis_constraints::{Constraint, Scalar};
 use nalgebra::{Point3, Vector3};
@@ -12,6 +14,7 @@ use crate::{Handle, SolverError, Stiffness, System, Vertex};
 /// Collects vertices, kinds of constraints and handles into a [`System`].
 pub struct SystemBuilder<T: Scalar> {
     system: System<T>,
+    carried: HashSet<u32>,
 }
 
 impl<T: Scalar> SystemBuilder<T> {
@@ -61,7 +64,7 @@ impl<T: Scalar> SystemBuilder<T> {
         let velocities = vec![Vector3::zeros(); count];
         let system =
             System { origin, vertices, previous, velocities, kinds: Vec::new(), handles: Vec::new() };
-        Ok(Self { system })
+        Ok(Self { system, carried: HashSet::new() })
     }
 
     /// Velocities at the start in m/s, one per vertex. Without this call all are zero.
@@ -124,11 +127,11 @@ impl<T: Scalar> SystemBuilder<T> {
     /// Adds a handle; its vertices leave the dynamics.
     ///
     /// # Errors
-    /// A vertex that does not exist or that an earlier handle moves, a path or a time that is not finite, a negative
+    /// A vertex that does not exist or is moved by a handle already, a path or a time that is not finite, a negative
     /// time.
     pub fn handle(mut self, handle: Handle) -> Result<Self, SolverError> {
         let System { vertices, handles, .. } = &mut self.system;
-        let carried = Carried::new(handles.len(), handle, vertices, handles)?;
+        let carried = Carried::new(handles.len(), handle, vertices, &mut self.carried)?;
         handles.push(carried);
         Ok(self)
     }

@@ -1,5 +1,7 @@
 //! Kinematic vertices: what a hand, a hook or a clamp moves along a given path.
 
+use std::collections::HashSet;
+
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
@@ -29,12 +31,12 @@ pub(crate) struct Carried<T: Scalar> {
 }
 
 impl<T: Scalar> Carried<T> {
-    /// Checks the numbers of `handle` and takes its vertices out of the dynamics.
+    /// Checks the numbers of `handle` and takes its vertices out of the dynamics. `taken` are those of other handles.
     pub(crate) fn new(
         index: usize,
         handle: Handle,
         vertices: &mut [Vertex<T>],
-        taken: &[Self],
+        taken: &mut HashSet<u32>,
     ) -> Result<Self, SolverError> {
         for value in handle.move_m {
             if !value.is_finite() {
@@ -50,8 +52,8 @@ impl<T: Scalar> Carried<T> {
         for &vertex in &handle.vertices {
             let error = |reason| SolverError::Handle { handle: index, vertex, reason };
             let place = vertices.get_mut(vertex as usize).ok_or_else(|| error("does not exist"))?;
-            if taken.iter().any(|other| other.vertices.contains(&vertex)) {
-                return Err(error("is moved by an earlier handle already"));
+            if !taken.insert(vertex) {
+                return Err(error("is moved by a handle already"));
             }
             rest.push(place.position());
             *place = Vertex::new(place.position(), T::zero());

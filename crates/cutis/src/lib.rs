@@ -1,1 +1,55 @@
-//! cutis
+//! From a CT scan to a cut, deformed body: scene files and the whole pipeline.
+//!
+//! ```no_run
+//! use cutis::{RunOptions, Scene, Silent};
+//!
+//! let loaded = Scene::load("scene.toml".as_ref(), &[])?;
+//! let plan = cutis::check(&loaded, &Silent)?;
+//! println!("{} tetrahedra, left out: {:?}", plan.sizes.tets, plan.left_out);
+//! let report = cutis::run(&loaded, &RunOptions { out: "run".into(), resume: false }, &Silent)?;
+//! println!("{:?}", report.wound);
+//! # Ok::<(), cutis::Error>(())
+//! ```
+//!
+//! The parts are crates of their own, re-exported here: [`volume`] (CT in and out), [`mesh`] (lattice, skin, incisions),
+//! [`constraints`], [`coloring`], [`solver`] and [`solver_cpu`], [`resample`] and [`render`]. This crate adds the scene file
+//! ([`scene`]), the order of the stages, and what is written: a run folder with [`report::Report`].
+#![forbid(unsafe_code)]
+
+mod body;
+mod checkpoint;
+mod demo;
+mod dynamics;
+mod error;
+mod files;
+mod find_skin;
+mod html;
+mod inspect;
+mod output;
+mod pictures;
+mod plan;
+mod progress;
+pub mod report;
+mod run;
+pub mod scene;
+mod source;
+
+pub use cutis_coloring as coloring;
+pub use cutis_constraints as constraints;
+pub use cutis_mesh as mesh;
+pub use cutis_render as render;
+pub use cutis_resample as resample;
+pub use cutis_solver as solver;
+pub use cutis_solver_cpu as solver_cpu;
+pub use cutis_volume as volume;
+
+pub use demo::demo;
+pub use error::Error;
+pub use files::RunFolder;
+pub use find_skin::{SkinRequest, find_skin};
+pub use inspect::{Inspection, inspect};
+pub use output::{ResampleRequest, resample_run};
+pub use plan::{Plan, check};
+pub use progress::{Progress, Silent};
+pub use run::{RunOptions, run};
+pub use scene::{LoadedScene, Override, Scene};

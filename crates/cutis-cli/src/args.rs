@@ -1,0 +1,218 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args as Group, Parser, Subcommand, ValueEnum};
+use cutis::scene::Override;
+use cutis::volume::sample::LatticeSize;
+
+/// Cut a CT scan and watch skin tension open the wound.
+///
+/// Exit codes: 0 done, 1 failed while running, 2 bad input or usage.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run the whole pipeline on the built-in phantom
+    Demo {
+        /// Run folder
+        #[arg(long, default_value = "cutis-demo")]
+        out: PathBuf,
+        #[command(flatten)]
+        change: Change,
+        /// Print report.json on standard output
+        #[arg(long)]
+        json: bool,
+    },
+    /// Run a scene
+    Run {
+        /// Scene file (TOML)
+        scene: PathBuf,
+        /// Run folder [default: the scene's name with `-run`, in the current folder]
+        #[arg(long)]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        change: Change,
+        /// Go on from the checkpoint in the run folder
+        #[arg(long)]
+        resume: bool,
+        /// Print report.json on standard output
+        #[arg(long)]
+        json: bool,
+    },
+    /// Tell what a scene would do: sizes, memory, what is left out
+    Check {
+        /// Scene file (TOML)
+        scene: PathBuf,
+        #[command(flatten)]
+        change: Change,
+        /// Lattice instead of the scene's: native, a spacing in mm, or nx,ny,nz
+        #[arg(long)]
+        lattice: Option<LatticeSize>,
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Tell what is in a volume file
+    Inspect {
+        /// NIfTI file
+        volume: PathBuf,
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Detect the skin of a volume
+    Skin {
+        /// NIfTI file
+        volume: PathBuf,
+        /// native, a spacing in mm, or nx,ny,nz
+        #[arg(long, default_value = "native")]
+        lattice: LatticeSize,
+        /// Detection rule
+        #[arg(long, value_enum, default_value_t = Mode::Exterior)]
+        mode: Mode,
+        /// How a lattice cell is split
+        #[arg(long, value_enum, default_value_t = Split::Kuhn6)]
+        split: Split,
+        /// Write the triangles (.vtu or .vtp)
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Make a synthetic CT of a torso
+    Phantom {
+        /// Voxels per axis: nx,ny,nz
+        #[arg(long, visible_alias = "lattice", value_parser = size, default_value = "128,128,96")]
+        size: [usize; 3],
+        /// Anatomy and noise vary with it
+        #[arg(long, default_value_t = 0)]
+        seed: u64,
+        /// File to write (.nii or .nii.gz)
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Carry another volume through the deformation of a finished run
+    Resample {
+        /// Scene file of the run
+        scene: PathBuf,
+        /// Run folder; it must hold a checkpoint
+        #[arg(long)]
+        run: PathBuf,
+        /// Volume to deform, in the same world frame [default: the scene's own]
+        #[arg(long)]
+        volume: Option<PathBuf>,
+        /// File to write (.nii or .nii.gz)
+        #[arg(long)]
+        out: PathBuf,
+        #[command(flatten)]
+        change: Change,
+    },
+    /// Make a picture of a volume: its skin from a side, or a slice
+    Render {
+        /// NIfTI file
+        volume: PathBuf,
+        /// File to write (.png)
+        #[arg(long)]
+        out: PathBuf,
+        /// Side from which the skin is seen
+        #[arg(long, value_enum, default_value_t = Side::Anterior, conflicts_with = "slice")]
+        side: Side,
+        /// Slice instead: axial@MM, coronal@MM or sagittal@MM
+        #[arg(long)]
+        slice: Option<String>,
+        /// Window of a slice: level/width in HU
+        #[arg(long, default_value = "40/400", requires = "slice")]
+        window: String,
+        /// Centre of a close-up: x,y,z in mm
+        #[arg(long, requires = "zoom")]
+        focus: Option<String>,
+        /// Size of a close-up, mm
+        #[arg(long, requires = "focus")]
+        zoom: Option<f64>,
+        /// Width and height, pixels
+        #[arg(long, default_value_t = 800)]
+        pixels: usize,
+    },
+    /// Print a scene to start from, or the JSON schema of scenes and reports
+    Scene {
+        #[command(subcommand)]
+        what: SceneCommand,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum SceneCommand {
+    /// A commented scene
+    New,
+    /// JSON schema of a scene
+    Schema,
+    /// Every key, its values and defaults, as Markdown
+    Reference,
+    /// JSON schema of report.json
+    ReportSchema,
+}
+
+/// Changes to a scene from the command line.
+#[derive(Clone, Debug, Default, Group)]
+pub(crate) struct Change {
+    /// Where the solver runs: auto, cpu, reference, gpu
+    #[arg(long)]
+    pub(crate) backend: Option<String>,
+    /// Number of frames
+    #[arg(long)]
+    pub(crate) frames: Option<u32>,
+    /// Change a key of the scene, for example solver.substeps=20
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<Override>,
+    /// Leave a constraint kind out
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub(crate) without: Vec<Kind>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Kind {
+    Distance,
+    Volume,
+    Stc,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Mode {
+    /// The paper's rule, literally
+    Paper,
+    /// All faces between tissue and the rest
+    Boundary,
+    /// The outer skin of the body
+    Exterior,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Split {
+    Kuhn6,
+    Five,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Side {
+    Anterior,
+    Posterior,
+    Left,
+    Right,
+    Superior,
+    Inferior,
+}
+
+fn size(text: &str) -> Result<[usize; 3], String> {
+    let parts: Result<Vec<usize>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    parts
+        .ok()
+        .and_then(|parts| <[usize; 3]>::try_from(parts).ok())
+        .ok_or_else(|| format!("`{text}` must be three whole numbers nx,ny,nz, for example 128,128,96"))
+}

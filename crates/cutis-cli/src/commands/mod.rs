@@ -1,0 +1,43 @@
+//! One function per subcommand: arguments in, library call, what is printed.
+
+mod look;
+mod simulate;
+
+use cutis::{Error, report::Report, scene};
+
+use crate::args::{Command, SceneCommand};
+use crate::terminal::print;
+
+/// Runs a subcommand.
+pub(crate) fn run(command: Command) -> Result<(), Error> {
+    match command {
+        Command::Demo { out, change, json } => simulate::demo(&out, &change, json),
+        Command::Run { scene, out, change, resume, json } => simulate::run(&scene, out, &change, resume, json),
+        Command::Check { scene, change, lattice, json } => simulate::check(&scene, &change, lattice, json),
+        Command::Resample { scene, run, volume, out, change } => {
+            simulate::resample(&scene, &change, cutis::ResampleRequest { run, volume, out })
+        }
+        Command::Inspect { volume, json } => look::inspect(&volume, json),
+        Command::Skin { volume, lattice, mode, split, out, json } => {
+            look::skin(&volume, lattice, mode, split, out.as_deref(), json)
+        }
+        Command::Phantom { size, seed, out } => look::phantom(size, seed, &out),
+        Command::Render { volume, out, side, slice, window, focus, zoom, pixels } => {
+            look::render(&volume, &out, &look::Look { side, slice, window, focus, zoom, pixels })
+        }
+        Command::Scene { what } => {
+            match what {
+                SceneCommand::New => print(scene::template().trim_end()),
+                SceneCommand::Schema => print(&pretty(&scene::schema())),
+                SceneCommand::Reference => print(scene::reference().trim_end()),
+                SceneCommand::ReportSchema => print(&pretty(&Report::json_schema())),
+            }
+            Ok(())
+        }
+    }
+}
+
+/// JSON for people and machines. Serialising plain data cannot fail.
+fn pretty(value: &impl serde::Serialize) -> String {
+    serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"))
+}

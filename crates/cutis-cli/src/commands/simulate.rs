@@ -1,0 +1,140 @@
+//! `demo`, `run`, `check` and `resample`.
+
+use std::path::{Path, PathBuf};
+
+use cutis::report::Report;
+use cutis::volume::sample::LatticeSize;
+use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOptions, Scene};
+
+use super::pretty;
+use crate::args::{Change, Kind};
+use crate::terminal::{Terminal, print};
+
+pub(crate) fn demo(out: &Path, change: &Change, json: bool) -> Result<(), Error> {
+    let loaded = change.applied(cutis::demo(&change.overrides(None))?);
+    finish(&loaded, RunOptions { out: out.into(), resume: false }, json)
+}
+
+pub(crate) fn run(
+    scene: &Path,
+    out: Option<PathBuf>,
+    change: &Change,
+    resume: bool,
+    json: bool,
+) -> Result<(), Error> {
+    let loaded = change.applied(Scene::load(scene, &change.overrides(None))?);
+    let out = out.unwrap_or_else(|| {
+        let mut name = scene.file_stem().unwrap_or_default().to_owned();
+        name.push("-run");
+        name.into()
+    });
+    finish(&loaded, RunOptions { out, resume }, json)
+}
+
+fn finish(loaded: &LoadedScene, options: RunOptions, json: bool) -> Result<(), Error> {
+    let report = cutis::run(loaded, &options, &Terminal::new())?;
+    print(&if json { pretty(&report) } else { summary(&report, &options.out) });
+    Ok(())
+}
+
+fn summary(report: &Report, out: &Path) -> String {
+    let sizes = &report.sizes;
+    let mut lines = vec![
+        format!(
+            "{} vertices, {} edges, {} tetrahedra, {} skin triangles",
+            sizes.vertices, sizes.edges, sizes.tets, sizes.skin_triangles
+        ),
+        format!(
+            "{} frames on {} ({}): {:.1} ms each",
+            report.frames.count, report.backend.name, report.backend.reason, report.frames.ms_mean
+        ),
+    ];
+    lines.extend(report.wounds.iter().map(|w| {
+        format!("wound: {:.2} mm -> {:.2} mm ({:.2} mm in the middle)", w.initial_mm, w.final_mm, w.mid_mm)
+    }));
+    lines.push(format!("run folder: {}", out.display()));
+    if report.scene.output.report {
+        lines.push(format!("look at:    {}", out.join("report.html").display()));
+    }
+    lines.join("\n")
+}
+
+pub(crate) fn check(
+    scene: &Path,
+    change: &Change,
+    lattice: Option<LatticeSize>,
+    json: bool,
+) -> Result<(), Error> {
+    let loaded = change.applied(Scene::load(scene, &change.overrides(lattice))?);
+    let plan = cutis::check(&loaded, &Terminal::new())?;
+    print(&if json { pretty(&plan) } else { table(&plan) });
+    Ok(())
+}
+
+fn table(plan: &Plan) -> String {
+    let sizes = &plan.sizes;
+    let [nx, ny, nz] = sizes.lattice;
+    let mut lines = vec![
+        format!("backend          {} ({}), {} threads", plan.backend.name, plan.backend.reason, plan.backend.threads),
+        format!("lattice          {nx} x {ny} x {nz}"),
+        format!("vertices         {} ({} fixed, {} cut out)", sizes.vertices, sizes.fixed_vertices, sizes.removed_vertices),
+        format!("edges            {}", sizes.edges),
+        format!("tetrahedra       {}", sizes.tets),
+        format!("skin triangles   {}", sizes.skin_triangles),
+        format!("projections      {}", plan.projections),
+        format!("memory, volume   {:.1} MB", plan.volume_bytes as f64 / 1e6),
+    ];
+    for part in &plan.memory {
+        let colors = plan.colors.get(&part.part).map(|n| format!(", {n} colours")).unwrap_or_default();
+        lines.push(format!("memory, {:8} {:.1} MB{colors}", part.part, part.bytes as f64 / 1e6));
+    }
+    lines.push("left out:".into());
+    lines.extend(plan.left_out.iter().map(|line| format!("  {line}")));
+    lines.extend(plan.warnings.iter().map(|line| format!("note: {line}")));
+    lines.join("\n")
+}
+
+pub(crate) fn resample(scene: &Path, change: &Change, request: ResampleRequest) -> Result<(), Error> {
+    let loaded = change.applied(Scene::load(scene, &change.overrides(None))?);
+    let terminal = Terminal::new();
+    let report = cutis::resample_run(&loaded, &request, &terminal)?;
+    if report.folds > 0 {
+        terminal.note(&format!("{} voxels lie in two places of the deformed body at once (folds)", report.folds));
+    }
+    print(&format!("{}: {} voxels inside the deformed body", request.out.display(), report.covered_voxels));
+    Ok(())
+}
+
+impl Change {
+    /// The changes that are overrides of keys, in the order in which they hold.
+    fn overrides(&self, lattice: Option<LatticeSize>) -> Vec<Override> {
+        let mut list = self.set.clone();
+        let mut set = |key: &str, value: String| list.push(Override { key: key.into(), value });
+        if let Some(backend) = &self.backend {
+            set("solver.backend", format!("{backend:?}"));
+        }
+        if let Some(frames) = self.frames {
+            set("run.frames", frames.to_string());
+        }
+        match lattice {
+            Some(LatticeSize::Native) => set("lattice", "{}".into()),
+            Some(LatticeSize::SpacingMm(spacing)) => set("lattice", format!("{{ spacing_mm = {spacing:?} }}")),
+            Some(LatticeSize::Vertices(vertices)) => set("lattice", format!("{{ vertices = {vertices:?} }}")),
+            None => {}
+        }
+        list
+    }
+
+    /// Takes the kinds out that `--without` names.
+    fn applied(&self, mut loaded: LoadedScene) -> LoadedScene {
+        let constraints = &mut loaded.scene.constraints;
+        for kind in &self.without {
+            match kind {
+                Kind::Distance => constraints.distance = None,
+                Kind::Volume => constraints.volume = None,
+                Kind::Stc => constraints.stc = None,
+            }
+        }
+        loaded
+    }
+}

@@ -1,0 +1,92 @@
+//! Checkpoints: the state from which `--resume` goes on, bit for bit.
+//!
+//! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32), vertex count (u64),
+//! positions and velocities (3 × f32 per vertex each, m and m/s, local frame), SHA-256 of all that (32).
+
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+use sha2::{Digest, Sha256};
+
+use crate::{Error, Scene, files};
+
+const MAGIC: &[u8; 8] = b"CUTISCP1";
+const HEADER: usize = 8 + 32 + 4 + 8;
+const SEAL: usize = 32;
+
+/// State after a whole number of frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    /// Frames done.
+    pub frame: u32,
+    /// Local metres.
+    pub positions: Vec<Point3<f32>>,
+    /// m/s.
+    pub velocities: Vec<Vector3<f32>>,
+}
+
+/// Identifies scene and volume, without what may change between two runs that continue each other (number of frames,
+/// outputs, threads).
+pub(crate) fn fingerprint(scene: &Scene, volume_sha256: &str) -> [u8; 32] {
+    let mut scene = scene.clone();
+    scene.run = crate::scene::RunSection::default();
+    scene.output = crate::scene::OutputSection::default();
+    scene.solver.threads = 0;
+    scene.volume.path = None;
+    let text = serde_json::to_string(&scene).unwrap_or_default();
+    Sha256::new().chain_update(env!("CARGO_PKG_VERSION")).chain_update(volume_sha256).chain_update(text).finalize().into()
+}
+
+impl Checkpoint {
+    /// Writes the checkpoint.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file cannot be written.
+    pub(crate) fn write(&self, path: &Path, fingerprint: &[u8; 32]) -> Result<(), Error> {
+        let mut bytes = Vec::with_capacity(HEADER + 24 * self.positions.len() + SEAL);
+        bytes.extend_from_slice(MAGIC);
+        bytes.extend_from_slice(fingerprint);
+        bytes.extend_from_slice(&self.frame.to_le_bytes());
+        bytes.extend_from_slice(&(self.positions.len() as u64).to_le_bytes());
+        let positions = self.positions.iter().flat_map(|p| [p.x, p.y, p.z]);
+        let velocities = self.velocities.iter().flat_map(|v| [v.x, v.y, v.z]);
+        for value in positions.chain(velocities) {
+            bytes.extend_from_slice(&value.to_le_bytes());
+        }
+        let seal = Sha256::digest(&bytes);
+        bytes.extend_from_slice(&seal);
+        files::write(path, &bytes)
+    }
+
+    /// Reads a checkpoint of a scene with `vertices` vertices.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or of another scene.
+    pub(crate) fn read(path: &Path, fingerprint: &[u8; 32], vertices: usize) -> Result<Self, Error> {
+        let bytes = files::read(path)?;
+        let fail = |why: String| Error::Checkpoint { path: path.into(), why };
+        let expected = HEADER + 24 * vertices + SEAL;
+        if bytes.len() < HEADER + SEAL || &bytes[..8] != MAGIC {
+            return Err(fail("it does not begin as one".into()));
+        }
+        if bytes[8..40] != fingerprint[..] {
+            return Err(fail("scene, volume or program version differ from those that wrote it".into()));
+        }
+        if bytes.len() != expected {
+            return Err(fail(format!("it has {} bytes; {vertices} vertices need {expected}", bytes.len())));
+        }
+        let (content, seal) = bytes.split_at(bytes.len() - SEAL);
+        if Sha256::digest(content)[..] != *seal {
+            return Err(fail("its checksum is wrong: the file is damaged".into()));
+        }
+        let frame = u32::from_le_bytes([content[40], content[41], content[42], content[43]]);
+        let values: Vec<f32> =
+            content[HEADER..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let (positions, velocities) = values.split_at(3 * vertices);
+        Ok(Self {
+            frame,
+            positions: positions.chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect(),
+            velocities: velocities.chunks_exact(3).map(|v| Vector3::new(v[0], v[1], v[2])).collect(),
+        })
+    }
+}

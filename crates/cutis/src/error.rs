@@ -1,0 +1,125 @@
+//! What can go wrong between a scene file and a run folder, and whose fault it is.
+
+use std::path::PathBuf;
+
+use cutis_coloring::ColoringError;
+use cutis_constraints::MaterialError;
+use cutis_mesh::MeshError;
+use cutis_render::RenderError;
+use cutis_resample::ResampleError;
+use cutis_solver::SolverError;
+use cutis_solver_cpu::CpuError;
+use cutis_volume::VolumeError;
+
+/// An error of the pipeline.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scene file cannot be read.
+    #[error("{}: cannot read the scene: {why}", file.display())]
+    SceneFile {
+        /// The scene file.
+        file: PathBuf,
+        /// What the system said.
+        why: String,
+    },
+    /// The scene file is not TOML.
+    #[error("{}: not valid TOML: {why}", file.display())]
+    SceneSyntax {
+        /// The scene file.
+        file: PathBuf,
+        /// Line, column and reason.
+        why: String,
+    },
+    /// A key of the scene is unknown or its value cannot be used.
+    #[error("{}: key `{key}`{}: {why}", file.display(), if value.is_empty() { String::new() } else { format!(" = {value}") })]
+    SceneKey {
+        /// The scene file.
+        file: PathBuf,
+        /// Dotted key.
+        key: String,
+        /// The value found, as text; empty if there is none to show.
+        value: String,
+        /// What would be right.
+        why: String,
+    },
+    /// A request from the command line or a caller that cannot be met.
+    #[error("{what}: {why}")]
+    Request {
+        /// The request.
+        what: String,
+        /// What would be right.
+        why: String,
+    },
+    /// The scene names a backend that this build does not have.
+    #[error("backend `{backend}`: {why}")]
+    Backend {
+        /// The backend asked for.
+        backend: String,
+        /// What would be right.
+        why: String,
+    },
+    /// A volume, its file or a table.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// Lattice, skin or incision.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A material parameter.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    /// Grouping of constraints.
+    #[error(transparent)]
+    Coloring(#[from] ColoringError),
+    /// System or time stepping.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    /// The CPU backend.
+    #[error(transparent)]
+    Cpu(#[from] CpuError),
+    /// Resampling.
+    #[error(transparent)]
+    Resample(#[from] ResampleError),
+    /// Pictures.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A file of the run folder.
+    #[error("{}: cannot {action}: {why}", path.display())]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        why: String,
+    },
+    /// A checkpoint that does not belong to this scene or is damaged.
+    #[error("{}: not a checkpoint of this scene: {why}", path.display())]
+    Checkpoint {
+        /// The checkpoint file.
+        path: PathBuf,
+        /// What does not fit.
+        why: String,
+    },
+}
+
+impl Error {
+    /// True if the input or the request is at fault (exit code 2), false if the run itself failed (exit code 1).
+    pub fn is_bad_input(&self) -> bool {
+        match self {
+            Self::SceneFile { .. }
+            | Self::SceneSyntax { .. }
+            | Self::SceneKey { .. }
+            | Self::Request { .. }
+            | Self::Backend { .. }
+            | Self::Checkpoint { .. }
+            | Self::Mesh(_)
+            | Self::Material(_)
+            | Self::Coloring(_) => true,
+            Self::Volume(e) => !matches!(e, VolumeError::Io { action: "write" | "create" | "rename", .. }),
+            Self::Solver(e) => !matches!(e, SolverError::NotFinite { .. }),
+            Self::Cpu(e) => !matches!(e, CpuError::ThreadPool { .. }),
+            Self::Resample(_) | Self::Render(_) | Self::File { .. } => false,
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Files of the run folder: written beside and renamed, so that none is ever half there.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::Error;
+
+/// Writes a whole file under a temporary name in the same folder and renames it.
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    let part = path.with_file_name(name);
+    let result = fs::File::create(&part)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&part, path));
+    result.map_err(|e| {
+        // The error that matters is the first one; a leftover that cannot be removed changes nothing about it.
+        let _ = fs::remove_file(&part);
+        Error::File { path: path.into(), action: "write", why: e.to_string() }
+    })
+}
+
+/// Reads a whole file.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    fs::read(path).map_err(|e| Error::File { path: path.into(), action: "read", why: e.to_string() })
+}
+
+/// Makes a folder and its parents.
+pub(crate) fn create_folder(path: &Path) -> Result<(), Error> {
+    fs::create_dir_all(path).map_err(|e| Error::File {
+        path: path.into(),
+        action: "create the folder",
+        why: e.to_string(),
+    })
+}
+
+/// SHA-256 of a file, hexadecimal, in constant memory.
+pub(crate) fn sha256(path: &Path) -> Result<String, Error> {
+    let error = |e: std::io::Error| Error::File { path: path.into(), action: "read", why: e.to_string() };
+    let mut file = fs::File::open(path).map_err(error)?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer).map_err(error)? {
+            0 => return Ok(hex(&hash.finalize())),
+            n => hash.update(&buffer[..n]),
+        }
+    }
+}
+
+/// SHA-256 of bytes, hexadecimal.
+pub(crate) fn sha256_of(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 of voxels as little-endian int16, hexadecimal, in constant memory.
+pub(crate) fn sha256_of_voxels(voxels: &[i16]) -> String {
+    let mut hash = Sha256::new();
+    let mut buffer = Vec::with_capacity(1 << 16);
+    for block in voxels.chunks(1 << 15) {
+        buffer.clear();
+        buffer.extend(block.iter().flat_map(|v| v.to_le_bytes()));
+        hash.update(&buffer);
+    }
+    hex(&hash.finalize())
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The files of a run folder.
+pub struct RunFolder(pub PathBuf);
+
+macro_rules! paths {
+    ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
+        impl RunFolder { $($(#[$doc])* pub fn $name(&self) -> PathBuf { self.0.join($file) })* }
+    };
+}
+
+paths! {
+    /// Versions, sizes, timings, results.
+    report = "report.json";
+    /// The same for people, with pictures and plots.
+    html = "report.html";
+    /// The CT, carried along by the body.
+    volume = "deformed.nii.gz";
+    /// The deformed skin.
+    skin = "skin.vtu";
+    /// The deformed tetrahedra.
+    tissue = "tissue.vtu";
+    /// One line per frame.
+    frames = "frames.csv";
+    /// The skin before.
+    before = "before.png";
+    /// The skin after.
+    after = "after.png";
+    /// A slice through the wound.
+    slice = "slice.png";
+    /// State from which a run goes on.
+    checkpoint = "checkpoint.bin";
+}

@@ -1,0 +1,105 @@
+//! `report.html`: the report for people; one file, pictures and plots inside.
+
+use std::fmt::Write as _;
+
+use base64::Engine;
+
+use crate::report::{Report, Wound};
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
+h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse}\
+td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top;border-bottom:1px solid #ddd}\
+td.n{text-align:right;font-variant-numeric:tabular-nums}figure{display:inline-block;margin:0 1rem 1rem 0}\
+img{max-width:100%;height:auto}figcaption{color:#555}.warn{background:#fff4d6;padding:.5rem 1rem}pre{background:#f5f5f5;padding:1rem;overflow:auto}";
+
+/// A picture for the page: caption and PNG bytes.
+pub(crate) struct Figure {
+    pub(crate) caption: &'static str,
+    pub(crate) png: Vec<u8>,
+}
+
+/// The page.
+pub(crate) fn page(report: &Report, figures: &[Figure], plots: &[String], scene_toml: &str) -> String {
+    let mut out = String::new();
+    let mut put = |text: &str| out.push_str(text);
+    put("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Cutis run</title><style>");
+    put(STYLE);
+    put("</style></head><body><h1>Cutis run</h1>");
+    put(&summary(report));
+    if !report.warnings.is_empty() {
+        put(&format!("<div class=\"warn\"><b>Note</b><ul>{}</ul></div>", items(&report.warnings)));
+    }
+    for figure in figures {
+        let data = base64::engine::general_purpose::STANDARD.encode(&figure.png);
+        put(&format!(
+            "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{data}\"><figcaption>{0}</figcaption></figure>",
+            escape(figure.caption)
+        ));
+    }
+    for plot in plots {
+        put(&format!("<figure>{plot}</figure>"));
+    }
+    put(&tables(report));
+    if !report.left_out.is_empty() {
+        put(&format!("<h2>Left out by the scene</h2><ul>{}</ul>", items(&report.left_out)));
+    }
+    put(&format!("<h2>Scene as it ran</h2><pre>{}</pre></body></html>\n", escape(scene_toml)));
+    out
+}
+
+fn summary(report: &Report) -> String {
+    let s = &report.sizes;
+    let mut text = format!(
+        "<p>{} vertices, {} edges, {} tetrahedra and {} skin triangles; {} frames on <b>{}</b> ({}, {} threads), {:.1} ms per frame.</p>",
+        s.vertices, s.edges, s.tets, s.skin_triangles, report.frames.count, escape(&report.backend.name),
+        escape(&report.machine.cpu), report.backend.threads, report.frames.ms_mean
+    );
+    for Wound { initial_mm, final_mm, mid_mm, .. } in &report.wounds {
+        let _ = write!(
+            text,
+            "<p>The wound opened from <b>{initial_mm:.2} mm</b> to <b>{final_mm:.2} mm</b> (mean distance of the lips; {mid_mm:.2} mm in the middle).</p>"
+        );
+    }
+    text
+}
+
+fn tables(report: &Report) -> String {
+    let mut out = String::from("<h2>Time per stage</h2><table>");
+    for stage in &report.stages {
+        let _ = write!(out, "<tr><td>{}</td><td class=\"n\">{:.1} ms</td></tr>", escape(&stage.name), stage.ms);
+    }
+    out.push_str("</table><h2>Constraints</h2><table><tr><th>kind</th><th>colours</th><th>RMS error / rest size</th><th>largest</th></tr>");
+    for r in &report.residuals {
+        let colors = report.colors.get(&r.kind).map(usize::to_string).unwrap_or_default();
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td class=\"n\">{colors}</td><td class=\"n\">{:.3e}</td><td class=\"n\">{:.3e}</td></tr>",
+            escape(&r.kind), r.rms, r.max
+        );
+    }
+    out.push_str("</table><h2>Memory of the solver</h2><table>");
+    for part in &report.memory {
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td class=\"n\">{:.1} MB</td></tr>",
+            escape(&part.part), part.bytes as f64 / 1e6
+        );
+    }
+    out.push_str("</table>");
+    if let Some(r) = &report.resample {
+        let _ = write!(
+            out,
+            "<h2>Resampled CT</h2><p>{} voxels inside the deformed body, {} left as air, {} folds.</p>",
+            r.covered_voxels, r.vacated_voxels, r.folds
+        );
+    }
+    out
+}
+
+fn items(lines: &[String]) -> String {
+    lines.iter().map(|line| format!("<li>{}</li>", escape(line))).collect()
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

@@ -1,0 +1,164 @@
+//! What a scene will do, before it does it: sizes, colours, memory, what is left out, and which backend.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+use crate::body::{Body, needs_skin};
+use crate::dynamics::{self, Dynamics};
+use crate::report::{Backend, Clock, MemoryPart, Sizes, Stage};
+use crate::scene::{BackendChoice, LoadedScene};
+use crate::source::{self, Source};
+use crate::{Error, Progress};
+
+/// The plan of a scene, as `cutis check` prints it.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Plan {
+    /// Where the solver will run.
+    pub backend: Backend,
+    /// Element counts.
+    pub sizes: Sizes,
+    /// Colours per constraint kind.
+    pub colors: BTreeMap<String, usize>,
+    /// Memory of the solver by part, bytes.
+    pub memory: Vec<MemoryPart>,
+    /// Bytes of the volume's voxels.
+    pub volume_bytes: usize,
+    /// Frames and projections (constraints × iterations × substeps × frames).
+    pub projections: u64,
+    /// What the scene leaves out, and therefore costs nothing.
+    pub left_out: Vec<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Time that planning took, by stage.
+    pub stages: Vec<Stage>,
+}
+
+/// Everything that a run starts from.
+pub(crate) struct Prepared {
+    pub(crate) source: Source,
+    pub(crate) body: Body,
+    pub(crate) dynamics: Dynamics,
+    pub(crate) plan: Plan,
+}
+
+/// Plans a scene: reads the CT, builds the body and the system, steps nothing and writes nothing.
+///
+/// # Errors
+/// [`Error`] as a run of the scene would give it before its first frame.
+pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Error> {
+    let mut clock = Clock::new(progress);
+    let mut plan = prepare(loaded, &mut clock)?.plan;
+    plan.stages = clock.stages;
+    Ok(plan)
+}
+
+/// Reads the CT, builds body and system.
+pub(crate) fn prepare(loaded: &LoadedScene, clock: &mut Clock<'_>) -> Result<Prepared, Error> {
+    let backend = choose_backend(loaded)?;
+    let source = clock.stage("read the CT", 0, |_| source::load(loaded))?;
+    let body = clock.stage("lattice, skin, incision", 0, |_| Body::build(loaded, &source.volume))?;
+    let dynamics = clock.stage("constraints and colours", 0, |_| dynamics::build(loaded, &body))?;
+    let mut warnings = source.warnings.clone();
+    warnings.extend(body.warnings.iter().cloned());
+    warnings.extend(scene_warnings(loaded, &body));
+    let sizes = sizes(&body, &dynamics);
+    let memory: Vec<MemoryPart> = dynamics
+        .system
+        .bytes()
+        .into_iter()
+        .map(|part| MemoryPart { part: part.name.into(), bytes: part.bytes })
+        .collect();
+    let solver = &loaded.scene.solver;
+    let constraints: usize = dynamics.system.kinds().iter().map(|kind| kind.len()).sum();
+    let per_frame = constraints as u64 * u64::from(solver.iterations) * u64::from(solver.substeps);
+    let plan = Plan {
+        backend,
+        sizes,
+        colors: dynamics.colors.clone(),
+        memory,
+        volume_bytes: 2 * source.volume.voxels().len(),
+        projections: per_frame * u64::from(loaded.scene.run.frames),
+        left_out: left_out(loaded),
+        warnings,
+        stages: Vec::new(),
+    };
+    Ok(Prepared { source, body, dynamics, plan })
+}
+
+fn sizes(body: &Body, dynamics: &Dynamics) -> Sizes {
+    let removed = body.cut.removed.iter().filter(|&&removed| removed).count();
+    let still = dynamics.system.vertices().iter().filter(|v| v.inverse_mass() == 0.0).count();
+    Sizes {
+        lattice: body.mesh.lattice.grid().shape,
+        vertices: body.mesh.positions.len(),
+        edges: body.mesh.edges.len(),
+        tets: body.mesh.tets.len(),
+        skin_triangles: body.skin.len(),
+        removed_vertices: removed,
+        fixed_vertices: still - removed,
+    }
+}
+
+/// The backend that will run, and why. Nothing falls back silently: a backend that this build lacks is refused.
+fn choose_backend(loaded: &LoadedScene) -> Result<Backend, Error> {
+    let solver = &loaded.scene.solver;
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let threads = if solver.threads == 0 { cores } else { solver.threads };
+    let backend = |name: &str, threads, reason: &str| {
+        Ok(Backend { name: name.into(), adapter: None, threads, reason: reason.into() })
+    };
+    match solver.backend {
+        BackendChoice::Auto => backend("cpu", threads, "auto: this build has no GPU backend"),
+        BackendChoice::Cpu => backend("cpu", threads, "the scene asks for it"),
+        BackendChoice::Reference => backend("reference", 1, "the scene asks for it"),
+        BackendChoice::Gpu => Err(Error::Backend {
+            backend: "gpu".into(),
+            why: "this build has no GPU backend; use \"cpu\" or \"auto\"".into(),
+        }),
+    }
+}
+
+/// What the scene does not name. Each line says what is not built for that reason.
+fn left_out(loaded: &LoadedScene) -> Vec<String> {
+    let scene = &loaded.scene;
+    let (constraints, output) = (&scene.constraints, &scene.output);
+    let mut lines = Vec::new();
+    let mut say = |absent: bool, line: &str| {
+        if absent {
+            lines.push(line.to_owned());
+        }
+    };
+    say(constraints.distance.is_none(), "distance: no edge constraints are stored or projected");
+    say(constraints.volume.is_none(), "volume: no tetrahedron constraints are stored or projected");
+    say(constraints.stc.is_none(), "stc: no skin triangle constraints are stored or projected");
+    say(!needs_skin(loaded), "skin: not detected, nothing refers to it");
+    say(scene.incision.is_empty(), "incision: nothing is cut");
+    say(scene.handle.is_empty(), "handle: nothing is dragged");
+    say(scene.solver.iterations == 1, "multipliers: one iteration per substep needs none stored");
+    say(scene.run.checkpoint_every == 0, "checkpoints: none are written");
+    say(!output.volume && !output.pictures, "volume: the CT is not resampled");
+    say(output.pictures && !output.volume, "volume: the CT is resampled for the pictures only and not written");
+    say(!output.surface, "surface: skin.vtu is not written");
+    say(!output.tissue, "tissue: tissue.vtu is not written");
+    say(!output.pictures, "pictures: nothing is rendered");
+    say(!output.report, "report: report.json, report.html and frames.csv are not written");
+    say(true, "gpu: not part of this build");
+    lines
+}
+
+fn scene_warnings(loaded: &LoadedScene, body: &Body) -> Vec<String> {
+    let scene = &loaded.scene;
+    let none = scene.constraints == Default::default();
+    let still = scene.fixed == Default::default();
+    let gravity = scene.solver.gravity_m_s2 != [0.0; 3];
+    let lines = [
+        (none, "no constraint kind is named: nothing holds the tissue together".to_owned()),
+        (still && gravity, "gravity acts and nothing is fixed: the body will fall".to_owned()),
+        (
+            scene.constraints.stc.is_some() && body.skin.is_empty(),
+            "no skin was found: skin tension has nothing to act on".to_owned(),
+        ),
+    ];
+    lines.into_iter().filter(|(holds, _)| *holds).map(|(_, line)| line).collect()
+}

@@ -1,0 +1,24 @@
+//! How a run tells what it is doing, without knowing whether anybody looks.
+
+/// Receives the progress of long work. All methods may be called from worker threads.
+pub trait Progress: Sync {
+    /// A stage begins; it will report up to `total` units (0: unknown).
+    fn begin(&self, stage: &str, total: u64);
+    /// `done` units of the current stage are finished.
+    fn advance(&self, done: u64);
+    /// The current stage is finished.
+    fn end(&self);
+    /// Something that the user should know, said once.
+    fn note(&self, message: &str);
+}
+
+/// Says nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _done: u64) {}
+    fn end(&self) {}
+    fn note(&self, _message: &str) {}
+}

@@ -1,0 +1,263 @@
+//! `report.json`: what ran, on what, how long it took and what came out. Versioned, with a schema.
+
+use std::path::Path;
+use std::time::Instant;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Progress, Scene, files};
+
+/// Version of the report's layout; the number grows when a key changes its meaning or goes.
+pub const SCHEMA: &str = "cutis-report/1";
+
+/// The whole report.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Report {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of this program.
+    pub cutis_version: String,
+    /// Machine that it ran on.
+    pub machine: Machine,
+    /// Files that went in.
+    pub inputs: Vec<Input>,
+    /// The scene as it ran, overrides applied and defaults filled in.
+    pub scene: Scene,
+    /// What the solver ran on.
+    pub backend: Backend,
+    /// Element counts.
+    pub sizes: Sizes,
+    /// Quality of the detected skin, if something needed it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skin: Option<SkinQuality>,
+    /// Colours (groups without shared vertices) per constraint kind; absent kinds were left out.
+    pub colors: std::collections::BTreeMap<String, usize>,
+    /// Memory of the solver by part, bytes.
+    pub memory: Vec<MemoryPart>,
+    /// Time per stage.
+    pub stages: Vec<Stage>,
+    /// Time per frame.
+    pub frames: Frames,
+    /// Opening of each incision.
+    pub wounds: Vec<Wound>,
+    /// Opening of the first incision, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wound: Option<Wound>,
+    /// The resampled CT, if it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resample: Option<Resample>,
+    /// Constraint errors at the end.
+    pub residuals: Vec<KindResidual>,
+    /// Largest distance that a vertex moved, mm.
+    pub max_displacement_mm: f64,
+    /// What the scene left out, and therefore cost nothing.
+    pub left_out: Vec<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// The machine.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Machine {
+    /// Processor, as the system names it.
+    pub cpu: String,
+    /// Logical cores.
+    pub cores: usize,
+    /// Operating system and architecture.
+    pub system: String,
+}
+
+/// A file that went in.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Input {
+    /// As the scene names it.
+    pub path: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+}
+
+/// What the solver ran on.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Backend {
+    /// `cpu` or `reference`.
+    pub name: String,
+    /// GPU adapter; none on a CPU backend.
+    pub adapter: Option<String>,
+    /// Worker threads.
+    pub threads: usize,
+    /// Why this backend.
+    pub reason: String,
+}
+
+/// Element counts.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Sizes {
+    /// Vertices per axis of the whole lattice.
+    pub lattice: [usize; 3],
+    /// Vertices in tissue.
+    pub vertices: usize,
+    /// Lattice edges in tissue.
+    pub edges: usize,
+    /// Tetrahedra in tissue.
+    pub tets: usize,
+    /// Skin triangles.
+    pub skin_triangles: usize,
+    /// Vertices that the incisions took out of all constraints.
+    pub removed_vertices: usize,
+    /// Vertices that do not move.
+    pub fixed_vertices: usize,
+}
+
+/// Quality of the detected skin, before the incisions.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct SkinQuality {
+    /// Triangles.
+    pub triangles: usize,
+    /// Edges of one triangle only, where the scan does not end.
+    pub open_edges: usize,
+    /// Edges of more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Parts that share no vertex.
+    pub components: usize,
+    /// Share of the tissue's boundary that is not outer skin (lungs, bowel, table).
+    pub enclosed_share: f64,
+    /// Share of the iso-surface that has skin on it.
+    pub coverage: f64,
+}
+
+impl From<&cutis_mesh::SkinReport> for SkinQuality {
+    fn from(report: &cutis_mesh::SkinReport) -> Self {
+        Self {
+            triangles: report.triangles,
+            open_edges: report.open_edges - report.open_edges_on_box,
+            non_manifold_edges: report.non_manifold_edges,
+            components: report.components,
+            enclosed_share: report.enclosed_share,
+            coverage: report.coverage,
+        }
+    }
+}
+
+/// Memory of one part of the solver.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct MemoryPart {
+    /// `vertices` or a constraint kind.
+    pub part: String,
+    /// Bytes.
+    pub bytes: usize,
+}
+
+/// Time of one stage.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Stage {
+    /// Name.
+    pub name: String,
+    /// Wall time, ms.
+    pub ms: f64,
+}
+
+/// Time per frame.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Frames {
+    /// Frames that this run computed.
+    pub count: u32,
+    /// Mean wall time, ms; 0 without frames.
+    pub ms_mean: f64,
+    /// Shortest wall time, ms; 0 without frames.
+    pub ms_min: f64,
+}
+
+/// Opening of an incision, mm: distance between its lips.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Wound {
+    /// Mean before the first frame.
+    pub initial_mm: f64,
+    /// Mean after the last one.
+    pub final_mm: f64,
+    /// In the middle of the slit, after the last frame.
+    pub mid_mm: f64,
+    /// In the middle of the slit, before the first frame.
+    pub initial_mid_mm: f64,
+}
+
+/// The resampled CT.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Resample {
+    /// Voxels inside the deformed body.
+    pub covered_voxels: u64,
+    /// Voxels inside two or more deformed tetrahedra: the body overlaps itself there.
+    pub folds: u64,
+    /// Voxels that the body left or the incision took, now air.
+    pub vacated_voxels: u64,
+}
+
+/// Error of one constraint kind.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct KindResidual {
+    /// Constraint kind.
+    pub kind: String,
+    /// Root mean square of C over the rest size.
+    pub rms: f64,
+    /// Largest |C| over the rest size.
+    pub max: f64,
+}
+
+impl Report {
+    /// Writes `report.json`.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|e| Error::File { path: path.into(), action: "write", why: e.to_string() })?;
+        files::write(path, text.as_bytes())
+    }
+
+    /// JSON schema of the report.
+    pub fn json_schema() -> serde_json::Value {
+        schemars::schema_for!(Report).to_value()
+    }
+}
+
+impl Machine {
+    /// This machine.
+    pub fn here() -> Self {
+        let cpu = std::fs::read_to_string("/proc/cpuinfo")
+            .ok()
+            .and_then(|text| {
+                let line = text.lines().find(|line| line.starts_with("model name"))?;
+                Some(line.split_once(':')?.1.trim().to_owned())
+            })
+            .unwrap_or_else(|| "unknown".into());
+        let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+        Self { cpu, cores, system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH) }
+    }
+}
+
+/// Times the stages of a run and tells the user about them.
+pub(crate) struct Clock<'a> {
+    pub(crate) progress: &'a dyn Progress,
+    pub(crate) stages: Vec<Stage>,
+}
+
+impl<'a> Clock<'a> {
+    pub(crate) fn new(progress: &'a dyn Progress) -> Self {
+        Self { progress, stages: Vec::new() }
+    }
+
+    /// Runs one stage of `total` units (0: unknown).
+    pub(crate) fn stage<T>(
+        &mut self,
+        name: &str,
+        total: u64,
+        work: impl FnOnce(&dyn Progress) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        self.progress.begin(name, total);
+        let start = Instant::now();
+        let result = work(self.progress);
+        self.stages.push(Stage { name: name.into(), ms: start.elapsed().as_secs_f64() * 1e3 });
+        self.progress.end();
+        result
+    }
+}

@@ -1,0 +1,57 @@
+//! The scene file: everything that a run depends on, as plain data with units in the key names.
+//!
+//! Positions are world millimetres in the volume's RAS+ frame. Unknown keys are refused. [`Scene::load`] reads a
+//! file, applies overrides and checks every value; the sections are in [`sections`].
+
+mod load;
+mod reference;
+mod sections;
+mod validate;
+
+pub use load::{LoadedScene, Override, schema, template};
+pub use reference::reference;
+pub use sections::*;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One scene: what is simulated and what is written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Deformation model; `"pbd"` is position-based dynamics.
+    #[serde(default)]
+    pub model: Model,
+    /// Where the CT comes from.
+    pub volume: VolumeSection,
+    /// The tetrahedral lattice laid over the volume. Left out: one vertex on every voxel centre.
+    #[serde(default)]
+    pub lattice: LatticeSection,
+    /// What is tissue, and what it weighs.
+    #[serde(default)]
+    pub tissue: TissueSection,
+    /// Which triangles are skin.
+    #[serde(default)]
+    pub skin: SkinSection,
+    /// The constraint kinds; a kind that is left out costs nothing.
+    #[serde(default)]
+    pub constraints: ConstraintsSection,
+    /// What does not move.
+    #[serde(default)]
+    pub fixed: FixedSection,
+    /// Cuts, made before the first frame.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub incision: Vec<IncisionSection>,
+    /// Spheres of tissue that are dragged along.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub handle: Vec<HandleSection>,
+    /// Time stepping.
+    #[serde(default)]
+    pub solver: SolverSection,
+    /// How long to run.
+    #[serde(default)]
+    pub run: RunSection,
+    /// What to write. Left out: everything but the tissue mesh.
+    #[serde(default)]
+    pub output: OutputSection,
+}

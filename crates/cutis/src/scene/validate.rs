@@ -1,0 +1,154 @@
+//! Ranges: every number of a scene is checked here, once, and named with its key when it is out of range.
+
+use std::path::Path;
+
+use super::*;
+use crate::Error;
+
+/// Names the file and collects nothing: the first bad value is reported.
+struct Check<'a> {
+    file: &'a Path,
+}
+
+impl Check<'_> {
+    fn require(&self, ok: bool, key: &str, value: impl ToString, why: &str) -> Result<(), Error> {
+        if ok {
+            return Ok(());
+        }
+        Err(Error::SceneKey { file: self.file.into(), key: key.into(), value: value.to_string(), why: why.into() })
+    }
+
+    fn positive(&self, key: &str, value: f64) -> Result<(), Error> {
+        self.require(value.is_finite() && value > 0.0, key, value, "must be a finite number above 0")
+    }
+
+    fn not_negative(&self, key: &str, value: f64) -> Result<(), Error> {
+        self.require(value.is_finite() && value >= 0.0, key, value, "must be a finite number, 0 or more")
+    }
+
+    fn share(&self, key: &str, value: f64) -> Result<(), Error> {
+        self.require((0.0..=1.0).contains(&value), key, value, "must lie between 0 and 1")
+    }
+
+    fn point(&self, key: &str, value: [f64; 3]) -> Result<(), Error> {
+        let finite = value.iter().all(|v| v.is_finite());
+        self.require(finite, key, format!("{value:?}"), "must be three finite numbers")
+    }
+
+    fn plane(&self, key: &str, plane: &PlaneSection) -> Result<(), Error> {
+        self.point(&format!("{key}.point_mm"), plane.point_mm)?;
+        self.point(&format!("{key}.normal"), plane.normal)?;
+        let length = plane.normal.iter().map(|v| v * v).sum::<f64>();
+        let normal = format!("{:?}", plane.normal);
+        self.require(length > 0.0 && length.is_finite(), &format!("{key}.normal"), normal, "must not be the zero vector")
+    }
+}
+
+impl Scene {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`Error::SceneKey`] with the first key whose value cannot be used.
+    pub(super) fn validate(&self, file: &Path) -> Result<(), Error> {
+        let check = Check { file };
+        self.validate_body(&check)?;
+        self.validate_constraints(&check)?;
+        for (n, i) in self.incision.iter().enumerate() {
+            check.point(&format!("incision[{n}].from_mm"), i.from_mm)?;
+            check.point(&format!("incision[{n}].to_mm"), i.to_mm)?;
+            check.positive(&format!("incision[{n}].depth_mm"), i.depth_mm)?;
+            check.positive(&format!("incision[{n}].width_mm"), i.width_mm)?;
+            let to = format!("{:?}", i.to_mm);
+            check.require(i.from_mm != i.to_mm, &format!("incision[{n}].to_mm"), to, "must differ from from_mm")?;
+        }
+        for (n, h) in self.handle.iter().enumerate() {
+            check.point(&format!("handle[{n}].at_mm"), h.at_mm)?;
+            check.point(&format!("handle[{n}].move_mm"), h.move_mm)?;
+            check.positive(&format!("handle[{n}].radius_mm"), h.radius_mm)?;
+            check.positive(&format!("handle[{n}].over_s"), h.over_s)?;
+        }
+        let s = &self.solver;
+        check.positive("solver.dt_s", s.dt_s)?;
+        check.require(s.substeps > 0, "solver.substeps", s.substeps, "must be 1 or more")?;
+        check.require(s.iterations > 0, "solver.iterations", s.iterations, "must be 1 or more")?;
+        check.require(s.threads <= 1024, "solver.threads", s.threads, "must be at most 1024; 0 takes all cores")?;
+        check.point("solver.gravity_m_s2", s.gravity_m_s2)?;
+        check.not_negative("solver.damping_per_s", s.damping_per_s)
+    }
+
+    fn validate_body(&self, check: &Check<'_>) -> Result<(), Error> {
+        let v = &self.volume;
+        match (&v.path, &v.phantom) {
+            (Some(path), None) => {
+                let name = path.to_string_lossy();
+                check.require(!name.is_empty(), "volume.path", "", "must name a NIfTI file")?;
+            }
+            (None, Some(_)) => {}
+            _ => {
+                let why = "must have exactly one of `path` (a NIfTI file) and `phantom` (a size and a seed)";
+                check.require(false, "volume", "", why)?;
+            }
+        }
+        let l = &self.lattice;
+        check.require(
+            l.spacing_mm.is_none() || l.vertices.is_none(),
+            "lattice",
+            "",
+            "must have at most one of `spacing_mm` and `vertices`",
+        )?;
+        if let Some(spacing) = l.spacing_mm {
+            check.positive("lattice.spacing_mm", spacing)?;
+        }
+        if let Some(n) = l.vertices {
+            let why = "must be at least 2 along each axis";
+            check.require(n.iter().all(|&n| n >= 2), "lattice.vertices", format!("{n:?}"), why)?;
+        }
+        let air = self.tissue.air_below_hu;
+        check.require(air.is_finite(), "tissue.air_below_hu", air, "must be a finite HU value")?;
+        for (n, plane) in self.tissue.cut_planes.iter().enumerate() {
+            check.plane(&format!("tissue.cut_planes[{n}]"), plane)?;
+        }
+        let bone = self.fixed.bone_above_hu.unwrap_or(0.0);
+        check.require(bone.is_finite(), "fixed.bone_above_hu", bone, "must be a finite HU value")?;
+        for (n, plane) in self.fixed.planes.iter().enumerate() {
+            check.plane(&format!("fixed.planes[{n}]"), plane)?;
+        }
+        for (n, b) in self.fixed.boxes.iter().enumerate() {
+            check.point(&format!("fixed.boxes[{n}].min_mm"), b.min_mm)?;
+            check.point(&format!("fixed.boxes[{n}].max_mm"), b.max_mm)?;
+            let ordered = b.min_mm.iter().zip(&b.max_mm).all(|(low, high)| low <= high);
+            let max = format!("{:?}", b.max_mm);
+            check.require(ordered, &format!("fixed.boxes[{n}].max_mm"), max, "must not lie below min_mm")?;
+        }
+        Ok(())
+    }
+
+    fn validate_constraints(&self, check: &Check<'_>) -> Result<(), Error> {
+        let c = &self.constraints;
+        if let Some(d) = &c.distance {
+            check.positive("constraints.distance.youngs_modulus_pa", d.youngs_modulus_pa)?;
+            check.share("constraints.distance.stiffness", d.stiffness)?;
+        }
+        if let Some(v) = &c.volume {
+            check.positive("constraints.volume.bulk_modulus_pa", v.bulk_modulus_pa)?;
+            check.share("constraints.volume.stiffness", v.stiffness)?;
+        }
+        let Some(s) = &c.stc else { return Ok(()) };
+        check.positive("constraints.stc.area_modulus_n_per_m", s.area_modulus_n_per_m)?;
+        check.share("constraints.stc.stiffness", s.stiffness)?;
+        check.not_negative("constraints.stc.amplification", s.amplification)?;
+        check.positive("constraints.stc.rest_area_scale", s.rest_area_scale)?;
+        let paper_in_xpbd = s.form == StcForm::Paper && self.solver.formulation == FormulationChoice::Xpbd;
+        let why = "works with solver.formulation = \"pbd\" only; use \"energy\" with xpbd";
+        check.require(!paper_in_xpbd, "constraints.stc.form", "paper", why)?;
+        let positive_stiffness = s.form == StcForm::Energy || s.stiffness > 0.0;
+        let why = "must be above 0 for the paper form, whose clamp is 1/stiffness";
+        check.require(positive_stiffness, "constraints.stc.stiffness", s.stiffness, why)?;
+        if let Some(near) = &s.near_incision {
+            check.positive("constraints.stc.near_incision.radius_mm", near.radius_mm)?;
+            check.positive("constraints.stc.near_incision.rest_area_factor", near.rest_area_factor)?;
+            check.positive("constraints.stc.near_incision.stiffness_factor", near.stiffness_factor)?;
+        }
+        Ok(())
+    }
+}
