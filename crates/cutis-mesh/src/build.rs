@@ -15,7 +15,8 @@ pub const NO_VERTEX: u32 = u32::MAX;
 /// What of a lattice becomes a mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct Tissue<'a> {
-    /// Per lattice point, in grid order: true if the point is air (alpha = 0).
+    /// Per lattice point, in grid order: true if the point is air. With the transfer table from −449 to 6 HU that is a value *below* −449 HU;
+    /// a point of exactly −449 HU is tissue (published counts of skin triangles rest on this).
     pub air: &'a [bool],
     /// Everything strictly inside one of these is left out, as if it were air.
     pub cut_away: &'a [HalfSpace],

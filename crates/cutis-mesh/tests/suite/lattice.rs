@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cutis_mesh::{HalfSpace, Lattice, MeshError, Split, TetMesh, Tissue};
+use cutis_mesh::{HalfSpace, Lattice, MeshError, SkinMode, SkinOptions, Split, TetMesh, Tissue, skin};
 use cutis_volume::{Affine, Grid};
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
@@ -211,5 +211,31 @@ fn scaled_and_turned_lattices_stay_positive() {
         assert!(mesh.tet_volumes().iter().all(|&volume| volume > 0.0));
         let middle = mesh.positions.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords) / 60.0;
         assert!(Point3::from(middle).coords.norm() < 1e-4 * scale as f32);
+    }
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let lattice = lattice([33, 30, 37], [2.0, 2.0, 3.0], Split::Kuhn6);
+    // Blobs and holes of a few steps.
+    let wave = |p: [f64; 3]| (p[0] / 7.0).sin() + (p[1] / 5.0).cos() + (p[2] / 9.0).sin();
+    let air = air(&lattice, |p| wave(p) > -0.4);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mesh = mesh(&lattice, &air);
+            let bits = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect::<Vec<_>>();
+            let skins = [SkinMode::Paper, SkinMode::Boundary, SkinMode::Exterior].map(|mode| {
+                let skin = skin::detect(&lattice, &air, mode, &SkinOptions::default()).unwrap();
+                (skin.triangles, skin.report)
+            });
+            let figures = [mesh.tet_volumes(), mesh.edge_volumes(), mesh.masses(&|hu| hu)].map(bits);
+            (mesh.boundary(), mesh.edge_classes(&mesh.edges), mesh.tets, mesh.edges, skins, figures)
+        })
+    };
+    let one = run(1);
+    assert!(one.0.len() > 1000);
+    for threads in [2, 3, 8] {
+        assert!(run(threads) == one, "{threads} threads");
     }
 }
