@@ -35,7 +35,7 @@ pub fn extent(corners: &[Point3<f64>; 8], direction: &Vector3<f64>) -> f64 {
 
 /// Pixels per pixel of the font that suit a picture.
 pub fn text_scale(image: &Image) -> usize {
-    (image.width.min(image.height) / 260).clamp(1, 8)
+    ((image.width + image.height) / 480).clamp(1, 8)
 }
 
 /// Orientation letters at the four edges, and a scale bar at the bottom left.

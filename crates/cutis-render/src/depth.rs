@@ -18,7 +18,7 @@ const UNIT_MM: f32 = 0.01;
 /// [`View::depth`](crate::View::depth).
 ///
 /// # Errors
-/// [`RenderError::Setting`] for lengths that are not above zero, [`RenderError::EmptyVolume`].
+/// [`RenderError::Setting`] for lengths that are not above zero.
 pub fn skin_depth(
     volume: &Volume,
     threshold_hu: f32,
@@ -30,7 +30,7 @@ pub fn skin_depth(
             return Err(RenderError::Setting { key, value, expected: "a length above zero" });
         }
     }
-    let field = Field::new(volume)?;
+    let field = Field::new(volume);
     let (grid, stride) = coarse_grid(volume.grid(), spacing_mm)?;
     let fine = volume.grid();
     let air: Vec<bool> = (0..grid.len())
@@ -142,7 +142,7 @@ mod tests {
         };
         let volume = Volume::new(grid, (0..grid.len()).map(hollow).collect(), 1.0, 0.0).unwrap();
         let depth = skin_depth(&volume, -300.0, 1.0, 20.0).unwrap();
-        let field = Field::new(&depth).unwrap();
+        let field = Field::new(&depth);
         for r in [8.0, 12.0, 20.0, 24.0] {
             let at = field.at_mm(Point3::new(0.6 * r, 0.8 * r, 0.0));
             assert!((f64::from(at) - (25.0 - r)).abs() < 1.5, "{at} at {r}");

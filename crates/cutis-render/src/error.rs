@@ -45,12 +45,6 @@ pub enum RenderError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// The volume has no voxels.
-    #[error("a volume of shape {shape:?} has nothing to show")]
-    EmptyVolume {
-        /// Voxels per axis.
-        shape: [usize; 3],
-    },
     /// A picture could not be encoded or written.
     #[error("{path}: cannot write the picture: {source}")]
     Write {

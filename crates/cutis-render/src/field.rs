@@ -3,8 +3,6 @@
 use cutis_volume::{AIR_HU, Volume};
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::RenderError;
-
 /// A volume as a continuous field. Padding below air counts as air.
 pub struct Field<'a> {
     volume: &'a Volume,
@@ -12,19 +10,12 @@ pub struct Field<'a> {
     shape: [usize; 3],
     slope: f32,
     intercept: f32,
-    floor_hu: f32,
 }
 
 impl<'a> Field<'a> {
-    /// # Errors
-    /// [`RenderError::EmptyVolume`].
-    pub fn new(volume: &'a Volume) -> Result<Self, RenderError> {
-        let shape = volume.grid().shape;
-        if volume.grid().is_empty() {
-            return Err(RenderError::EmptyVolume { shape });
-        }
+    pub fn new(volume: &'a Volume) -> Self {
         let (slope, intercept) = (volume.slope(), volume.intercept());
-        Ok(Self { volume, voxels: volume.voxels(), shape, slope, intercept, floor_hu: AIR_HU })
+        Self { volume, voxels: volume.voxels(), shape: volume.grid().shape, slope, intercept }
     }
 
     pub fn shape(&self) -> [usize; 3] {
@@ -34,7 +25,7 @@ impl<'a> Field<'a> {
     /// HU of one voxel, padding as air.
     #[inline]
     pub fn voxel(&self, index: usize) -> f32 {
-        (self.slope * f32::from(self.voxels[index]) + self.intercept).max(self.floor_hu)
+        (self.slope * f32::from(self.voxels[index]) + self.intercept).max(AIR_HU)
     }
 
     /// HU at a continuous index, clamped to the grid.
@@ -65,13 +56,24 @@ impl<'a> Field<'a> {
         self.at(self.volume.grid().affine.to_index(mm))
     }
 
-    /// ∂HU/∂index by central differences over one voxel to either side.
+    /// ∂HU/∂index, smoothed: central differences over one voxel to either side, averaged over the position and its six
+    /// neighbours. Without the average the steps between voxels show as rings on the skin.
     pub fn index_gradient(&self, position: Point3<f64>) -> Vector3<f64> {
-        Vector3::from_fn(|axis, _| {
-            let mut step = Vector3::zeros();
-            step[axis] = 1.0;
-            f64::from(self.at(position + step) - self.at(position - step)) / 2.0
-        })
+        let unit = |axis: usize| Vector3::from_fn(|row, _| if row == axis { 1.0 } else { 0.0 });
+        let at = |offset: Vector3<f64>| f64::from(self.at(position + offset));
+        let mut sum = Vector3::zeros();
+        for axis in 0..3 {
+            let along = unit(axis);
+            sum[axis] += at(along) - at(-along) + at(along * 2.0) - at(along * -2.0);
+            // Each diagonal neighbour serves the differences along both its axes.
+            let other = (axis + 1) % 3;
+            let across = unit(other);
+            let [pp, pm, mp, mm] =
+                [at(along + across), at(along - across), at(across - along), at(-along - across)];
+            sum[axis] += pp + pm - mp - mm;
+            sum[other] += pp + mp - pm - mm;
+        }
+        sum / 14.0
     }
 
     /// Index per mm: the linear part of world → index.

@@ -4,26 +4,24 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::field::Field;
 use crate::raymarch::Hit;
-use crate::{Axes, RenderError, Rgb, View};
+use crate::{Axes, Rgb, View};
 
 /// Behind the body.
 pub const BACKGROUND: Rgb = [24, 26, 32];
 const SKIN: Rgb = [232, 186, 160];
-/// Where little light comes, skin and tissue turn to this.
-const CLEFT: Rgb = [96, 22, 18];
 /// Tissue of a wound by HU: fat, connective tissue, muscle, bone.
 const TISSUE: [(f32, Rgb); 6] = [
-    (-180.0, [246, 214, 128]),
-    (-70.0, [240, 190, 110]),
+    (-180.0, [250, 206, 124]),
+    (-70.0, [242, 178, 100]),
     (-20.0, [214, 92, 74]),
     (60.0, [168, 38, 34]),
     (160.0, [190, 90, 74]),
     (400.0, [238, 228, 206]),
 ];
 /// Directions in which ambient light is looked for, spread over a sphere.
-const DIRECTIONS: usize = 24;
+const DIRECTIONS: usize = 16;
 /// Parts of the occlusion's reach at which tissue is looked for.
-const REACHES: [f64; 4] = [0.12, 0.3, 0.6, 1.0];
+const REACHES: [f64; 3] = [0.2, 0.5, 1.0];
 
 /// Linear light, 0 to 1.
 type Light = Vector3<f32>;
@@ -43,8 +41,9 @@ pub struct Shader<'a> {
 }
 
 impl<'a> Shader<'a> {
-    pub fn new(field: &'a Field<'a>, view: &View<'a>, axes: &Axes) -> Result<Self, RenderError> {
-        let depth = view.depth.map(Field::new).transpose()?.map(|depth| {
+    pub fn new(field: &'a Field<'a>, view: &View<'a>, axes: &Axes) -> Self {
+        let depth = view.depth.map(|volume| {
+            let depth = Field::new(volume);
             let spacing = depth.finest_mm();
             (depth, spacing)
         });
@@ -56,7 +55,7 @@ impl<'a> Shader<'a> {
             let radius = (1.0 - z * z).sqrt();
             Vector3::new(radius * cos, radius * sin, z)
         });
-        Ok(Self {
+        Self {
             field,
             depth,
             threshold_hu: view.threshold_hu,
@@ -67,7 +66,7 @@ impl<'a> Shader<'a> {
             finest_mm: field.finest_mm(),
             toward: axes.toward,
             light: (axes.toward * 0.75 + axes.up * 0.55 - axes.right * 0.4).normalize(),
-        })
+        }
     }
 
     pub fn background(&self) -> Light {
@@ -82,8 +81,9 @@ impl<'a> Shader<'a> {
         let normal = self.normal(hit.index);
         let base = self.albedo(hit.index, &normal);
         let open = self.openness(hit.index, &normal);
-        let cleft = decode(CLEFT) * base.max();
-        let surface = base * open + cleft * ((1.0 - open) * 0.35);
+        // Light that has been through flesh is red: the less of it comes, the more so.
+        let root = open.sqrt();
+        let surface = base.component_mul(&Light::new(open, open * root, open * root * root.sqrt()));
         let diffuse = normal.dot(&self.light).max(0.0) as f32;
         let facing = normal.dot(&self.toward).max(0.0) as f32;
         let half = (self.light + self.toward).normalize();

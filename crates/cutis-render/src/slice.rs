@@ -100,11 +100,10 @@ impl SliceView<'_> {
 /// not cubes keep their aspect. Outside the volume it is black.
 ///
 /// # Errors
-/// [`RenderError::ImageSize`], [`RenderError::Setting`] with the key, [`RenderError::VertexOutOfRange`],
-/// [`RenderError::EmptyVolume`].
+/// [`RenderError::ImageSize`], [`RenderError::Setting`] with the key, [`RenderError::VertexOutOfRange`].
 pub fn slice(volume: &Volume, view: &SliceView<'_>) -> Result<Image, RenderError> {
     view.validate()?;
-    let field = Field::new(volume)?;
+    let field = Field::new(volume);
     let axes = view.axes()?;
     let corners = field.corners_mm();
     let [width_mm, height_mm] = match view.focus {

@@ -45,7 +45,7 @@ pub struct View<'a> {
     pub skin_mm: f64,
     /// Reach of the ambient occlusion that darkens clefts, mm. Default 12; 0 switches it off.
     pub occlusion_mm: f64,
-    /// Rays per pixel along each axis, 1 to 4. Default 2.
+    /// Rays per pixel along each axis where the picture has an edge, 1 to 4. Default 2.
     pub samples: usize,
     /// Orientation letters and a scale bar.
     pub annotate: bool,
