@@ -149,9 +149,12 @@ impl Table {
         }
     }
 
-    /// True where the table is 0: for an alpha table, air.
+    /// For an alpha table: true below the point at which it rises from 0.
+    ///
+    /// The foot of the ramp itself (−449 HU in the preset) is tissue. The paper leaves that open; the counts of its rule that an
+    /// independent program gave on real scans hold with this reading only.
     pub fn is_air(&self, hu: f32) -> bool {
-        self.at(hu) == 0.0
+        self.points.iter().take_while(|point| point.1 == 0.0).last().is_some_and(|foot| hu < foot.0)
     }
 
     /// Unit of the values.
@@ -201,7 +204,8 @@ mod tests {
     #[test]
     fn presets_have_the_published_values() {
         let alpha = Table::preset(TableKind::Alpha, "paper").unwrap();
-        assert!(alpha.is_air(-449.0) && alpha.is_air(-3024.0) && !alpha.is_air(-448.9));
+        assert!(alpha.is_air(-449.1) && alpha.is_air(-3024.0) && !alpha.is_air(-449.0));
+        assert!(!Table::new("1", &[(0.0, 1.0)]).unwrap().is_air(-3024.0));
         assert_eq!([alpha.at(6.0), alpha.at(3000.0), alpha.at(-221.5)], [1.0, 1.0, 0.5]);
         let density = Table::preset(TableKind::Density, "schneider2000").unwrap();
         assert_eq!(

@@ -35,7 +35,7 @@ impl Body {
         let grid = sample::lattice_grid(volume.grid(), scene.lattice.size())?;
         let lattice = Lattice::new(grid, scene.lattice.split.into())?;
         let hu = sample::to_grid(volume, &grid);
-        let air: Vec<bool> = hu.iter().map(|&hu| hu <= scene.tissue.air_below_hu).collect();
+        let air: Vec<bool> = hu.iter().map(|&hu| hu < scene.tissue.air_below_hu).collect();
         let cut_away: Vec<HalfSpace> = scene.tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = scene.tissue.keep == Keep::Largest;
         let tissue = Tissue { air: &air, cut_away: &cut_away, largest_component };

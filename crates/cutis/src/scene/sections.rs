@@ -67,7 +67,7 @@ pub enum SplitChoice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TissueSection {
-    /// HU at and below which a vertex is air.
+    /// HU below which a vertex is air.
     pub air_below_hu: f32,
     /// Which connected parts are simulated.
     pub keep: Keep,
