@@ -124,7 +124,11 @@ fn a_small_file_cannot_promise_a_large_volume() {
     assert!(matches!(image.refused(), VolumeError::Truncated { .. }));
     let packed = gzip(&image.bytes);
     assert!(packed.len() < 1024);
-    assert!(matches!(read("scan.nii.gz", &packed), Err(VolumeError::Truncated { .. })));
+    // Refused for what so short a file can hold at most, before the 48 bytes that it does hold are unpacked.
+    let most = packed.len() as u64 * 1032 - 352;
+    assert!(
+        matches!(read("scan.nii.gz", &packed), Err(VolumeError::Truncated { found_bytes, .. }) if found_bytes == most)
+    );
     // Overflow of the product is possible in NIfTI-2 alone.
     let mut large = vec![0; 600];
     large[..4].copy_from_slice(&540i32.to_le_bytes());

@@ -111,6 +111,20 @@ fn a_header_that_f32_cannot_hold_still_places_the_volume() {
 }
 
 #[test]
+fn a_volume_of_many_portions_comes_back_with_its_figures() {
+    let volume = ramp([70, 65, 61]);
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["v.nii", "v.nii.gz"] {
+        let path = folder.path().join(name);
+        nifti::write(&path, &volume).unwrap();
+        let back = nifti::read(&path).unwrap();
+        assert!(back.volume == volume);
+        let sum: i64 = volume.voxels().iter().map(|&stored| i64::from(stored)).sum();
+        assert_eq!((back.stats.min, back.stats.max, back.stats.sum), (-1024.0, 3071.0, sum as f64));
+    }
+}
+
+#[test]
 fn what_cannot_be_written_is_refused_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let volume = ramp([4, 3, 2]);

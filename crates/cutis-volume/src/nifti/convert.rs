@@ -124,9 +124,9 @@ impl Converter {
         }
     }
 
-    /// Makes room for `additional` voxels; false if the machine has none.
-    pub(super) fn reserve(&mut self, additional: usize) -> bool {
-        self.voxels.try_reserve_exact(additional).is_ok()
+    /// Makes room for `total` voxels; false if the machine has none.
+    pub(super) fn reserve(&mut self, total: usize) -> bool {
+        self.voxels.try_reserve_exact(total.saturating_sub(self.voxels.len())).is_ok()
     }
 
     /// Takes whole voxels.

@@ -6,6 +6,7 @@ mod gzip;
 mod header;
 mod placement;
 mod read;
+mod source;
 mod write;
 
 pub use read::{HuStats, Loaded, read};
