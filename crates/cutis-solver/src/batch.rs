@@ -19,11 +19,11 @@ pub trait Store<T> {
 }
 
 impl<T: Copy> Store<T> for &mut [Vertex<T>] {
-    #[inline]
+    #[inline(always)]
     fn load(&self, index: u32) -> Vertex<T> {
         self[index as usize]
     }
-    #[inline]
+    #[inline(always)]
     fn store(&mut self, index: u32, vertex: Vertex<T>) {
         self[index as usize] = vertex;
     }

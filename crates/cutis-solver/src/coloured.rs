@@ -117,14 +117,14 @@ pub struct SharedVertices<'a, T> {
 }
 
 impl<T: Copy> Store<T> for SharedVertices<'_, T> {
-    #[inline]
+    #[inline(always)]
     fn load(&self, index: u32) -> Vertex<T> {
         // SAFETY: a batch only passes its own indices, all below the number of vertices, and no other thread moves
         // a vertex of the constraint in work (top of the file).
         unsafe { *self.vertices.add(index as usize) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn store(&mut self, index: u32, vertex: Vertex<T>) {
         // SAFETY: as for `load`.
         unsafe { *self.vertices.add(index as usize) = vertex }

@@ -22,14 +22,14 @@ pub struct Xpbd<T> {
 }
 
 impl<T: Real> Rule<T> for Pbd {
-    #[inline]
+    #[inline(always)]
     fn multiplier(self, c: T, weighted_square: T, stiffness: T, _multiplier: T) -> T {
         quotient_or_zero(-(stiffness * c), weighted_square)
     }
 }
 
 impl<T: Real> Rule<T> for Xpbd<T> {
-    #[inline]
+    #[inline(always)]
     fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T {
         let compliance = stiffness * self.inverse_h_squared;
         quotient_or_zero(-c - compliance * multiplier, weighted_square + compliance)
@@ -38,7 +38,7 @@ impl<T: Real> Rule<T> for Xpbd<T> {
 
 /// `numerator / denominator`, or zero where the denominator is zero or the quotient is not finite: a constraint whose
 /// vertices cannot move, or whose gradient vanishes, moves nothing.
-#[inline]
+#[inline(always)]
 fn quotient_or_zero<T: Real>(numerator: T, denominator: T) -> T {
     let quotient = numerator / denominator;
     // The product is zero for a finite quotient and NaN for any other.
@@ -58,7 +58,7 @@ pub struct Projection<T, const N: usize> {
 /// Projects constraint `C` at positions `x` with inverse masses `w`.
 ///
 /// A pure function: it knows no index, no storage and no thread. `T` may be a number or a vector of lanes.
-#[inline]
+#[inline(always)]
 pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
     x: &[Point3<T>; N],
     w: &[T; N],

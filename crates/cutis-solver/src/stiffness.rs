@@ -14,7 +14,7 @@ pub enum Values<T> {
 }
 
 impl<T: Copy> Values<T> {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn at(&self, index: usize) -> T {
         match self {
             Self::Uniform(value) => *value,

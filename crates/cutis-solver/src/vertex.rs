@@ -11,31 +11,31 @@ pub struct Vertex<T>([T; 4]);
 
 impl<T: Scalar> Vertex<T> {
     /// A vertex at `position` (m) with `inverse_mass` (1/kg).
-    #[inline]
+    #[inline(always)]
     pub fn new(position: Point3<T>, inverse_mass: T) -> Self {
         Self([position.x, position.y, position.z, inverse_mass])
     }
 
     /// Position in metres, relative to [`System::origin`](crate::System::origin).
-    #[inline]
+    #[inline(always)]
     pub fn position(&self) -> Point3<T> {
         Point3::new(self.0[0], self.0[1], self.0[2])
     }
 
     /// Inverse mass in 1/kg; 0 = fixed or kinematic.
-    #[inline]
+    #[inline(always)]
     pub fn inverse_mass(&self) -> T {
         self.0[3]
     }
 
     /// Moves the vertex; the mass stays.
-    #[inline]
+    #[inline(always)]
     pub fn set_position(&mut self, position: Point3<T>) {
         *self = Self::new(position, self.inverse_mass());
     }
 
     /// Whether all three coordinates are finite.
-    #[inline]
+    #[inline(always)]
     pub fn is_finite(&self) -> bool {
         self.0[..3].iter().all(|value| value.is_finite())
     }
