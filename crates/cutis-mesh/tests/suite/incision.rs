@@ -109,6 +109,10 @@ fn lips_are_apart_however_thin_or_oblique_the_slit() {
             assert!(!reached(&mesh, start, window).is_disjoint(&other));
             cut.apply(&mut opened, &mut skin);
             assert!(reached(&opened, start, window).is_disjoint(&other), "{from:?} {to:?} {width}");
+            // Whatever is not removed hangs on a tet, and every edge on a tet of some volume.
+            let masses = opened.masses(&|_| 1000.0);
+            assert!(cut.removed.iter().zip(&masses).all(|(&removed, &mass)| removed == (mass == 0.0)));
+            assert!(opened.edge_volumes().iter().all(|&share| share > 0.0));
             let joined: BTreeSet<[u32; 2]> = opened.edges.iter().copied().collect();
             let both = |a: u32, b: u32| joined.contains(&[a.min(b), a.max(b)]);
             assert!(!lip.iter().any(|&a| other.iter().any(|&b| both(a, b))));
@@ -238,4 +242,23 @@ fn unusable_incisions_are_refused_by_name() {
         Cut::plan(&mesh, &[], &[incision(a, b, 6.0, 4.0)]),
         Err(MeshError::IncisionOffSkin { .. })
     ));
+}
+
+#[test]
+fn vertices_left_without_a_tet_are_removed() {
+    // Two slits that cross at a sharp angle: near the crossing, every tet between them goes.
+    let (mesh, triangles) = block(2.0, Split::Kuhn6);
+    let rising = incision([10.0, 17.0, 20.0], [50.0, 23.0, 20.0], 8.0, 0.1);
+    let falling = incision([10.0, 23.0, 20.0], [50.0, 17.0, 20.0], 8.0, 0.1);
+    let cut = Cut::plan(&mesh, &triangles, &[rising, falling]).unwrap();
+    let (mut opened, mut skin) = (mesh.clone(), triangles.clone());
+    cut.apply(&mut opened, &mut skin);
+    let masses = opened.masses(&|_| 1000.0);
+    let between = mesh
+        .positions
+        .iter()
+        .map(|p| mesh.frame.to_mm(*p))
+        .map(|mm| (mm.y - 20.0).abs() < 1e-3 && (mm.x - 34.0).abs() < 1e-3 && mm.z > 13.0);
+    assert!(between.zip(&cut.removed).any(|(between, removed)| between && *removed));
+    assert!(cut.removed.iter().zip(&masses).all(|(&removed, &mass)| removed == (mass == 0.0)));
 }
