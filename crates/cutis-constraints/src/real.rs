@@ -2,6 +2,7 @@
 
 use bytemuck::Pod;
 use nalgebra::{RealField, SimdRealField};
+use simba::simd::{SimdValue, WideF32x4, WideF64x4};
 
 /// A number, or a vector of lanes, in which a constraint can be evaluated.
 ///
@@ -22,6 +23,10 @@ pub trait Scalar: Real<SimdBool = bool> + RealField + Pod {
     fn from_f64(value: f64) -> Self;
     /// Exact for `f32` and `f64`.
     fn to_f64(self) -> f64;
+    /// Several numbers side by side, to evaluate as many constraints at once with the bits of one at a time.
+    type Lanes: Real + SimdValue<Element = Self>;
+    /// Lanes that hold `value(0)`, `value(1)`, …
+    fn lanes(value: impl FnMut(usize) -> Self) -> Self::Lanes;
 }
 
 impl Scalar for f32 {
@@ -31,6 +36,11 @@ impl Scalar for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
+    type Lanes = WideF32x4;
+    #[inline(always)]
+    fn lanes(value: impl FnMut(usize) -> Self) -> WideF32x4 {
+        std::array::from_fn::<_, 4, _>(value).into()
+    }
 }
 
 impl Scalar for f64 {
@@ -39,5 +49,10 @@ impl Scalar for f64 {
     }
     fn to_f64(self) -> f64 {
         self
+    }
+    type Lanes = WideF64x4;
+    #[inline(always)]
+    fn lanes(value: impl FnMut(usize) -> Self) -> WideF64x4 {
+        std::array::from_fn::<_, 4, _>(value).into()
     }
 }

@@ -1,14 +1,18 @@
-//! Storage of one kind of constraint: flat arrays ordered by colour, and the loop over a range of them.
+//! Storage of one kind of constraint: flat arrays ordered by colour, and the loops over a range of them, scalar for the
+//! reference and in lanes for the threads.
 
 use std::marker::PhantomData;
 use std::ops::Range;
 
 use cutis_coloring::Groups;
-use cutis_constraints::{Constraint, Scalar};
+use cutis_constraints::{Constraint, Params, Scalar};
 use nalgebra::Point3;
+use simba::simd::SimdValue;
 
 use crate::coloured::SharedVertices;
-use crate::{ConstraintSet, Pbd, Residual, Rule, SolverError, Step, Stiffness, Vertex, Xpbd, project};
+use crate::{
+    ConstraintSet, Pbd, Residual, Rule, SolverError, Step, Stiffness, Values, Vertex, Xpbd, project,
+};
 
 /// Where a loop over constraints reads and moves vertices.
 pub trait Store<T> {
@@ -101,19 +105,11 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         self.indices[k].map(|i| vertices[i as usize].position())
     }
 
-    fn run<S: Store<T>>(&self, range: Range<usize>, store: S, step: Step<T>, multipliers: &mut [T]) {
-        match step {
-            Step::Pbd => self.sweep(range, store, Pbd, multipliers),
-            Step::Xpbd { inverse_h_squared } => {
-                self.sweep(range, store, Xpbd { inverse_h_squared }, multipliers);
-            }
-        }
-    }
-
-    fn sweep<S: Store<T>, R: Rule<T>>(
+    /// Projects one constraint after the other.
+    fn one_by_one<S: Store<T>, R: Rule<T>>(
         &self,
         range: Range<usize>,
-        mut store: S,
+        store: &mut S,
         rule: R,
         multipliers: &mut [T],
     ) {
@@ -132,6 +128,59 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
                 store.store(tuple[i], Vertex::new(x[i] + done.corrections[i], w[i]));
             }
         }
+    }
+
+    /// Projects constraints of one colour side by side, as many at once as there are lanes, and the rest one by one:
+    /// the same bits, since they share no vertex and each lane does what the scalar does.
+    fn side_by_side<S: Store<T>, R: Rule<T>, L: Rule<T::Lanes>>(
+        &self,
+        range: Range<usize>,
+        mut store: S,
+        rule: R,
+        lane_rule: L,
+        multipliers: &mut [T],
+    ) {
+        let lanes = T::Lanes::LANES;
+        let stiffness = self.stiffness.values();
+        let groups = range.len() / lanes;
+        let (mut rest, keeps) = (range.clone(), !multipliers.is_empty());
+        for group in 0..groups {
+            let first = range.start + group * lanes;
+            let tuples = &self.indices[first..first + lanes];
+            let params = &self.params[first..first + lanes];
+            let mut x = [Point3::origin(); N];
+            let mut w = [T::Lanes::splat(T::zero()); N];
+            for i in 0..N {
+                let column = |axis: usize| T::lanes(|lane| store.load(tuples[lane][i]).component(axis));
+                x[i] = Point3::new(column(0), column(1), column(2));
+                w[i] = column(3);
+            }
+            let params = Params::from_fn(|j| T::lanes(|lane| params[lane].as_ref()[j]));
+            let stiffness = match stiffness {
+                Values::Uniform(value) => T::Lanes::splat(*value),
+                Values::Each(values) => T::lanes(|lane| values[first + lane]),
+            };
+            let offset = group * lanes;
+            let multiplier =
+                if keeps { T::lanes(|lane| multipliers[offset + lane]) } else { T::Lanes::splat(T::zero()) };
+            let done = project::<C, N, T::Lanes, L>(&x, &w, &params, lane_rule, stiffness, multiplier);
+            if keeps {
+                let sum: T::Lanes = multiplier + done.multiplier;
+                for lane in 0..lanes {
+                    multipliers[offset + lane] = sum.extract(lane);
+                }
+            }
+            for i in 0..N {
+                let moved = x[i] + done.corrections[i];
+                for lane in 0..lanes {
+                    let position = moved.map(|component| component.extract(lane));
+                    store.store(tuples[lane][i], Vertex::new(position, w[i].extract(lane)));
+                }
+            }
+            rest.start = first + lanes;
+        }
+        let multipliers = if keeps { &mut multipliers[groups * lanes..] } else { multipliers };
+        self.one_by_one(rest, &mut store, rule, multipliers);
     }
 }
 
@@ -153,8 +202,19 @@ fn check_tuple(
 }
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, C::Params<T>> {
-    fn project(&self, range: Range<usize>, vertices: &mut [Vertex<T>], step: Step<T>, multipliers: &mut [T]) {
-        self.run(range, vertices, step, multipliers);
+    fn project(
+        &self,
+        range: Range<usize>,
+        mut vertices: &mut [Vertex<T>],
+        step: Step<T>,
+        multipliers: &mut [T],
+    ) {
+        match step {
+            Step::Pbd => self.one_by_one(range, &mut vertices, Pbd, multipliers),
+            Step::Xpbd { inverse_h_squared } => {
+                self.one_by_one(range, &mut vertices, Xpbd { inverse_h_squared }, multipliers);
+            }
+        }
     }
 
     fn project_shared(
@@ -164,7 +224,13 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
         step: Step<T>,
         multipliers: &mut [T],
     ) {
-        self.run(range, vertices, step, multipliers);
+        match step {
+            Step::Pbd => self.side_by_side(range, vertices, Pbd, Pbd, multipliers),
+            Step::Xpbd { inverse_h_squared } => {
+                let lanes = Xpbd { inverse_h_squared: T::Lanes::splat(inverse_h_squared) };
+                self.side_by_side(range, vertices, Xpbd { inverse_h_squared }, lanes, multipliers);
+            }
+        }
     }
 
     fn vertex_count(&self) -> usize {
@@ -214,8 +280,8 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
 
     fn bytes(&self) -> usize {
         let stiffness = match self.stiffness.values() {
-            crate::Values::Uniform(_) => 0,
-            crate::Values::Each(values) => size_of_val(values.as_slice()),
+            Values::Uniform(_) => 0,
+            Values::Each(values) => size_of_val(values.as_slice()),
         };
         size_of_val(self.offsets.as_slice())
             + size_of_val(self.indices.as_slice())

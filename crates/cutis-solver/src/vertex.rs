@@ -28,6 +28,12 @@ impl<T: Scalar> Vertex<T> {
         self.0[3]
     }
 
+    /// One of the four numbers: x, y, z, inverse mass.
+    #[inline(always)]
+    pub(crate) fn component(&self, index: usize) -> T {
+        self.0[index]
+    }
+
     /// Moves the vertex; the mass stays.
     #[inline(always)]
     pub fn set_position(&mut self, position: Point3<T>) {
