@@ -173,7 +173,7 @@ impl Span {
 
 /// A tick of a linear axis, with the decimals that its step needs.
 fn linear(at: f64, step: f64) -> String {
-    if step >= 1e6 || step < 1e-4 {
+    if !(1e-4..1e6).contains(&step) {
         return number(if at.abs() < step / 2.0 { 0.0 } else { at }, 3);
     }
     let decimals = (-step.log10().floor()).max(0.0) as usize;

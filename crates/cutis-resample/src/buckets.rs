@@ -23,11 +23,8 @@ impl Buckets {
     pub fn new(count: usize, slabs: usize, slabs_of: impl Fn(usize) -> Range<usize> + Sync) -> Self {
         let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
             let tets = chunk * CHUNK..count.min((chunk + 1) * CHUNK);
-            let touched: Vec<(u32, u32)> = tets
-                .clone()
-                .map(&slabs_of)
-                .map(|range| (range.start as u32, range.end as u32))
-                .collect();
+            let touched: Vec<(u32, u32)> =
+                tets.clone().map(&slabs_of).map(|range| (range.start as u32, range.end as u32)).collect();
             let mut offsets = vec![0_u32; slabs + 1];
             for &(start, end) in &touched {
                 for slab in start..end {

@@ -4,137 +4,193 @@ use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 
-/// Barycentric coordinates of a tet as linear functions `λ(x) = constant + gradient · x` of the continuous voxel index.
+/// Share of the tolerance that covers the rounding of `f64`, so that a centre on a shared face is inside both tets.
+const ROUNDING: f64 = 1.0 / 1024.0;
+
+/// A deformed tet over the voxel grid. Its barycentric coordinates are linear functions `λ(x) = constant + gradient · x` of the
+/// continuous voxel index.
 ///
 /// A centre counts as inside when no face has it further out than the tolerance, a length in voxels. With the rounding of
 /// `f32` positions as tolerance no centre falls between two tets that share a face.
 pub struct TetRaster {
     constant: [f64; 4],
-    /// ∂λ/∂i, ∂λ/∂j, ∂λ/∂k of the four corners.
-    gradient: [[f64; 4]; 3],
-    /// The tolerance in units of each coordinate: tolerance · |∇λ|.
-    slack: [f64; 4],
-    /// 1/∂λ/∂i; a huge positive number where that is zero.
-    inverse_x: [f64; 4],
+    gradient: [Vector3<f64>; 4],
+    /// Where a row enters the tet: the largest of four columns.
+    enter: Crossings,
+    /// Where it leaves: the smallest of four columns.
+    leave: Crossings,
     low: [f64; 3],
     high: [f64; 3],
 }
 
-/// How firmly a tet holds a voxel centre.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub enum Hold {
-    /// Outside by less than the tolerance.
-    Near,
-    /// Inside, or on a face, edge or corner.
-    Inside,
+/// Columns at which row `(j, k)` crosses the four faces: `constant + by_j · j + by_k · k`. A face that the row crosses in the
+/// other direction has an infinite constant and takes no part.
+struct Crossings {
+    constant: [f64; 4],
+    by_j: [f64; 4],
+    by_k: [f64; 4],
+    /// The tolerance as a number of columns, towards the inside.
+    slack: [f64; 4],
+}
+
+/// Columns, as first and end, of a row by how firmly the tet holds their centres; each range lies in the one before.
+#[derive(Clone, Copy)]
+pub struct Row {
+    /// Inside, or outside by no more than the tolerance.
+    pub near: (usize, usize),
+    /// Inside, or on a face, edge or corner, as far as `f64` can tell.
+    pub inside: (usize, usize),
     /// Inside by more than the tolerance.
-    Strict,
+    pub strict: (usize, usize),
 }
 
 impl TetRaster {
     /// `None` for a tet without volume.
+    #[inline]
     pub fn new(corners: &[Point3<f64>; 4], tolerance: f64) -> Option<Self> {
-        let edge: [Vector3<f64>; 3] = std::array::from_fn(|i| corners[i + 1] - corners[0]);
-        let normal = [edge[1].cross(&edge[2]), edge[2].cross(&edge[0]), edge[0].cross(&edge[1])];
-        let scale = 1.0 / edge[0].dot(&normal[0]);
-        let [g1, g2, g3] = normal.map(|n| n * scale);
-        let g = [-(g1 + g2 + g3), g1, g2, g3];
-        if !g.iter().all(|v| v.iter().all(|c| c.is_finite())) {
+        let [a, b, c, d] = corners;
+        let (ab, ac, ad) = (b - a, c - a, d - a);
+        let (n1, n2, n3) = (ac.cross(&ad), ad.cross(&ab), ab.cross(&ac));
+        let scale = 1.0 / ab.dot(&n1);
+        let (g1, g2, g3) = (n1 * scale, n2 * scale, n3 * scale);
+        let gradient = [-(g1 + g2 + g3), g1, g2, g3];
+        if !(gradient[0].abs() + g1.abs() + g2.abs() + g3.abs()).sum().is_finite() {
             return None;
         }
-        let from = corners[0].coords;
-        let offset = |i: usize| if i == 0 { 1.0 } else { 0.0 };
-        let at = |bound: fn(f64, f64) -> f64| {
-            let reduce = |axis: usize| corners.iter().map(|c| c[axis]).reduce(bound).unwrap_or(0.0);
-            [reduce(0), reduce(1), reduce(2)]
-        };
-        Some(Self {
-            constant: std::array::from_fn(|i| offset(i) - g[i].dot(&from)),
-            gradient: std::array::from_fn(|axis| g.map(|v| v[axis])),
-            slack: g.map(|v| tolerance * v.norm()),
-            inverse_x: g.map(|v| if v.x == 0.0 { 1e300 } else { 1.0 / v.x }),
-            low: at(f64::min).map(|v| v - tolerance),
-            high: at(f64::max).map(|v| v + tolerance),
-        })
+        let mut constant = [1.0, 0.0, 0.0, 0.0];
+        let mut enter = Crossings::none(f64::NEG_INFINITY);
+        let mut leave = Crossings::none(f64::INFINITY);
+        for corner in 0..4 {
+            let g = &gradient[corner];
+            constant[corner] -= g.dot(&a.coords);
+            // A face along the row is crossed far away, on the side that keeps or drops the whole row; the bound keeps the
+            // products finite.
+            let along = if g.x.abs() < 1e-200 { 1e-200 } else { g.x };
+            let crossings = if along > 0.0 { &mut enter } else { &mut leave };
+            let per_column = 1.0 / along;
+            crossings.slack[corner] = tolerance * g.norm() * per_column;
+            crossings.constant[corner] = -constant[corner] * per_column - crossings.slack[corner];
+            crossings.by_j[corner] = -g.y * per_column;
+            crossings.by_k[corner] = -g.z * per_column;
+        }
+        let mut raster = Self { constant, gradient, enter, leave, low: [0.0; 3], high: [0.0; 3] };
+        for axis in 0..3 {
+            raster.low[axis] = less(less(a[axis], b[axis]), less(c[axis], d[axis])) - tolerance;
+            raster.high[axis] = more(more(a[axis], b[axis]), more(c[axis], d[axis])) + tolerance;
+        }
+        Some(raster)
     }
 
-    /// Visits the rows of `region` that hold centres of this tet: `visit(j, k, i_range, λ at i = 0 of the row)`.
-    #[inline]
-    pub fn rows(
-        &self,
-        region: &[Range<usize>; 3],
-        mut visit: impl FnMut(usize, usize, Range<usize>, [f64; 4]),
-    ) {
-        let [columns, rows, slices] =
-            [0, 1, 2].map(|axis| covered(self.low[axis], self.high[axis], &region[axis]));
-        for k in slices {
-            for j in rows.clone() {
-                let (y, z) = (j as f64, k as f64);
-                let base: [f64; 4] = std::array::from_fn(|c| {
-                    self.constant[c] + self.gradient[1][c] * y + self.gradient[2][c] * z
-                });
-                let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-                for c in 0..4 {
-                    let crossing = (-self.slack[c] - base[c]) * self.inverse_x[c];
-                    if self.inverse_x[c] > 0.0 {
-                        low = if crossing > low { crossing } else { low };
-                    } else {
-                        high = if crossing < high { crossing } else { high };
-                    }
-                }
-                let range = covered(low, high, &columns);
-                if !range.is_empty() {
-                    visit(j, k, range, base);
+    /// Visits the rows of `region` that come near the tet: `visit(j, k, row)`.
+    #[inline(always)]
+    pub fn rows(&self, region: &[Range<usize>; 3], mut visit: impl FnMut(usize, usize, RowCrossings<'_>)) {
+        let span =
+            |axis: usize| covered(self.low[axis], self.high[axis], region[axis].start, region[axis].end);
+        let (columns, rows, slices) = (span(0), span(1), span(2));
+        for k in slices.0..slices.1 {
+            let (enter_slice, leave_slice) = (self.enter.slice(k as f64), self.leave.slice(k as f64));
+            for j in rows.0..rows.1 {
+                let enter = self.enter.row(&enter_slice, j as f64);
+                let leave = self.leave.row(&leave_slice, j as f64);
+                let near = covered(largest(&enter), smallest(&leave), columns.0, columns.1);
+                if near.0 < near.1 {
+                    visit(j, k, RowCrossings { raster: self, enter, leave, near });
                 }
             }
         }
     }
 
-    /// How the tet holds column `i` of a row visited by [`TetRaster::rows`].
-    #[inline]
-    pub fn hold(&self, base: &[f64; 4], i: usize) -> Hold {
-        let lambda = self.lambda(base, i);
-        let (mut inside, mut strict) = (true, true);
-        for c in 0..4 {
-            inside &= lambda[c] >= 0.0;
-            strict &= lambda[c] > self.slack[c];
-        }
-        match (inside, strict) {
-            (_, true) => Hold::Strict,
-            (true, _) => Hold::Inside,
-            _ => Hold::Near,
-        }
+    /// Barycentric coordinates of a centre.
+    pub fn lambda(&self, centre: [f64; 3]) -> [f64; 4] {
+        std::array::from_fn(|c| self.constant[c] + self.gradient[c].dot(&Vector3::from(centre)))
     }
 
     /// ∇λ of a corner.
+    #[inline]
     pub fn gradient_of(&self, corner: usize) -> Vector3<f64> {
-        Vector3::new(self.gradient[0][corner], self.gradient[1][corner], self.gradient[2][corner])
+        self.gradient[corner]
     }
 
     /// λ of a corner at voxel index (0, 0, 0).
+    #[inline]
     pub fn constant_of(&self, corner: usize) -> f64 {
         self.constant[corner]
     }
+}
 
-    /// Barycentric coordinates of column `i` of a row.
+impl Crossings {
     #[inline]
-    pub fn lambda(&self, base: &[f64; 4], i: usize) -> [f64; 4] {
-        let x = i as f64;
-        std::array::from_fn(|c| base[c] + self.gradient[0][c] * x)
+    fn none(far: f64) -> Self {
+        Self { constant: [far; 4], by_j: [0.0; 4], by_k: [0.0; 4], slack: [0.0; 4] }
+    }
+
+    #[inline]
+    fn slice(&self, k: f64) -> [f64; 4] {
+        std::array::from_fn(|c| self.constant[c] + self.by_k[c] * k)
+    }
+
+    #[inline]
+    fn row(&self, slice: &[f64; 4], j: f64) -> [f64; 4] {
+        std::array::from_fn(|c| slice[c] + self.by_j[c] * j)
     }
 }
 
-/// The integers of `within` between `low` and `high`, both included.
+/// One row and where it meets the tet's faces.
+pub struct RowCrossings<'a> {
+    raster: &'a TetRaster,
+    enter: [f64; 4],
+    leave: [f64; 4],
+    /// Columns, as first and end, that are inside or outside by no more than the tolerance.
+    pub near: (usize, usize),
+}
+
+impl RowCrossings<'_> {
+    /// The columns by how firmly the tet holds them.
+    #[inline]
+    pub fn firmness(&self) -> Row {
+        let level = |times: f64| {
+            let enter = std::array::from_fn(|c| self.enter[c] + times * self.raster.enter.slack[c]);
+            let leave = std::array::from_fn(|c| self.leave[c] + times * self.raster.leave.slack[c]);
+            covered(largest(&enter), smallest(&leave), self.near.0, self.near.1)
+        };
+        Row { near: self.near, inside: level(1.0 - ROUNDING), strict: level(2.0) }
+    }
+}
+
+/// The smaller number, without the care for NaN that costs [`f64::min`] three instructions.
 #[inline]
-fn covered(low: f64, high: f64, within: &Range<usize>) -> Range<usize> {
-    let first = within.start as f64;
-    let last = within.end as f64 - 1.0;
-    let low = if low > first { low } else { first };
-    let high = if high < last { high } else { last };
-    // Both are non-negative where there is something to cover, so that the conversion's truncation is a floor.
-    let floor = low as usize;
-    let start = floor + usize::from((floor as f64) < low);
-    if low <= high { start..high as usize + 1 } else { start..start }
+fn less(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger number.
+#[inline]
+fn more(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline]
+fn smallest(x: &[f64; 4]) -> f64 {
+    less(less(x[0], x[1]), less(x[2], x[3]))
+}
+
+#[inline]
+fn largest(x: &[f64; 4]) -> f64 {
+    more(more(x[0], x[1]), more(x[2], x[3]))
+}
+
+/// The integers of `start..end` between `low` and `high`, both included, as first and end.
+#[inline]
+fn covered(low: f64, high: f64, start: usize, end: usize) -> (usize, usize) {
+    let low = more(low, start as f64);
+    let high = less(high, end as f64 - 1.0);
+    if low <= high {
+        // Both lie in the range, which is not negative, so that the conversion's truncation is a floor.
+        let floor = low as usize;
+        (floor + usize::from((floor as f64) < low), high as usize + 1)
+    } else {
+        (start, start)
+    }
 }
 
 #[cfg(test)]
@@ -143,13 +199,17 @@ mod tests {
 
     #[test]
     fn covered_keeps_both_ends_and_stays_within() {
-        assert_eq!(covered(1.0, 3.0, &(0..10)), 1..4);
-        assert_eq!(covered(1.1, 2.9, &(0..10)), 2..3);
-        assert_eq!(covered(-7.0, 99.0, &(2..5)), 2..5);
-        assert!(covered(3.2, 3.8, &(0..10)).is_empty());
-        assert!(covered(12.0, 14.0, &(0..10)).is_empty());
-        assert!(covered(-3.0, -1.0, &(0..10)).is_empty());
-        assert!(covered(f64::NAN, 1.0, &(0..0)).is_empty());
+        let covered = |low, high, within: Range<usize>| {
+            let (first, end) = covered(low, high, within.start, within.end);
+            first..end
+        };
+        assert_eq!(covered(1.0, 3.0, 0..10), 1..4);
+        assert_eq!(covered(1.1, 2.9, 0..10), 2..3);
+        assert_eq!(covered(-7.0, 99.0, 2..5), 2..5);
+        assert!(covered(3.2, 3.8, 0..10).is_empty());
+        assert!(covered(12.0, 14.0, 0..10).is_empty());
+        assert!(covered(-3.0, -1.0, 0..10).is_empty());
+        assert!(covered(f64::NAN, 1.0, 0..0).is_empty());
     }
 
     #[test]
@@ -160,9 +220,10 @@ mod tests {
         for corners in [corners, flipped] {
             let raster = TetRaster::new(&corners, 1e-9).unwrap();
             let mut found = 0;
-            raster.rows(&[0..10, 0..10, 0..10], |_, _, range, base| {
-                found += range.clone().filter(|&i| raster.hold(&base, i) == Hold::Strict).count();
-                assert!(range.clone().all(|i| raster.hold(&base, i) != Hold::Near));
+            raster.rows(&[0..10, 0..10, 0..10], |_, _, row| {
+                let row = row.firmness();
+                found += row.strict.1 - row.strict.0;
+                assert_eq!((row.near, row.inside), (row.strict, row.strict), "no centre lies near a face");
             });
             let mut expected = 0;
             let all: f64 = volume(corners).abs();

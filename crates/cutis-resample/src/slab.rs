@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::raster::{Hold, TetRaster};
+use crate::raster::TetRaster;
 use crate::report::ResampleReport;
 use crate::sample::trilinear;
 use crate::space::IndexSpace;
@@ -52,36 +52,44 @@ impl<'a> Slab<'a> {
     pub fn deform(&mut self, tet: usize) {
         let Source { warp, space, voxels, shape, .. } = *self.source;
         let vertices = warp.tets[tet].map(|v| v as usize);
-        let deformed = vertices.map(|v| space.index(warp.deformed[v]));
+        let [a, b, c, d] = vertices;
+        let place = |positions: &[Point3<f32>]| {
+            [
+                space.index(positions[a]),
+                space.index(positions[b]),
+                space.index(positions[c]),
+                space.index(positions[d]),
+            ]
+        };
+        let deformed = place(warp.deformed);
         let Some(raster) = TetRaster::new(&deformed, space.tolerance) else { return };
-        let inverse =
-            warp.tet_moved(tet).then(|| RestMap::new(&raster, vertices.map(|v| space.index(warp.rest[v]))));
+        let inverse = warp.tet_moved(tet).then(|| RestMap::new(&raster, place(warp.rest)));
         let in_body = tet < warp.body_tets;
         let region = self.region.clone();
-        raster.rows(&region, |j, k, range, base| {
-            let row = self.row(j, k);
-            for i in range {
-                let at = row + i - region[0].start;
-                let hold = raster.hold(&base, i);
-                let state = &mut self.state[at];
-                if in_body && hold == Hold::Strict && *state & STRICT_COUNT < 2 {
-                    *state += 1;
+        raster.rows(&region, |j, k, row| {
+            let row = row.firmness();
+            let first = self.row(j, k);
+            let at = |i: usize| first + i - region[0].start;
+            if in_body {
+                for state in &mut self.state[at(row.strict.0)..at(row.strict.1)] {
+                    *state += u8::from(*state & STRICT_COUNT < 2);
                 }
-                let claim = if hold == Hold::Near { NEAR } else { INSIDE };
+            }
+            for i in row.near.0..row.near.1 {
+                let inside = (row.inside.0..row.inside.1).contains(&i);
+                let claim = if inside { INSIDE } else { NEAR };
+                let state = &mut self.state[at(i)];
                 // The first tet wins, and a tet that holds the centre wins over one that only comes near it.
-                if *state & INSIDE != 0 || *state & claim != 0 {
+                if *state & (INSIDE | claim) != 0 {
                     continue;
                 }
                 *state = *state & !MOVED | claim;
-                self.values[at] = match &inverse {
+                self.values[at(i)] = match &inverse {
                     None => voxels[i + shape[0] * (j + shape[1] * k)],
                     Some(map) => {
                         *state |= MOVED;
-                        let rest = if hold == Hold::Near {
-                            map.nearest(raster.lambda(&base, i))
-                        } else {
-                            map.at([i, j, k].map(|index| index as f64))
-                        };
+                        let centre = [i as f64, j as f64, k as f64];
+                        let rest = if inside { map.at(centre) } else { map.nearest(raster.lambda(centre)) };
                         trilinear(voxels, shape, rest)
                     }
                 };
@@ -95,9 +103,9 @@ impl<'a> Slab<'a> {
         let rest = vertices.map(|v| space.index(warp.rest[v as usize]));
         let Some(raster) = TetRaster::new(&rest, space.tolerance) else { return };
         let region = self.region.clone();
-        raster.rows(&region, |j, k, range, _| {
-            let row = self.row(j, k);
-            for at in row + range.start - region[0].start..row + range.end - region[0].start {
+        raster.rows(&region, |j, k, row| {
+            let first = self.row(j, k);
+            for at in first + row.near.0 - region[0].start..first + row.near.1 - region[0].start {
                 if self.state[at] & (NEAR | INSIDE | VACATED) == 0 {
                     self.state[at] = VACATED;
                     self.values[at] = air;

@@ -36,6 +36,7 @@ pub struct Warp<'a> {
 
 impl Warp<'_> {
     /// True if a corner of the tet is not where it was, down to the last bit.
+    #[inline]
     pub(crate) fn tet_moved(&self, tet: usize) -> bool {
         self.tets[tet].iter().any(|&v| self.rest[v as usize] != self.deformed[v as usize])
     }
@@ -123,9 +124,13 @@ fn resample_in_slabs(
     let slices = region[2].clone();
     let slabs = slices.len().div_ceil(slab_slices);
     let touched = |positions: &[Point3<f32>], tet: &[u32; 4]| {
-        let z = tet.map(|v| space.slice(positions[v as usize]));
-        let low = z.into_iter().fold(f64::INFINITY, f64::min) - space.tolerance;
-        let high = z.into_iter().fold(f64::NEG_INFINITY, f64::max) + space.tolerance;
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &v in tet {
+            let z = space.slice(positions[v as usize]);
+            low = if z < low { z } else { low };
+            high = if z > high { z } else { high };
+        }
+        let (low, high) = (low - space.tolerance, high + space.tolerance);
         let (first, end) = (slices.start as f64, slices.end as f64);
         if high < first || low >= end {
             return 0..0;
