@@ -2,6 +2,7 @@
 
 mod deny;
 mod python;
+mod results;
 mod spdx;
 mod steps;
 mod tidy;
@@ -20,6 +21,7 @@ usage: cargo xtask COMMAND
   tidy                layers, file headers, unsafe, paths named in the docs, links, manifests
   licences            licences, bans and sources of every dependency, by deny.toml
   python              outputs and awkward inputs compared with nibabel and SimpleITK
+  results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
   publish --dry-run   packages every crate as for crates.io and builds it from the package";
 
 fn main() -> ExitCode {
@@ -43,6 +45,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["tidy"] => tidy::run(&workspace),
         ["licences"] => deny::run(&workspace),
         ["python"] => steps::build_program(&workspace).and_then(|()| python::run(&workspace)),
+        ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
         ["publish", "--dry-run"] => steps::publish_dry_run(&workspace),
         ["publish"] => bail!(
             "only `cargo xtask publish --dry-run` is offered; a release is made by `cargo publish --workspace`"

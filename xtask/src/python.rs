@@ -10,10 +10,7 @@ use crate::workspace::{Workspace, execute};
 pub fn run(workspace: &Workspace) -> Result<()> {
     let target = workspace.target_dir()?;
     let python = environment(workspace, &target.join("venv"))?;
-    let program = target.join("release").join(format!("cutis{}", std::env::consts::EXE_SUFFIX));
-    if !program.is_file() {
-        bail!("{} is missing; build it with `cargo build --release -p cutis-cli`", program.display());
-    }
+    let program = workspace.program()?;
     for script in scripts(&workspace.root.join("tests/python"))? {
         let mut command = workspace.command(&python);
         execute(command.arg(&script).env("CUTIS_PROGRAM", &program).env("PYTHONDONTWRITEBYTECODE", "1"))?;

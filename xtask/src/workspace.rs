@@ -68,6 +68,28 @@ impl Workspace {
         serde_json::from_slice(&output.stdout).context("cargo metadata did not print JSON")
     }
 
+    /// The released `cutis` program.
+    pub fn program(&self) -> Result<PathBuf> {
+        let program =
+            self.target_dir()?.join("release").join(format!("cutis{}", std::env::consts::EXE_SUFFIX));
+        if !program.is_file() {
+            bail!("{} is missing; build it with `cargo build --release -p cutis-cli`", program.display());
+        }
+        Ok(program)
+    }
+
+    /// The folder of real volumes: `CUTIS_TEST_DATA`, else `shared/data` beside the checkout. None if there is none, an
+    /// error in CI.
+    pub fn test_data(&self) -> Result<Option<PathBuf>> {
+        let folder = std::env::var_os("CUTIS_TEST_DATA")
+            .map_or_else(|| self.root.join("../shared/data"), PathBuf::from);
+        match folder.is_dir() {
+            true => Ok(Some(folder)),
+            false if self.ci => bail!("{} is missing; in CI the real volumes must be there", folder.display()),
+            false => Ok(None),
+        }
+    }
+
     /// Where builds go; follows `CARGO_TARGET_DIR`.
     pub fn target_dir(&self) -> Result<PathBuf> {
         let metadata = self.metadata(&self.root.join("Cargo.toml"), false)?;
