@@ -1,6 +1,8 @@
 //! From the CT to a body that is ready to be simulated: lattice, tissue, skin, incisions, what is fixed.
 
-use cutis_mesh::{Cut, HalfSpace, Incision, Lattice, SkinMode, SkinOptions, SkinReport, TetMesh, Tissue, skin};
+use cutis_mesh::{
+    Cut, HalfSpace, Incision, Lattice, SkinMode, SkinOptions, SkinReport, TetMesh, Tissue, skin,
+};
 use cutis_volume::{TableKind, Volume, sample};
 
 use crate::Error;
@@ -57,7 +59,9 @@ impl Body {
             let found = skin::detect(&lattice, &air, scene.skin.mode.into(), &options)?;
             let (on_mesh, dropped) = found.on_mesh(&mesh);
             if dropped > 0 {
-                warnings.push(format!("{dropped} skin triangles have no tissue tetrahedron behind them and were left out"));
+                warnings.push(format!(
+                    "{dropped} skin triangles have no tissue tetrahedron behind them and were left out"
+                ));
             }
             triangles = on_mesh;
             report = Some(found.report);
@@ -65,7 +69,12 @@ impl Body {
         let incisions: Vec<Incision> = scene
             .incision
             .iter()
-            .map(|i| Incision { from_mm: i.from_mm, to_mm: i.to_mm, depth_mm: i.depth_mm, width_mm: i.width_mm })
+            .map(|i| Incision {
+                from_mm: i.from_mm,
+                to_mm: i.to_mm,
+                depth_mm: i.depth_mm,
+                width_mm: i.width_mm,
+            })
             .collect();
         let cut = Cut::plan(&mesh, &triangles, &incisions)?;
         let taken = cut.apply(&mut mesh, &mut triangles).tets;
@@ -99,7 +108,8 @@ impl Body {
     pub(crate) fn fixed(&self, loaded: &LoadedScene) -> Result<Vec<bool>, Error> {
         let (mesh, section) = (&self.mesh, &loaded.scene.fixed);
         let mut fixed = vec![false; mesh.positions.len()];
-        let mut add = |which: Vec<bool>| fixed.iter_mut().zip(which).for_each(|(fixed, other)| *fixed |= other);
+        let mut add =
+            |which: Vec<bool>| fixed.iter_mut().zip(which).for_each(|(fixed, other)| *fixed |= other);
         if let Some(hu) = section.bone_above_hu {
             add(mesh.hu.iter().map(|&value| value > hu).collect());
         }
@@ -122,17 +132,25 @@ impl Body {
         let Some(near) = &stc.near_incision else {
             return Nearness { rest_area_factor: 1.0, stiffness_factor: 1.0 };
         };
-        let center = triangle.iter().map(|&v| self.mesh.positions[v as usize].coords).sum::<nalgebra::Vector3<f32>>() / 3.0;
+        let center =
+            triangle.iter().map(|&v| self.mesh.positions[v as usize].coords).sum::<nalgebra::Vector3<f32>>()
+                / 3.0;
         let weight = (1.0 - self.cut.distance_mm(center.into()) / near.radius_mm).max(0.0);
         let blend = |factor: f64| 1.0 + weight * (factor - 1.0);
-        Nearness { rest_area_factor: blend(near.rest_area_factor), stiffness_factor: blend(near.stiffness_factor) }
+        Nearness {
+            rest_area_factor: blend(near.rest_area_factor),
+            stiffness_factor: blend(near.stiffness_factor),
+        }
     }
 }
 
 /// The skin is detected only if something of the scene refers to it.
 pub(crate) fn needs_skin(loaded: &LoadedScene) -> bool {
     let scene = &loaded.scene;
-    scene.constraints.stc.is_some() || !scene.incision.is_empty() || scene.output.surface || scene.output.pictures
+    scene.constraints.stc.is_some()
+        || !scene.incision.is_empty()
+        || scene.output.surface
+        || scene.output.pictures
 }
 
 impl From<&PlaneSection> for HalfSpace {

@@ -34,7 +34,12 @@ pub(crate) fn fingerprint(scene: &Scene, volume_sha256: &str) -> [u8; 32] {
     scene.solver.threads = 0;
     scene.volume.path = None;
     let text = serde_json::to_string(&scene).unwrap_or_default();
-    Sha256::new().chain_update(env!("CARGO_PKG_VERSION")).chain_update(volume_sha256).chain_update(text).finalize().into()
+    Sha256::new()
+        .chain_update(env!("CARGO_PKG_VERSION"))
+        .chain_update(volume_sha256)
+        .chain_update(text)
+        .finalize()
+        .into()
 }
 
 impl Checkpoint {

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{
-    Constraint, Distance, DistanceMaterial, MaterialError, SkinTension, SkinTensionMaterial, SkinTensionPaper,
-    SkinTensionPaperMaterial, Volume, VolumeMaterial,
+    Constraint, Distance, DistanceMaterial, MaterialError, SkinTension, SkinTensionMaterial,
+    SkinTensionPaper, SkinTensionPaperMaterial, Volume, VolumeMaterial,
 };
 use cutis_mesh::TetMesh;
 use cutis_solver::{Formulation, Handle, Settings, Stiffness, System, SystemBuilder, Values};
@@ -67,7 +67,9 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
         let groups = Groups::from_colors(&mesh.tet_classes(&mesh.tets))?;
         let stiffness = if xpbd {
             let volumes = mesh.tet_volumes();
-            compliances(&mesh.tets, |n, _| cutis_constraints::volume_compliance(f64::from(volumes[n]), v.bulk_modulus_pa))?
+            compliances(&mesh.tets, |n, _| {
+                cutis_constraints::volume_compliance(f64::from(volumes[n]), v.bulk_modulus_pa)
+            })?
         } else {
             Stiffness::pbd(v.stiffness as f32)
         };
@@ -124,7 +126,10 @@ fn add_skin_tension(
             file: loaded.file.clone(),
             key: key.into(),
             value: String::new(),
-            why: format!("gives {} for a skin triangle; it must be above 0 at every HU of the skin", factor[n]),
+            why: format!(
+                "gives {} for a skin triangle; it must be above 0 at every HU of the skin",
+                factor[n]
+            ),
         });
     }
     let share = |n: usize| (stc.stiffness * factor[n]).min(1.0) as f32;
@@ -133,14 +138,20 @@ fn add_skin_tension(
         StcForm::Energy => {
             let params: Vec<_> = (0..body.skin.len())
                 .map(|n| {
-                    let rest = SkinTensionMaterial { rest_area_scale: rest_scale[n], amplification: stc.amplification };
+                    let rest = SkinTensionMaterial {
+                        rest_area_scale: rest_scale[n],
+                        amplification: stc.amplification,
+                    };
                     SkinTension::from_rest(&corners(n), &rest)
                 })
                 .collect();
             let stiffness = match loaded.scene.solver.formulation {
                 FormulationChoice::Pbd => shares(),
                 FormulationChoice::Xpbd => compliances(&body.skin, |n, _| {
-                    cutis_constraints::skin_compliance(f64::from(params[n][0]), stc.area_modulus_n_per_m * factor[n])
+                    cutis_constraints::skin_compliance(
+                        f64::from(params[n][0]),
+                        stc.area_modulus_n_per_m * factor[n],
+                    )
                 })?,
             };
             Ok(builder.add::<SkinTension, 3>(&body.skin, &params, stiffness, groups)?)

@@ -4,23 +4,20 @@ use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
+use cutis_volume::PartialFile;
 use sha2::{Digest, Sha256};
 
 use crate::Error;
 
 /// Writes a whole file under a temporary name in the same folder and renames it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let part = path.with_file_name(name);
-    let result = fs::File::create(&part)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&part, path));
-    result.map_err(|e| {
-        // The error that matters is the first one; a leftover that cannot be removed changes nothing about it.
-        let _ = fs::remove_file(&part);
-        Error::File { path: path.into(), action: "write", why: e.to_string() }
-    })
+    let mut file = PartialFile::create(path)?;
+    file.write_all(bytes).map_err(|e| Error::File {
+        path: path.into(),
+        action: "write",
+        why: e.to_string(),
+    })?;
+    Ok(file.commit()?)
 }
 
 /// Reads a whole file.

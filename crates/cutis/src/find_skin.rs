@@ -40,7 +40,8 @@ pub fn find_skin(
     progress.begin("detect the skin", 0);
     let lattice = Lattice::new(sample::lattice_grid(volume.grid(), request.lattice)?, request.split)?;
     let alpha = Table::preset(TableKind::Alpha, "paper")?;
-    let air: Vec<bool> = sample::to_grid(&volume, lattice.grid()).iter().map(|&hu| alpha.is_air(hu)).collect();
+    let air: Vec<bool> =
+        sample::to_grid(&volume, lattice.grid()).iter().map(|&hu| alpha.is_air(hu)).collect();
     let found = skin::detect(&lattice, &air, request.mode, &SkinOptions::default())?;
     progress.end();
     if let Some(path) = out {
@@ -52,7 +53,10 @@ pub fn find_skin(
 fn check_extension(path: &Path) -> Result<(), Error> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("vtu" | "vtp") => Ok(()),
-        _ => Err(Error::Request { what: format!("--out {}", path.display()), why: "must end in .vtu or .vtp".into() }),
+        _ => Err(Error::Request {
+            what: format!("--out {}", path.display()),
+            why: "must end in .vtu or .vtp".into(),
+        }),
     }
 }
 
@@ -67,7 +71,8 @@ fn write(path: &Path, lattice: &Lattice, skin: &Skin) -> Result<(), Error> {
         used.iter().map(|&point| frame.to_local(grid.mm(grid.point(point as usize)))).collect();
     let number = |point: u32| used.partition_point(|&other| other < point) as u32;
     let triangles: Vec<[u32; 3]> = skin.triangles.iter().map(|triangle| triangle.map(number)).collect();
-    let piece = Piece { frame: &frame, positions: &positions, cells: Cells::Triangles(&triangles), data: &[] };
+    let piece =
+        Piece { frame: &frame, positions: &positions, cells: Cells::Triangles(&triangles), data: &[] };
     if path.extension().is_some_and(|e| e == "vtp") {
         vtk::write_vtp(path, Space::default(), &piece)?;
     } else {

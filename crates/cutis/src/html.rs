@@ -51,8 +51,15 @@ fn summary(report: &Report) -> String {
     let s = &report.sizes;
     let mut text = format!(
         "<p>{} vertices, {} edges, {} tetrahedra and {} skin triangles; {} frames on <b>{}</b> ({}, {} threads), {:.1} ms per frame.</p>",
-        s.vertices, s.edges, s.tets, s.skin_triangles, report.frames.count, escape(&report.backend.name),
-        escape(&report.machine.cpu), report.backend.threads, report.frames.ms_mean
+        s.vertices,
+        s.edges,
+        s.tets,
+        s.skin_triangles,
+        report.frames.count,
+        escape(&report.backend.name),
+        escape(&report.machine.cpu),
+        report.backend.threads,
+        report.frames.ms_mean
     );
     for Wound { initial_mm, final_mm, mid_mm, .. } in &report.wounds {
         let _ = write!(
@@ -66,7 +73,8 @@ fn summary(report: &Report) -> String {
 fn tables(report: &Report) -> String {
     let mut out = String::from("<h2>Time per stage</h2><table>");
     for stage in &report.stages {
-        let _ = write!(out, "<tr><td>{}</td><td class=\"n\">{:.1} ms</td></tr>", escape(&stage.name), stage.ms);
+        let _ =
+            write!(out, "<tr><td>{}</td><td class=\"n\">{:.1} ms</td></tr>", escape(&stage.name), stage.ms);
     }
     out.push_str("</table><h2>Constraints</h2><table><tr><th>kind</th><th>colours</th><th>RMS error / rest size</th><th>largest</th></tr>");
     for r in &report.residuals {
@@ -74,7 +82,9 @@ fn tables(report: &Report) -> String {
         let _ = write!(
             out,
             "<tr><td>{}</td><td class=\"n\">{colors}</td><td class=\"n\">{:.3e}</td><td class=\"n\">{:.3e}</td></tr>",
-            escape(&r.kind), r.rms, r.max
+            escape(&r.kind),
+            r.rms,
+            r.max
         );
     }
     out.push_str("</table><h2>Memory of the solver</h2><table>");
@@ -82,7 +92,8 @@ fn tables(report: &Report) -> String {
         let _ = write!(
             out,
             "<tr><td>{}</td><td class=\"n\">{:.1} MB</td></tr>",
-            escape(&part.part), part.bytes as f64 / 1e6
+            escape(&part.part),
+            part.bytes as f64 / 1e6
         );
     }
     out.push_str("</table>");

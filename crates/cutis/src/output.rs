@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use cutis_mesh::vtk::{self, Cells, Piece, PointData, PointValues, Space};
 use cutis_mesh::Shell;
+use cutis_mesh::vtk::{self, Cells, Piece, PointData, PointValues, Space};
 use cutis_render::plot::{Axis, Scale, Series, line_chart};
 use cutis_resample::Warp;
 use cutis_volume::{Volume, nifti};
@@ -60,7 +60,9 @@ pub(crate) fn write(outcome: &Outcome<'_>, clock: &mut Clock<'_>) -> Result<Prod
     let (volume, found) =
         clock.stage("resample the CT", 0, |progress| warp.apply(&source.volume, progress))?;
     if found.folds > 0 {
-        products.warnings.push(format!("{} voxels lie in two places of the deformed body at once (folds)", found.folds));
+        products
+            .warnings
+            .push(format!("{} voxels lie in two places of the deformed body at once (folds)", found.folds));
     }
     products.resample = Some(found);
     if output.volume {
@@ -152,16 +154,21 @@ pub(crate) fn write_html(
     if wounds > 0 && rows.len() > 1 {
         let curves: Vec<(String, Vec<[f64; 2]>)> = (0..wounds)
             .flat_map(|n| {
-                let name = |what: &str| if wounds == 1 { what.into() } else { format!("wound {} {what}", n + 1) };
+                let name =
+                    |what: &str| if wounds == 1 { what.into() } else { format!("wound {} {what}", n + 1) };
                 let mean = rows.iter().map(|row| [row.time_s, row.gapes[n].mean_mm]).collect();
                 let middle = rows.iter().map(|row| [row.time_s, row.gapes[n].mid_mm]).collect();
                 [(name("mean"), mean), (name("in the middle"), middle)]
             })
             .collect();
-        let series: Vec<Series<'_>> =
-            curves.iter().map(|(name, points)| Series { name, points }).collect();
+        let series: Vec<Series<'_>> = curves.iter().map(|(name, points)| Series { name, points }).collect();
         let axis = |label| Axis { label, scale: Scale::Linear };
-        plots.push(line_chart("Opening of the wound", axis("time / s"), axis("distance of the lips / mm"), &series));
+        plots.push(line_chart(
+            "Opening of the wound",
+            axis("time / s"),
+            axis("distance of the lips / mm"),
+            &series,
+        ));
     }
     let scene = toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string());
     files::write(&folder.html(), html::page(report, &products.figures, &plots, &scene).as_bytes())

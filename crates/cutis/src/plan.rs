@@ -138,7 +138,10 @@ fn left_out(loaded: &LoadedScene) -> Vec<String> {
     say(scene.solver.iterations == 1, "multipliers: one iteration per substep needs none stored");
     say(scene.run.checkpoint_every == 0, "checkpoints: none are written");
     say(!output.volume && !output.pictures, "volume: the CT is not resampled");
-    say(output.pictures && !output.volume, "volume: the CT is resampled for the pictures only and not written");
+    say(
+        output.pictures && !output.volume,
+        "volume: the CT is resampled for the pictures only and not written",
+    );
     say(!output.surface, "surface: skin.vtu is not written");
     say(!output.tissue, "tissue: tissue.vtu is not written");
     say(!output.pictures, "pictures: nothing is rendered");

@@ -209,8 +209,11 @@ impl Report {
     /// # Errors
     /// [`Error::File`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        let text = serde_json::to_string_pretty(self)
-            .map_err(|e| Error::File { path: path.into(), action: "write", why: e.to_string() })?;
+        let text = serde_json::to_string_pretty(self).map_err(|e| Error::File {
+            path: path.into(),
+            action: "write",
+            why: e.to_string(),
+        })?;
         files::write(path, text.as_bytes())
     }
 

@@ -58,8 +58,10 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
         done = saved.frame;
         solver.restore(&saved.positions, &saved.velocities, u64::from(saved.frame))?;
     }
-    let measure = |positions: &[Point3<f32>]| body.cut.gapes.iter().map(|gape| gape.measure(positions)).collect();
-    let first = FrameRow { frame: done, time_s: solver.time_s(), ms: 0.0, gapes: measure(&solver.positions()) };
+    let measure =
+        |positions: &[Point3<f32>]| body.cut.gapes.iter().map(|gape| gape.measure(positions)).collect();
+    let first =
+        FrameRow { frame: done, time_s: solver.time_s(), ms: 0.0, gapes: measure(&solver.positions()) };
     let frames = loaded.scene.run.frames;
     let every = loaded.scene.run.checkpoint_every;
     let save = |solver: &dyn Solver<f32>, frame| {

@@ -28,7 +28,12 @@ pub(crate) fn load(loaded: &LoadedScene) -> Result<Source, Error> {
             let read = nifti::read(path)?;
             let sha256 = files::sha256(path)?;
             let input = Input { path: path.display().to_string(), sha256: sha256.clone() };
-            Ok(Source { volume: read.volume, sha256, inputs: vec![scene_input, input], warnings: read.warnings })
+            Ok(Source {
+                volume: read.volume,
+                sha256,
+                inputs: vec![scene_input, input],
+                warnings: read.warnings,
+            })
         }
         VolumeSection { phantom: Some(PhantomSection { size, seed }), path: None } => {
             let volume = Phantom::new(*size, *seed)?.volume()?;

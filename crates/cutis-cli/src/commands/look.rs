@@ -28,9 +28,9 @@ fn page(found: &Inspection) -> String {
         format!("HU           {} to {}", found.hu_min, found.hu_max),
         "index to RAS+ mm".into(),
     ];
-    lines.extend(found.affine[..3].iter().map(|row| {
-        row.iter().map(|v| format!("{v:12.4}")).collect::<String>()
-    }));
+    lines.extend(
+        found.affine[..3].iter().map(|row| row.iter().map(|v| format!("{v:12.4}")).collect::<String>()),
+    );
     if found.nan_count > 0 {
         lines.push(format!("NaN voxels   {}", found.nan_count));
     }
@@ -55,10 +55,19 @@ pub(crate) fn skin(
 fn skin_page(report: &SkinReport, out: Option<&Path>) -> String {
     let mut lines = vec![
         format!("lattice vertices     {}", report.vertices),
-        format!("tetrahedra           {} (with 0 to 4 air vertices: {:?})", report.tets, report.air_vertex_histogram),
+        format!(
+            "tetrahedra           {} (with 0 to 4 air vertices: {:?})",
+            report.tets, report.air_vertex_histogram
+        ),
         format!("skin triangles       {} ({} found twice)", report.triangles, report.duplicates),
-        format!("components           {}, Euler characteristic {}", report.components, report.euler_characteristic),
-        format!("open edges           {} ({} of them where the scan ends)", report.open_edges, report.open_edges_on_box),
+        format!(
+            "components           {}, Euler characteristic {}",
+            report.components, report.euler_characteristic
+        ),
+        format!(
+            "open edges           {} ({} of them where the scan ends)",
+            report.open_edges, report.open_edges_on_box
+        ),
         format!("non-manifold edges   {}", report.non_manifold_edges),
         format!("enclosed share       {:.1} %", 100.0 * report.enclosed_share),
         format!("coverage             {:.1} % of the iso-surface", 100.0 * report.coverage),
@@ -110,10 +119,13 @@ impl From<Split> for cutis::mesh::Split {
 /// Draws a volume into a PNG.
 pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error> {
     let focus = match (&look.focus, look.zoom) {
-        (Some(text), Some(size_mm)) => Some(Focus { centre_mm: numbers("--focus", text, ',', "x,y,z in mm")?, size_mm }),
+        (Some(text), Some(size_mm)) => {
+            Some(Focus { centre_mm: numbers("--focus", text, ',', "x,y,z in mm")?, size_mm })
+        }
         _ => None,
     };
-    let [level_hu, window_hu] = numbers("--window", &look.window, '/', "level/width in HU, for example 40/400")?;
+    let [level_hu, window_hu] =
+        numbers("--window", &look.window, '/', "level/width in HU, for example 40/400")?;
     let slice_at = look.slice.as_deref().map(plane).transpose()?;
     let terminal = Terminal::new();
     terminal.begin("read the CT", 0);
@@ -124,7 +136,10 @@ pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error
         Some((plane, at_mm)) => {
             let (window_hu, level_hu) = (window_hu as f32, level_hu as f32);
             let long_side = Some(look.pixels);
-            slice(&volume, &SliceView { window_hu, level_hu, focus, long_side, ..SliceView::new(plane, at_mm) })?
+            slice(
+                &volume,
+                &SliceView { window_hu, level_hu, focus, long_side, ..SliceView::new(plane, at_mm) },
+            )?
         }
         None => {
             let (width, height) = (look.pixels, look.pixels);
@@ -155,7 +170,12 @@ fn plane(text: &str) -> Result<(Plane, f64), Error> {
 }
 
 /// `N` numbers with `separator` between them.
-fn numbers<const N: usize>(option: &str, text: &str, separator: char, expected: &str) -> Result<[f64; N], Error> {
+fn numbers<const N: usize>(
+    option: &str,
+    text: &str,
+    separator: char,
+    expected: &str,
+) -> Result<[f64; N], Error> {
     let parsed: Option<Vec<f64>> = text.split(separator).map(|part| part.trim().parse().ok()).collect();
     parsed.and_then(|parts| parts.try_into().ok()).ok_or_else(|| Error::Request {
         what: format!("{option} {text}"),

@@ -12,7 +12,9 @@ use crate::terminal::print;
 pub(crate) fn run(command: Command) -> Result<(), Error> {
     match command {
         Command::Demo { out, change, json } => simulate::demo(&out, &change, json),
-        Command::Run { scene, out, change, resume, json } => simulate::run(&scene, out, &change, resume, json),
+        Command::Run { scene, out, change, resume, json } => {
+            simulate::run(&scene, out, &change, resume, json)
+        }
         Command::Check { scene, change, lattice, json } => simulate::check(&scene, &change, lattice, json),
         Command::Resample { scene, run, volume, out, change } => {
             simulate::resample(&scene, &change, cutis::ResampleRequest { run, volume, out })

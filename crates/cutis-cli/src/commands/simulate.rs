@@ -75,9 +75,15 @@ fn table(plan: &Plan) -> String {
     let sizes = &plan.sizes;
     let [nx, ny, nz] = sizes.lattice;
     let mut lines = vec![
-        format!("backend          {} ({}), {} threads", plan.backend.name, plan.backend.reason, plan.backend.threads),
+        format!(
+            "backend          {} ({}), {} threads",
+            plan.backend.name, plan.backend.reason, plan.backend.threads
+        ),
         format!("lattice          {nx} x {ny} x {nz}"),
-        format!("vertices         {} ({} fixed, {} cut out)", sizes.vertices, sizes.fixed_vertices, sizes.removed_vertices),
+        format!(
+            "vertices         {} ({} fixed, {} cut out)",
+            sizes.vertices, sizes.fixed_vertices, sizes.removed_vertices
+        ),
         format!("edges            {}", sizes.edges),
         format!("tetrahedra       {}", sizes.tets),
         format!("skin triangles   {}", sizes.skin_triangles),
@@ -99,7 +105,8 @@ pub(crate) fn resample(scene: &Path, change: &Change, request: ResampleRequest) 
     let terminal = Terminal::new();
     let report = cutis::resample_run(&loaded, &request, &terminal)?;
     if report.folds > 0 {
-        terminal.note(&format!("{} voxels lie in two places of the deformed body at once (folds)", report.folds));
+        terminal
+            .note(&format!("{} voxels lie in two places of the deformed body at once (folds)", report.folds));
     }
     print(&format!("{}: {} voxels inside the deformed body", request.out.display(), report.covered_voxels));
     Ok(())
@@ -118,7 +125,9 @@ impl Change {
         }
         match lattice {
             Some(LatticeSize::Native) => set("lattice", "{}".into()),
-            Some(LatticeSize::SpacingMm(spacing)) => set("lattice", format!("{{ spacing_mm = {spacing:?} }}")),
+            Some(LatticeSize::SpacingMm(spacing)) => {
+                set("lattice", format!("{{ spacing_mm = {spacing:?} }}"))
+            }
             Some(LatticeSize::Vertices(vertices)) => set("lattice", format!("{{ vertices = {vertices:?} }}")),
             None => {}
         }

@@ -84,7 +84,12 @@ impl Scene {
         let mut scene: Scene = serde_path_to_error::deserialize(value.clone()).map_err(|e| {
             let key = e.path().to_string();
             let found = lookup(&value, &key).map(|v| shorten(&v.to_string())).unwrap_or_default();
-            Error::SceneKey { file: file.into(), key, value: found, why: e.inner().to_string().trim().replace('\n', " ") }
+            Error::SceneKey {
+                file: file.into(),
+                key,
+                value: found,
+                why: e.inner().to_string().trim().replace('\n', " "),
+            }
         })?;
         scene.validate(file)?;
         let overridden = overrides.iter().any(|o| o.key == "volume.path");

@@ -58,15 +58,19 @@ fn table(out: &mut String, schema: &Value, path: &str, section: &Value) {
 fn kind(schema: &Value, property: &Value) -> String {
     let target = resolve(schema, property);
     if let Some(choices) = target["oneOf"].as_array() {
-        let names: Vec<String> = choices.iter().filter_map(|c| Some(format!("`{}`", c.get("const")?))).collect();
+        let names: Vec<String> =
+            choices.iter().filter_map(|c| Some(format!("`{}`", c.get("const")?))).collect();
         return names.join(", ");
     }
     if let Some(choices) = target["anyOf"].as_array() {
-        let names: Vec<String> = choices.iter().filter(|c| c["type"] != "null").map(|c| kind(schema, c)).collect();
+        let names: Vec<String> =
+            choices.iter().filter(|c| c["type"] != "null").map(|c| kind(schema, c)).collect();
         return names.join(" or ");
     }
     let kind = match &target["type"] {
-        Value::Array(types) => types.iter().find(|t| *t != "null").and_then(Value::as_str).unwrap_or_default(),
+        Value::Array(types) => {
+            types.iter().find(|t| *t != "null").and_then(Value::as_str).unwrap_or_default()
+        }
         other => other.as_str().unwrap_or_default(),
     };
     match kind {
@@ -78,7 +82,8 @@ fn kind(schema: &Value, property: &Value) -> String {
             }
         }
         "object" if target["properties"].is_object() => {
-            let keys = target["properties"].as_object().map(|p| p.keys().cloned().collect::<Vec<_>>().join(", "));
+            let keys =
+                target["properties"].as_object().map(|p| p.keys().cloned().collect::<Vec<_>>().join(", "));
             format!("{{ {} }}", keys.unwrap_or_default())
         }
         "integer" => "whole number".into(),
@@ -101,7 +106,9 @@ fn resolve<'a>(schema: &'a Value, property: &'a Value) -> &'a Value {
         return resolve(schema, one);
     }
     match property.get("items") {
-        Some(items) if items.get("$ref").is_some() && property.get("minItems").is_none() => resolve(schema, items),
+        Some(items) if items.get("$ref").is_some() && property.get("minItems").is_none() => {
+            resolve(schema, items)
+        }
         _ => property,
     }
 }

@@ -15,7 +15,12 @@ impl Check<'_> {
         if ok {
             return Ok(());
         }
-        Err(Error::SceneKey { file: self.file.into(), key: key.into(), value: value.to_string(), why: why.into() })
+        Err(Error::SceneKey {
+            file: self.file.into(),
+            key: key.into(),
+            value: value.to_string(),
+            why: why.into(),
+        })
     }
 
     fn positive(&self, key: &str, value: f64) -> Result<(), Error> {
@@ -40,7 +45,12 @@ impl Check<'_> {
         self.point(&format!("{key}.normal"), plane.normal)?;
         let length = plane.normal.iter().map(|v| v * v).sum::<f64>();
         let normal = format!("{:?}", plane.normal);
-        self.require(length > 0.0 && length.is_finite(), &format!("{key}.normal"), normal, "must not be the zero vector")
+        self.require(
+            length > 0.0 && length.is_finite(),
+            &format!("{key}.normal"),
+            normal,
+            "must not be the zero vector",
+        )
     }
 }
 
@@ -59,7 +69,12 @@ impl Scene {
             check.positive(&format!("incision[{n}].depth_mm"), i.depth_mm)?;
             check.positive(&format!("incision[{n}].width_mm"), i.width_mm)?;
             let to = format!("{:?}", i.to_mm);
-            check.require(i.from_mm != i.to_mm, &format!("incision[{n}].to_mm"), to, "must differ from from_mm")?;
+            check.require(
+                i.from_mm != i.to_mm,
+                &format!("incision[{n}].to_mm"),
+                to,
+                "must differ from from_mm",
+            )?;
         }
         for (n, h) in self.handle.iter().enumerate() {
             check.point(&format!("handle[{n}].at_mm"), h.at_mm)?;
@@ -71,7 +86,12 @@ impl Scene {
         check.positive("solver.dt_s", s.dt_s)?;
         check.require(s.substeps > 0, "solver.substeps", s.substeps, "must be 1 or more")?;
         check.require(s.iterations > 0, "solver.iterations", s.iterations, "must be 1 or more")?;
-        check.require(s.threads <= 1024, "solver.threads", s.threads, "must be at most 1024; 0 takes all cores")?;
+        check.require(
+            s.threads <= 1024,
+            "solver.threads",
+            s.threads,
+            "must be at most 1024; 0 takes all cores",
+        )?;
         check.point("solver.gravity_m_s2", s.gravity_m_s2)?;
         check.not_negative("solver.damping_per_s", s.damping_per_s)
     }

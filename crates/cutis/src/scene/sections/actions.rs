@@ -1,0 +1,90 @@
+//! What is done to the body: held, cut, dragged.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What does not move.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixedSection {
+    /// Vertices above this HU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bone_above_hu: Option<f32>,
+    /// Vertices inside these boxes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub boxes: Vec<BoxSection>,
+    /// Vertices on the side of these planes to which the normal points.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub planes: Vec<PlaneSection>,
+    /// Vertices in the first and last layer of the lattice along these axes (`"i"`, `"j"`, `"k"`), where the scan ends.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub end_layers: Vec<AxisChoice>,
+}
+
+/// A lattice axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum AxisChoice {
+    /// First voxel axis.
+    I,
+    /// Second voxel axis.
+    J,
+    /// Third voxel axis.
+    K,
+}
+
+impl AxisChoice {
+    /// 0, 1 or 2.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxSection {
+    /// Lowest corner, mm.
+    pub min_mm: [f64; 3],
+    /// Highest corner, mm.
+    pub max_mm: [f64; 3],
+}
+
+/// A half-space: the side of the plane to which the normal points.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlaneSection {
+    /// A point of the plane, mm.
+    pub point_mm: [f64; 3],
+    /// Direction of the half-space; any length but zero.
+    pub normal: [f64; 3],
+}
+
+/// A static incision: the paper's, with a mid-surface that always parts the lips.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IncisionSection {
+    /// One end, on or near the skin, mm.
+    pub from_mm: [f64; 3],
+    /// The other end, mm.
+    pub to_mm: [f64; 3],
+    /// Depth below the skin, mm.
+    pub depth_mm: f64,
+    /// Width of the removed strip, mm.
+    pub width_mm: f64,
+}
+
+/// Tissue that is dragged along a straight line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HandleSection {
+    /// Centre of the sphere that is grabbed, mm.
+    pub at_mm: [f64; 3],
+    /// Radius of the sphere, mm.
+    pub radius_mm: f64,
+    /// Where it ends up, relative to where it was, mm.
+    pub move_mm: [f64; 3],
+    /// Duration of the movement, s.
+    #[serde(default = "super::constraints::one")]
+    pub over_s: f64,
+}

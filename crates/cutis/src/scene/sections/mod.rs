@@ -1,0 +1,11 @@
+//! The sections of a scene file, each with its defaults.
+
+mod actions;
+mod body;
+mod constraints;
+mod running;
+
+pub use actions::*;
+pub use body::*;
+pub use constraints::*;
+pub use running::*;

@@ -1,0 +1,110 @@
+//! How it is stepped, for how long, and what is written.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Time stepping.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverSection {
+    /// Where it runs.
+    pub backend: BackendChoice,
+    /// Position-based dynamics as in the paper, or its compliant form.
+    pub formulation: FormulationChoice,
+    /// Duration of a frame, s.
+    pub dt_s: f64,
+    /// Substeps per frame.
+    pub substeps: u32,
+    /// Iterations per substep.
+    pub iterations: u32,
+    /// Acceleration, m/s², along R, A, S.
+    pub gravity_m_s2: [f64; 3],
+    /// Velocities decay as exp(−damping·t), 1/s.
+    pub damping_per_s: f64,
+    /// Worker threads; 0 takes all cores. The result does not depend on it.
+    pub threads: usize,
+}
+
+impl Default for SolverSection {
+    fn default() -> Self {
+        Self {
+            backend: BackendChoice::default(),
+            formulation: FormulationChoice::default(),
+            dt_s: 1.0 / 60.0,
+            substeps: 10,
+            iterations: 1,
+            gravity_m_s2: [0.0; 3],
+            damping_per_s: 10.0,
+            threads: 0,
+        }
+    }
+}
+
+/// Where the solver runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum BackendChoice {
+    /// The best one that this build and machine have; the report says which and why.
+    #[default]
+    Auto,
+    /// All CPU cores.
+    Cpu,
+    /// The scalar reference solver, one thread.
+    Reference,
+    /// A GPU. Not part of this build: refused.
+    Gpu,
+}
+
+/// Formulation of the projection.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum FormulationChoice {
+    /// Stiffness per iteration, as in the paper.
+    Pbd,
+    /// Compliance in physical units.
+    #[default]
+    Xpbd,
+}
+
+/// How long to run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RunSection {
+    /// Number of frames.
+    pub frames: u32,
+    /// Frames between checkpoints, from which `--resume` goes on; 0 writes none.
+    pub checkpoint_every: u32,
+}
+
+impl Default for RunSection {
+    fn default() -> Self {
+        Self { frames: 60, checkpoint_every: 0 }
+    }
+}
+
+/// What to write. In a scene that has this section, what it does not name is neither computed nor written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutputSection {
+    /// `deformed.nii.gz`: the CT, carried along by the body.
+    #[serde(default)]
+    pub volume: bool,
+    /// `skin.vtu`: the deformed skin.
+    #[serde(default)]
+    pub surface: bool,
+    /// `tissue.vtu`: the deformed tetrahedra.
+    #[serde(default)]
+    pub tissue: bool,
+    /// `before.png`, `after.png`, `slice.png`.
+    #[serde(default)]
+    pub pictures: bool,
+    /// `report.json`, `report.html`, `frames.csv`.
+    #[serde(default)]
+    pub report: bool,
+}
+
+impl Default for OutputSection {
+    fn default() -> Self {
+        Self { volume: true, surface: true, tissue: false, pictures: true, report: true }
+    }
+}
