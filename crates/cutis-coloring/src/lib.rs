@@ -30,3 +30,7 @@ pub use error::ColoringError;
 pub use greedy::greedy;
 pub use groups::Groups;
 pub use statistics::Statistics;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -44,3 +44,7 @@ pub use real::{Real, Scalar};
 pub use skin_tension::{SkinTension, SkinTensionMaterial};
 pub use skin_tension_paper::{SkinTensionPaper, SkinTensionPaperMaterial};
 pub use volume::{Volume, VolumeMaterial};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

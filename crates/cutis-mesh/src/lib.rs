@@ -33,3 +33,7 @@ pub use shell::Shell;
 pub use skin::{Skin, SkinMode, SkinOptions, SkinReport};
 pub use slit::Slit;
 pub use surface::Topology;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

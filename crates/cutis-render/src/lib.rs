@@ -43,3 +43,7 @@ pub use raymarch::raymarch;
 pub use side::{Axes, Side};
 pub use slice::{Plane, SliceView, slice};
 pub use view::{ClipPlane, Focus, View};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -48,3 +48,7 @@ mod warp;
 pub use error::ResampleError;
 pub use report::ResampleReport;
 pub use warp::{Warp, resample, resample_region};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

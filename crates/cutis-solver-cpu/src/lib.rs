@@ -12,3 +12,7 @@ mod solver;
 
 pub use error::CpuError;
 pub use solver::SolverCpu;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -71,3 +71,7 @@ pub use solver::Solver;
 pub use stiffness::{Stiffness, Values};
 pub use system::System;
 pub use vertex::Vertex;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -53,3 +53,7 @@ pub use plan::{Plan, check};
 pub use progress::{Progress, Silent};
 pub use run::{RunOptions, run};
 pub use scene::{LoadedScene, Override, Scene};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
