@@ -34,14 +34,15 @@ impl Body {
     /// Builds the body of a scene from its CT.
     pub(crate) fn build(loaded: &LoadedScene, volume: &Volume) -> Result<Self, Error> {
         let scene = &loaded.scene;
-        let grid = sample::lattice_grid(volume.grid(), scene.lattice.size())?;
-        let lattice = Lattice::new(grid, scene.lattice.split.into())?;
+        let grid =
+            sample::lattice_grid(volume.grid(), scene.lattice.size()).map_err(loaded.blame("lattice"))?;
+        let lattice = Lattice::new(grid, scene.lattice.split.into()).map_err(loaded.blame("lattice"))?;
         let hu = sample::to_grid(volume, &grid);
         let air: Vec<bool> = hu.iter().map(|&hu| hu < scene.tissue.air_below_hu).collect();
         let cut_away: Vec<HalfSpace> = scene.tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = scene.tissue.keep == Keep::Largest;
         let tissue = Tissue { air: &air, cut_away: &cut_away, largest_component };
-        let mut mesh = TetMesh::build(&lattice, &hu, &tissue)?;
+        let mut mesh = TetMesh::build(&lattice, &hu, &tissue).map_err(loaded.blame("tissue"))?;
         drop(hu);
         let mut warnings = Vec::new();
         if mesh.dropped_tets > 0 {
@@ -56,7 +57,8 @@ impl Body {
         let (mut triangles, mut report) = (Vec::new(), None);
         if needs_skin(loaded) {
             let options = SkinOptions { cut_away, ..SkinOptions::default() };
-            let found = skin::detect(&lattice, &air, scene.skin.mode.into(), &options)?;
+            let found = skin::detect(&lattice, &air, scene.skin.mode.into(), &options)
+                .map_err(loaded.blame("skin"))?;
             let (on_mesh, dropped) = found.on_mesh(&mesh);
             if dropped > 0 {
                 warnings.push(format!(
@@ -76,7 +78,7 @@ impl Body {
                 width_mm: i.width_mm,
             })
             .collect();
-        let cut = Cut::plan(&mesh, &triangles, &incisions)?;
+        let cut = Cut::plan(&mesh, &triangles, &incisions).map_err(loaded.blame("incision"))?;
         let taken = cut.apply(&mut mesh, &mut triangles).tets;
         Ok(Self { mesh, skin: triangles, skin_report: report, cut, taken, masses, air, warnings })
     }
@@ -117,7 +119,7 @@ impl Body {
             add(mesh.vertices_in_box_mm(b.min_mm, b.max_mm));
         }
         for plane in &section.planes {
-            add(mesh.vertices_beyond(&plane.into())?);
+            add(mesh.vertices_beyond(&plane.into()).map_err(loaded.blame("fixed.planes"))?);
         }
         for axis in section.end_layers.iter().map(|axis| axis.index()) {
             let last = mesh.lattice.grid().shape[axis] - 1;

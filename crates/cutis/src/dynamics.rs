@@ -14,7 +14,10 @@ use nalgebra::{Point3, Vector3};
 
 use crate::Error;
 use crate::body::Body;
-use crate::scene::{FormulationChoice, LoadedScene, SolverSection, StcForm, StcSection};
+use crate::scene::{
+    DistanceSection, FormulationChoice, LoadedScene, SolverSection, StcForm, StcSection,
+    VolumeConstraintSection,
+};
 
 /// A system, its settings, and the number of colours of each kind in it.
 pub(crate) struct Dynamics {
@@ -48,38 +51,22 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
     let mut colors = BTreeMap::new();
     let mut builder = SystemBuilder::<f32>::new(&mesh.positions, &body.inverse_masses(loaded)?)?;
 
-    if let Some(d) = &scene.constraints.distance {
+    if let Some(distance) = &scene.constraints.distance {
         let groups = Groups::from_colors(&mesh.edge_classes(&mesh.edges))?;
-        let stiffness = if xpbd {
-            let volumes = mesh.edge_volumes();
-            compliances(&mesh.edges, |n, [a, b]| {
-                let length = nalgebra::distance(&at(mesh, a), &at(mesh, b));
-                cutis_constraints::distance_compliance(length, d.youngs_modulus_pa, f64::from(volumes[n]))
-            })?
-        } else {
-            Stiffness::pbd(d.stiffness as f32)
-        };
-        let rest = DistanceMaterial { rest_scale: 1.0 };
-        builder = builder.add_from_rest::<Distance, 2>(&mesh.edges, &rest, stiffness, &groups)?;
+        builder = add_distance(builder, distance, xpbd, mesh, &groups)
+            .map_err(loaded.blame("constraints.distance"))?;
         colors.insert(Distance::NAME.into(), groups.len());
     }
-    if let Some(v) = &scene.constraints.volume {
+    if let Some(volume) = &scene.constraints.volume {
         let groups = Groups::from_colors(&mesh.tet_classes(&mesh.tets))?;
-        let stiffness = if xpbd {
-            let volumes = mesh.tet_volumes();
-            compliances(&mesh.tets, |n, _| {
-                cutis_constraints::volume_compliance(f64::from(volumes[n]), v.bulk_modulus_pa)
-            })?
-        } else {
-            Stiffness::pbd(v.stiffness as f32)
-        };
-        let rest = VolumeMaterial { rest_scale: 1.0 };
-        builder = builder.add_from_rest::<Volume, 4>(&mesh.tets, &rest, stiffness, &groups)?;
+        builder =
+            add_volume(builder, volume, xpbd, mesh, &groups).map_err(loaded.blame("constraints.volume"))?;
         colors.insert(Volume::NAME.into(), groups.len());
     }
     if let Some(stc) = &scene.constraints.stc {
         let groups = greedy(&body.skin, mesh.positions.len())?;
-        builder = add_skin_tension(builder, loaded, stc, body, &groups)?;
+        builder =
+            add_skin_tension(builder, loaded, stc, body, &groups).map_err(loaded.blame("constraints.stc"))?;
         colors.insert("stc".into(), groups.len());
     }
     for (n, handle) in scene.handle.iter().enumerate() {
@@ -97,9 +84,52 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
             });
         }
         let move_m = (Vector3::from(handle.move_mm) / 1000.0).into();
-        builder = builder.handle(Handle { vertices, move_m, over_s: handle.over_s })?;
+        builder = builder
+            .handle(Handle { vertices, move_m, over_s: handle.over_s })
+            .map_err(loaded.blame(&format!("handle[{n}]")))?;
     }
     Ok(Dynamics { system: builder.build(), settings: scene.solver.settings(), colors })
+}
+
+/// Adds a spring along each edge.
+fn add_distance(
+    builder: SystemBuilder<f32>,
+    distance: &DistanceSection,
+    xpbd: bool,
+    mesh: &TetMesh,
+    groups: &Groups,
+) -> Result<SystemBuilder<f32>, Error> {
+    let stiffness = if xpbd {
+        let volumes = mesh.edge_volumes();
+        compliances(&mesh.edges, |n, [a, b]| {
+            let length = nalgebra::distance(&at(mesh, a), &at(mesh, b));
+            cutis_constraints::distance_compliance(length, distance.youngs_modulus_pa, f64::from(volumes[n]))
+        })?
+    } else {
+        Stiffness::pbd(distance.stiffness as f32)
+    };
+    let rest = DistanceMaterial { rest_scale: 1.0 };
+    Ok(builder.add_from_rest::<Distance, 2>(&mesh.edges, &rest, stiffness, groups)?)
+}
+
+/// Adds the volume of each tetrahedron.
+fn add_volume(
+    builder: SystemBuilder<f32>,
+    volume: &VolumeConstraintSection,
+    xpbd: bool,
+    mesh: &TetMesh,
+    groups: &Groups,
+) -> Result<SystemBuilder<f32>, Error> {
+    let stiffness = if xpbd {
+        let volumes = mesh.tet_volumes();
+        compliances(&mesh.tets, |n, _| {
+            cutis_constraints::volume_compliance(f64::from(volumes[n]), volume.bulk_modulus_pa)
+        })?
+    } else {
+        Stiffness::pbd(volume.stiffness as f32)
+    };
+    let rest = VolumeMaterial { rest_scale: 1.0 };
+    Ok(builder.add_from_rest::<Volume, 4>(&mesh.tets, &rest, stiffness, groups)?)
 }
 
 /// Adds the skin: per-triangle rest areas and stiffness, by HU and by distance from the incisions.

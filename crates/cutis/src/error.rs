@@ -43,6 +43,16 @@ pub enum Error {
         /// What would be right.
         why: String,
     },
+    /// A section of the scene is well formed, but what it asks for cannot be done.
+    #[error("{}: `{section}`: {source}", file.display())]
+    SceneSection {
+        /// The scene file.
+        file: PathBuf,
+        /// Dotted name of the section.
+        section: String,
+        /// What stands against it.
+        source: Box<Error>,
+    },
     /// A request from the command line or a caller that cannot be met.
     #[error("{what}: {why}")]
     Request {
@@ -113,13 +123,17 @@ impl Error {
             | Self::Request { .. }
             | Self::Backend { .. }
             | Self::Checkpoint { .. }
-            | Self::Mesh(_)
             | Self::Material(_)
             | Self::Coloring(_) => true,
-            Self::Volume(e) => !matches!(e, VolumeError::Io { action: "write" | "create" | "rename", .. }),
+            Self::SceneSection { source, .. } => source.is_bad_input(),
+            Self::Volume(e) | Self::Mesh(MeshError::File(e)) => {
+                !matches!(e, VolumeError::Io { action: "write" | "create", .. })
+            }
+            Self::Mesh(e) => !matches!(e, MeshError::Write { .. }),
             Self::Solver(e) => !matches!(e, SolverError::NotFinite { .. }),
             Self::Cpu(e) => !matches!(e, CpuError::ThreadPool { .. }),
-            Self::Resample(_) | Self::Render(_) | Self::File { .. } => false,
+            Self::File { action, .. } => *action == "read",
+            Self::Resample(_) | Self::Render(_) => false,
         }
     }
 }

@@ -24,7 +24,7 @@ pub struct Plan {
     pub memory: Vec<MemoryPart>,
     /// Bytes of the volume's voxels.
     pub volume_bytes: usize,
-    /// Frames and projections (constraints × iterations × substeps × frames).
+    /// Constraints × iterations × substeps × frames; the largest 64-bit number where it is more.
     pub projections: u64,
     /// What the scene leaves out, and therefore costs nothing.
     pub left_out: Vec<String>,
@@ -71,14 +71,14 @@ pub(crate) fn prepare(loaded: &LoadedScene, clock: &mut Clock<'_>) -> Result<Pre
         .collect();
     let solver = &loaded.scene.solver;
     let constraints: usize = dynamics.system.kinds().iter().map(|kind| kind.len()).sum();
-    let per_frame = constraints as u64 * u64::from(solver.iterations) * u64::from(solver.substeps);
+    let passes = [solver.iterations, solver.substeps, loaded.scene.run.frames];
     let plan = Plan {
         backend,
         sizes,
         colors: dynamics.colors.clone(),
         memory,
         volume_bytes: 2 * source.volume.voxels().len(),
-        projections: per_frame * u64::from(loaded.scene.run.frames),
+        projections: passes.iter().fold(constraints as u64, |product, &n| product.saturating_mul(n.into())),
         left_out: left_out(loaded),
         warnings,
         stages: Vec::new(),

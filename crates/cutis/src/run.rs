@@ -47,8 +47,13 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
     plan.warnings.iter().for_each(|warning| progress.note(warning));
 
     let mut solver: Box<dyn Solver<f32>> = match loaded.scene.solver.backend {
-        BackendChoice::Reference => Box::new(SolverReference::new(dynamics.system, dynamics.settings)?),
-        _ => Box::new(SolverCpu::new(dynamics.system, dynamics.settings, Some(plan.backend.threads))?),
+        BackendChoice::Reference => Box::new(
+            SolverReference::new(dynamics.system, dynamics.settings).map_err(loaded.blame("solver"))?,
+        ),
+        _ => Box::new(
+            SolverCpu::new(dynamics.system, dynamics.settings, Some(plan.backend.threads))
+                .map_err(loaded.blame("solver"))?,
+        ),
     };
     let fingerprint = checkpoint::fingerprint(&loaded.scene, &source.sha256);
     let rest = &body.mesh.positions;
@@ -56,6 +61,11 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
     if options.resume {
         let saved = Checkpoint::read(&folder.checkpoint(), &fingerprint, rest.len())?;
         done = saved.frame;
+        if done > loaded.scene.run.frames {
+            let why =
+                format!("it is at frame {done}, and run.frames = {} lies before it", loaded.scene.run.frames);
+            return Err(Error::Checkpoint { path: folder.checkpoint(), why });
+        }
         solver.restore(&saved.positions, &saved.velocities, u64::from(saved.frame))?;
     }
     let measure =

@@ -36,7 +36,9 @@ pub(crate) fn load(loaded: &LoadedScene) -> Result<Source, Error> {
             })
         }
         VolumeSection { phantom: Some(PhantomSection { size, seed }), path: None } => {
-            let volume = Phantom::new(*size, *seed)?.volume()?;
+            let volume = Phantom::new(*size, *seed)
+                .and_then(|p| p.volume())
+                .map_err(loaded.blame("volume.phantom"))?;
             let sha256 = files::sha256_of_voxels(volume.voxels());
             let path = format!("phantom {size:?} seed {seed}");
             let inputs = vec![scene_input, Input { path, sha256: sha256.clone() }];

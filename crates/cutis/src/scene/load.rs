@@ -1,11 +1,15 @@
 //! Reading a scene: file, overrides, checks; and the schema and template that `cutis scene` prints.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::{Error, Scene};
 
 /// Longest scene file that is read, bytes. A scene is a page of text; anything longer is a mistake.
 const MAX_SCENE_BYTES: u64 = 1 << 20;
+/// Most parts of an override's dotted key. The deepest key of a scene has four.
+const MAX_KEY_PARTS: usize = 16;
 
 /// One `--set key=value`.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +43,20 @@ pub struct LoadedScene {
     pub text: String,
 }
 
+impl LoadedScene {
+    /// Says which section asked for what could not be done, unless the error names its key already.
+    pub(crate) fn blame<E: Into<Error>>(&self, section: &str) -> impl FnOnce(E) -> Error {
+        move |error| match error.into() {
+            named @ Error::SceneKey { .. } => named,
+            source => Error::SceneSection {
+                file: self.file.clone(),
+                section: section.into(),
+                source: Box::new(source),
+            },
+        }
+    }
+}
+
 impl Scene {
     /// Reads a scene file, applies `overrides` in order, resolves the volume's path and checks every value.
     ///
@@ -47,12 +65,12 @@ impl Scene {
     /// unknown key, a wrong type or a value out of range.
     pub fn load(file: &Path, overrides: &[Override]) -> Result<LoadedScene, Error> {
         let read = |why: std::io::Error| Error::SceneFile { file: file.into(), why: why.to_string() };
-        let length = std::fs::metadata(file).map_err(read)?.len();
-        if length > MAX_SCENE_BYTES {
-            let why = format!("it has {length} bytes; a scene has at most {MAX_SCENE_BYTES}");
+        let mut bytes = Vec::new();
+        File::open(file).and_then(|f| f.take(MAX_SCENE_BYTES + 1).read_to_end(&mut bytes)).map_err(read)?;
+        if bytes.len() as u64 > MAX_SCENE_BYTES {
+            let why = format!("it is longer than the {MAX_SCENE_BYTES} bytes that a scene may have");
             return Err(Error::SceneFile { file: file.into(), why });
         }
-        let bytes = std::fs::read(file).map_err(read)?;
         let text = String::from_utf8(bytes)
             .map_err(|e| Error::SceneFile { file: file.into(), why: format!("it is not UTF-8 text: {e}") })?;
         let directory = file.parent().unwrap_or(Path::new(""));
@@ -73,11 +91,10 @@ impl Scene {
             .map_err(|e| Error::SceneSyntax { file: file.into(), why: e.to_string().trim_end().into() })?;
         let mut value = toml::Value::Table(table);
         for Override { key, value: new } in overrides {
-            let parts: Vec<&str> = key.split('.').collect();
-            set(&mut value, &parts, parse_value(new)).map_err(|why| Error::SceneKey {
+            set(&mut value, key, parse_value(new)).map_err(|why| Error::SceneKey {
                 file: file.into(),
-                key: key.clone(),
-                value: new.clone(),
+                key: shorten(key),
+                value: shorten(new),
                 why,
             })?;
         }
@@ -104,24 +121,30 @@ impl Scene {
 }
 
 /// Sets the value under a dotted key, making the tables on the way. Entries of lists are addressed by number.
-fn set(at: &mut toml::Value, key: &[&str], new: toml::Value) -> Result<(), String> {
-    let [part, rest @ ..] = key else {
-        *at = new;
-        return Ok(());
-    };
-    match at {
-        toml::Value::Table(table) => {
-            set(table.entry(*part).or_insert_with(|| toml::Table::new().into()), rest, new)
-        }
-        toml::Value::Array(entries) => {
-            let count = entries.len();
-            match part.parse::<usize>().ok().and_then(|n| entries.get_mut(n)) {
-                Some(entry) => set(entry, rest, new),
-                None => Err(format!("`{part}` must be the number of one of the {count} entries, from 0")),
-            }
-        }
-        other => Err(format!("`{part}` cannot be set inside the value {other}")),
+fn set(mut at: &mut toml::Value, key: &str, new: toml::Value) -> Result<(), String> {
+    let parts = key.split('.').count();
+    if parts > MAX_KEY_PARTS {
+        return Err(format!("has {parts} parts; a key of a scene has at most {MAX_KEY_PARTS}"));
     }
+    for part in key.split('.') {
+        at = match at {
+            toml::Value::Table(table) => table.entry(part).or_insert_with(|| toml::Table::new().into()),
+            toml::Value::Array(entries) => {
+                let count = entries.len();
+                part.parse::<usize>().ok().and_then(|n| entries.get_mut(n)).ok_or_else(|| {
+                    format!("`{part}` must be the number of one of the {count} entries, from 0")
+                })?
+            }
+            other => {
+                return Err(format!(
+                    "`{part}` cannot be set inside the value {}",
+                    shorten(&other.to_string())
+                ));
+            }
+        };
+    }
+    *at = new;
+    Ok(())
 }
 
 /// A TOML value; what does not parse as one is a string.

@@ -2,118 +2,146 @@
 
 use std::fmt::Write as _;
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::load::schema;
 
+const HEAD: &str = "# Scene reference
+
+Written by `cutis scene reference` from the schema of the program; do not edit by hand.
+
+A scene is a TOML file. Lengths are millimetres and positions world millimetres in the volume's RAS+ frame (x right,
+y anterior, z superior); everything else is SI. Moduli, lengths, factors and durations are above 0 unless their row says
+otherwise. Unknown keys and values out of range are refused by name. `cutis scene new` prints a scene to start from.
+";
+
 /// The reference as Markdown: one table per section, in the order of the schema.
 pub fn reference() -> String {
-    let schema = schema();
-    let mut out = String::from(
-        "# Scene reference\n\nWritten by `cutis scene reference` from the schema of the program; do not edit by hand.\n\
-         Lengths are world millimetres in the volume's RAS+ frame, everything else is SI. Unknown keys are refused.\n",
-    );
-    let empty = serde_json::Map::new();
-    let sections = schema["properties"].as_object().unwrap_or(&empty);
-    for (name, section) in sections {
-        let target = resolve(&schema, section);
-        let list = section["type"] == "array";
-        let heading = if list { format!("[[{name}]]") } else { format!("[{name}]") };
-        if target["properties"].is_object() {
-            let _ = write!(out, "\n## `{heading}`\n\n{}\n", text(section, target));
-            table(&mut out, &schema, name, target);
-        } else {
-            let _ = write!(out, "\n## `{name}`\n\n{} {}\n", text(section, target), kind(&schema, section));
-        }
+    let page = Page { schema: schema() };
+    let mut out = HEAD.to_owned();
+    let (sections, keys): (Vec<_>, Vec<_>) =
+        properties(&page.schema).into_iter().partition(|(_, property)| page.section(property).is_some());
+    if !keys.is_empty() {
+        out.push_str("\n## Before the first section\n");
+        page.table(&mut out, &page.schema, &keys);
+    }
+    for (name, property) in sections {
+        page.write_section(&mut out, name, property, required(&page.schema, name));
     }
     out
 }
 
-/// The rows of one section, then the sections inside it.
-fn table(out: &mut String, schema: &Value, path: &str, section: &Value) {
-    let empty = serde_json::Map::new();
-    let properties = section["properties"].as_object().unwrap_or(&empty);
-    let required = section["required"].as_array().map(Vec::as_slice).unwrap_or_default();
-    let inner = |p: &Value| resolve(schema, p)["properties"].is_object() && p["type"] != "array";
-    out.push_str("\n| key | value | default | meaning |\n|---|---|---|---|\n");
-    for (key, property) in properties {
-        let target = resolve(schema, property);
-        let default = match property.get("default") {
-            _ if required.iter().any(|r| r == key) => "required".into(),
-            _ if inner(property) => String::new(),
-            Some(Value::Null) | None => String::new(),
-            Some(value) => format!("`{value}`"),
+struct Page {
+    schema: Value,
+}
+
+/// A table of TOML, or a list of them.
+struct Section<'a> {
+    definition: &'a Value,
+    list: bool,
+}
+
+impl Page {
+    /// A heading, what the section is for, its keys, then the sections inside it.
+    fn write_section(&self, out: &mut String, path: &str, property: &Value, required: bool) {
+        let Some(Section { definition, list }) = self.section(property) else { return };
+        let heading = if list { format!("[[{path}]]") } else { format!("[{path}]") };
+        let level = 2 + path.matches('.').count();
+        let _ = write!(out, "\n{} `{heading}`\n\n{}", "#".repeat(level), text(property, definition));
+        out.push_str(if required { " Required.\n" } else { "\n" });
+        let keys = properties(definition);
+        self.table(out, definition, &keys);
+        for (key, inner) in keys {
+            self.write_section(out, &format!("{path}.{key}"), inner, false);
+        }
+    }
+
+    /// One row per key.
+    fn table(&self, out: &mut String, owner: &Value, keys: &[(&str, &Value)]) {
+        out.push_str("\n| key | value | default | meaning |\n|---|---|---|---|\n");
+        for &(key, property) in keys {
+            let default = match property.get("default") {
+                _ if required(owner, key) => "required".into(),
+                Some(value) if !value.is_null() && self.section(property).is_none() => format!("`{value}`"),
+                _ => "none".to_owned(),
+            };
+            let meaning = text(property, self.definition(property)).replace('\n', " ").replace('|', "\\|");
+            let _ = writeln!(out, "| `{key}` | {} | {default} | {meaning} |", self.kind(property));
+        }
+    }
+
+    /// What a value may be, in words.
+    fn kind(&self, property: &Value) -> String {
+        match self.section(property) {
+            Some(Section { list: true, .. }) => return "list of sections, see below".into(),
+            Some(Section { list: false, .. }) => return "section, see below".into(),
+            None => {}
+        }
+        let definition = self.definition(property);
+        if let Some(choices) = definition["oneOf"].as_array() {
+            return either(choices.iter().filter_map(|c| Some(format!("`{}`", c.get("const")?))).collect());
+        }
+        if let Some(choices) = definition["anyOf"].as_array() {
+            return either(choices.iter().map(|choice| self.kind(choice)).collect());
+        }
+        let names: Vec<&str> = match &definition["type"] {
+            Value::Array(types) => types.iter().filter_map(Value::as_str).filter(|t| *t != "null").collect(),
+            other => other.as_str().into_iter().collect(),
         };
-        let meaning = text(property, target).replace('\n', " ").replace('|', "\\|");
-        let _ = writeln!(out, "| `{key}` | {} | {default} | {meaning} |", kind(schema, property));
-    }
-    for (key, property) in properties.iter().filter(|(_, p)| inner(p)) {
-        let path = format!("{path}.{key}");
-        let _ = write!(out, "\n### `[{path}]`\n\n{}\n", text(property, resolve(schema, property)));
-        table(out, schema, &path, resolve(schema, property));
-    }
-}
-
-/// What a value may be, in words.
-fn kind(schema: &Value, property: &Value) -> String {
-    let target = resolve(schema, property);
-    if let Some(choices) = target["oneOf"].as_array() {
-        let names: Vec<String> =
-            choices.iter().filter_map(|c| Some(format!("`{}`", c.get("const")?))).collect();
-        return names.join(", ");
-    }
-    if let Some(choices) = target["anyOf"].as_array() {
-        let names: Vec<String> =
-            choices.iter().filter(|c| c["type"] != "null").map(|c| kind(schema, c)).collect();
-        return names.join(" or ");
-    }
-    let kind = match &target["type"] {
-        Value::Array(types) => {
-            types.iter().find(|t| *t != "null").and_then(Value::as_str).unwrap_or_default()
-        }
-        other => other.as_str().unwrap_or_default(),
-    };
-    match kind {
-        "array" => {
-            let item = kind_of_items(schema, target);
-            match target["minItems"].as_u64() {
-                Some(n) if target["maxItems"].as_u64() == Some(n) => format!("{n} × {item}"),
-                _ => format!("list of {item}"),
+        match names.as_slice() {
+            ["array"] => {
+                let item = self.kind(&definition["items"]);
+                let (least, most) = (definition["minItems"].as_u64(), definition["maxItems"].as_u64());
+                match least {
+                    Some(n) if least == most => format!("[{}]", vec![item; n as usize].join(", ")),
+                    _ => format!("list of {item}"),
+                }
             }
+            ["integer"] => "whole number".into(),
+            names => either(names.iter().map(|&name| name.to_owned()).collect()),
         }
-        "object" if target["properties"].is_object() => {
-            let keys =
-                target["properties"].as_object().map(|p| p.keys().cloned().collect::<Vec<_>>().join(", "));
-            format!("{{ {} }}", keys.unwrap_or_default())
+    }
+
+    /// The section that a property stands for, if it is one.
+    fn section<'a>(&'a self, property: &'a Value) -> Option<Section<'a>> {
+        let whole = self.definition(property);
+        let definition = whole.get("items").map_or(whole, |item| self.definition(item));
+        definition["properties"]
+            .is_object()
+            .then_some(Section { definition, list: whole.get("items").is_some() })
+    }
+
+    /// The definition that a property points to, through `$ref` and an optional's `anyOf`.
+    fn definition<'a>(&'a self, property: &'a Value) -> &'a Value {
+        if let Some(name) = property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")) {
+            return &self.schema["$defs"][name];
         }
-        "integer" => "whole number".into(),
-        other => other.into(),
+        match property["anyOf"].as_array().map(Vec::as_slice) {
+            Some([one, other]) if other["type"] == "null" => self.definition(one),
+            _ => property,
+        }
     }
 }
 
-fn kind_of_items(schema: &Value, target: &Value) -> String {
-    target.get("items").map(|items| kind(schema, items)).unwrap_or_else(|| "value".into())
+fn properties(definition: &Value) -> Vec<(&str, &Value)> {
+    let keys = definition["properties"].as_object().map(Map::iter);
+    keys.into_iter().flatten().map(|(key, property)| (key.as_str(), property)).collect()
 }
 
-/// The definition that a property points to: through `$ref`, an optional's `anyOf`, or a list's items.
-fn resolve<'a>(schema: &'a Value, property: &'a Value) -> &'a Value {
-    if let Some(name) = property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")) {
-        return &schema["$defs"][name];
-    }
-    if let Some([one, other]) = property["anyOf"].as_array().map(Vec::as_slice)
-        && other["type"] == "null"
-    {
-        return resolve(schema, one);
-    }
-    match property.get("items") {
-        Some(items) if items.get("$ref").is_some() && property.get("minItems").is_none() => {
-            resolve(schema, items)
-        }
-        _ => property,
+fn required(owner: &Value, key: &str) -> bool {
+    owner["required"].as_array().is_some_and(|keys| keys.iter().any(|k| k == key))
+}
+
+/// `a, b or c`.
+fn either(mut choices: Vec<String>) -> String {
+    match choices.pop() {
+        Some(last) if choices.is_empty() => last,
+        Some(last) => format!("{} or {last}", choices.join(", ")),
+        None => "any value".into(),
     }
 }
 
 /// A property's own description, else that of its type.
-fn text<'a>(property: &'a Value, target: &'a Value) -> &'a str {
-    property["description"].as_str().or(target["description"].as_str()).unwrap_or_default()
+fn text<'a>(property: &'a Value, definition: &'a Value) -> &'a str {
+    property["description"].as_str().or(definition["description"].as_str()).unwrap_or_default()
 }

@@ -24,15 +24,25 @@ impl Check<'_> {
     }
 
     fn positive(&self, key: &str, value: f64) -> Result<(), Error> {
-        self.require(value.is_finite() && value > 0.0, key, value, "must be a finite number above 0")
+        self.require(
+            value.is_finite() && value > 0.0,
+            key,
+            format!("{value:?}"),
+            "must be a finite number above 0",
+        )
     }
 
     fn not_negative(&self, key: &str, value: f64) -> Result<(), Error> {
-        self.require(value.is_finite() && value >= 0.0, key, value, "must be a finite number, 0 or more")
+        self.require(
+            value.is_finite() && value >= 0.0,
+            key,
+            format!("{value:?}"),
+            "must be a finite number, 0 or more",
+        )
     }
 
     fn share(&self, key: &str, value: f64) -> Result<(), Error> {
-        self.require((0.0..=1.0).contains(&value), key, value, "must lie between 0 and 1")
+        self.require((0.0..=1.0).contains(&value), key, format!("{value:?}"), "must lie between 0 and 1")
     }
 
     fn point(&self, key: &str, value: [f64; 3]) -> Result<(), Error> {

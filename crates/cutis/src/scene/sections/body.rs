@@ -32,7 +32,7 @@ pub struct VolumeSection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhantomSection {
-    /// Voxels per axis.
+    /// Voxels per axis, 1 to 4096.
     pub size: [usize; 3],
     /// Anatomy and noise vary with it.
     #[serde(default)]
@@ -46,7 +46,7 @@ pub struct LatticeSection {
     /// Distance between neighbouring vertices, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spacing_mm: Option<f64>,
-    /// Vertices per axis.
+    /// Vertices per axis, at least 2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vertices: Option<[usize; 3]>,
     /// How a cell is split into tetrahedra.
@@ -76,7 +76,7 @@ pub struct TissueSection {
     /// Half-spaces that are dropped before anything else, for example a scanner table in contact with the body.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cut_planes: Vec<PlaneSection>,
-    /// HU → density, kg/m³.
+    /// HU → density, kg/m³: preset `schneider2000` or `water`, or points.
     pub density: TableChoice,
 }
 
@@ -116,7 +116,7 @@ pub enum TableChoice {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SkinSection {
-    /// Detection rule.
+    /// Detection rule: the outer skin of the body, all faces between tissue and the rest, or the paper's rule literally.
     #[serde(default)]
     pub mode: SkinChoice,
 }

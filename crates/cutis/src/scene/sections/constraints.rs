@@ -51,16 +51,17 @@ pub struct StcSection {
     /// Share of the error removed per projection, 0 to 1 (`pbd`).
     #[serde(default = "one")]
     pub stiffness: f64,
-    /// Tensile amplification β of the restoring force.
+    /// Tensile amplification β of the restoring force, 0 or more.
     #[serde(default = "default_amplification")]
     pub amplification: f64,
     /// Rest area over area in the scan; below 1 the skin is under tension.
     #[serde(default = "default_rest_area_scale")]
     pub rest_area_scale: f64,
-    /// Formula.
+    /// Formula: `"energy"` is stable for any amplification; `"paper"` is the paper's clamped update, for `pbd` only.
     #[serde(default)]
     pub form: StcForm,
-    /// HU → factor on the modulus (on the stiffness in `pbd`), at the mean HU of a triangle's vertices.
+    /// HU → factor on the modulus (on the stiffness in `pbd`), at the mean HU of a triangle's vertices: preset `uniform` or
+    /// `paper`, or points.
     #[serde(default = "uniform")]
     pub stiffness_table: TableChoice,
     /// Other values near the incisions.

@@ -7,19 +7,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSection {
-    /// Where it runs.
+    /// Where it runs: all CPU cores, the scalar reference solver, or what suits best; this build has no GPU backend.
     pub backend: BackendChoice,
     /// Position-based dynamics as in the paper, or its compliant form.
     pub formulation: FormulationChoice,
     /// Duration of a frame, s.
     pub dt_s: f64,
-    /// Substeps per frame.
+    /// Substeps per frame, 1 or more.
     pub substeps: u32,
-    /// Iterations per substep.
+    /// Iterations per substep, 1 or more.
     pub iterations: u32,
     /// Acceleration, m/s², along R, A, S.
     pub gravity_m_s2: [f64; 3],
-    /// Velocities decay as exp(−damping·t), 1/s.
+    /// Velocities decay as exp(−damping·t), 1/s; 0 or more.
     pub damping_per_s: f64,
     /// Worker threads; 0 takes all cores. The result does not depend on it.
     pub threads: usize,
