@@ -80,6 +80,7 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
     add(format_args!("{}", text(middle, 26.0, " font-size=\"16\" font-weight=\"bold\"", title)));
     add(format_args!("{}", text(middle, HEIGHT - 12.0, "", x.label)));
     add(format_args!("{}", text(20.0, centre, &format!(" transform=\"rotate(-90 20 {centre})\""), y.label)));
+    let legend = legend_corner(series, &across, &upward);
     for (number, line) in series.iter().enumerate() {
         let color = COLORS[number % COLORS.len()];
         // Lines past the seventh are dashed, so that no two look alike.
@@ -92,16 +93,35 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
             "<path d=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2\"{dash}/>\n",
             path(line, &across, &upward)
         ));
-        let row = top + 18.0 + 18.0 * number as f64;
+        let row = legend[1] + 18.0 + 18.0 * number as f64;
         add(format_args!(
             "<path d=\"M{} {}h22\" stroke=\"{color}\" stroke-width=\"3\"{dash}/>\n",
-            left + 12.0,
+            legend[0] + 12.0,
             row - 4.5
         ));
-        add(format_args!("<text x=\"{}\" y=\"{row}\">{}</text>\n", left + 40.0, escape(line.name)));
+        add(format_args!("<text x=\"{}\" y=\"{row}\">{}</text>\n", legend[0] + 40.0, escape(line.name)));
     }
     svg.push_str("</svg>\n");
     svg
+}
+
+/// Left and top of the legend: the corner of the plot area in which the fewest points lie.
+fn legend_corner(series: &[Series<'_>], across: &Span, upward: &Span) -> [f64; 2] {
+    let [left, top, right, bottom] = AREA;
+    let longest = series.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
+    let (width, height) = (52.0 + 8.0 * longest as f64, 12.0 + 18.0 * series.len() as f64);
+    let covered = |corner: &[f64; 2]| {
+        let inside = |&&[x, y]: &&[f64; 2]| {
+            let within = |place: Option<f64>, from: f64, length| {
+                place.is_some_and(|p| (0.0..=length).contains(&(p - from)))
+            };
+            within(across.place(x), corner[0], width) && within(upward.place(y), corner[1], height)
+        };
+        series.iter().flat_map(|s| s.points).filter(inside).count()
+    };
+    let (far, low) = ((right - width).max(left), (bottom - height).max(top));
+    let corners = [[left, top], [far, top], [left, low], [far, low]];
+    corners.into_iter().min_by_key(covered).unwrap_or([left, top])
 }
 
 fn path(line: &Series<'_>, across: &Span, upward: &Span) -> String {
@@ -204,4 +224,31 @@ fn inner(scale: Scale, value: f64) -> Option<f64> {
 
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_keeps_away_from_the_points() {
+        let axis = |label| Axis { label, scale: Scale::Linear };
+        let legend = |points: &[[f64; 2]]| {
+            let svg = line_chart("", axis("x"), axis("y"), &[Series { name: "name", points }]);
+            let at = svg.find("h22").unwrap_or(0);
+            svg[..at]
+                .rsplit("M")
+                .next()
+                .unwrap_or_default()
+                .split(' ')
+                .next()
+                .unwrap_or_default()
+                .parse::<f64>()
+                .unwrap_or(0.0)
+        };
+        let rising: Vec<[f64; 2]> = (0..50).map(|n| [f64::from(n), f64::from(n)]).collect();
+        assert!(legend(&rising) < 120.0, "top left is free under a rising line");
+        let left: Vec<[f64; 2]> = [[0.0, 0.0], [0.0, 1.0], [0.001, 1.0], [0.001, 0.0], [9.0, 0.5]].into();
+        assert!(legend(&left) > 400.0, "both left corners are taken");
+    }
 }

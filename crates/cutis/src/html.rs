@@ -9,12 +9,14 @@ use crate::report::{Report, Wound};
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
 h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse}\
 td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top;border-bottom:1px solid #ddd}\
-td.n{text-align:right;font-variant-numeric:tabular-nums}figure{display:inline-block;margin:0 1rem 1rem 0}\
+td.n{text-align:right;font-variant-numeric:tabular-nums}figure{margin:1rem 0}.pair{display:grid;grid-template-columns:1fr 1fr;gap:0 1rem}.pair .wide{grid-column:1/-1}\
 img{max-width:100%;height:auto}figcaption{color:#555}.warn{background:#fff4d6;padding:.5rem 1rem}pre{background:#f5f5f5;padding:1rem;overflow:auto}";
 
 /// A picture for the page: caption and PNG bytes.
 pub(crate) struct Figure {
     pub(crate) caption: &'static str,
+    /// Takes the whole width of the page instead of half of it.
+    pub(crate) wide: bool,
     pub(crate) png: Vec<u8>,
 }
 
@@ -29,13 +31,16 @@ pub(crate) fn page(report: &Report, figures: &[Figure], plots: &[String], scene_
     if !report.warnings.is_empty() {
         put(&format!("<div class=\"warn\"><b>Note</b><ul>{}</ul></div>", items(&report.warnings)));
     }
+    put("<div class=\"pair\">");
     for figure in figures {
         let data = base64::engine::general_purpose::STANDARD.encode(&figure.png);
+        let (class, caption) = (if figure.wide { "wide" } else { "half" }, escape(figure.caption));
         put(&format!(
-            "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{data}\"><figcaption>{0}</figcaption></figure>",
-            escape(figure.caption)
+            "<figure class=\"{class}\"><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\">\
+             <figcaption>{caption}</figcaption></figure>"
         ));
     }
+    put("</div>");
     for plot in plots {
         put(&format!("<figure>{plot}</figure>"));
     }

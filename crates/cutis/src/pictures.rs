@@ -69,10 +69,11 @@ pub(crate) fn draw(
     let after_slice = cross(after.0, &[rest, deformed])?;
     let slices = side_by_side(&[(&before_slice, "before"), (&after_slice, "after")])?;
     Ok(vec![
-        Figure { caption: "Before: cut, not yet moved", png: skin(before)?.to_png()? },
-        Figure { caption: "After", png: skin(after)?.to_png()? },
+        Figure { caption: "Before: cut, not yet moved", wide: false, png: skin(before)?.to_png()? },
+        Figure { caption: "After", wide: false, png: skin(after)?.to_png()? },
         Figure {
             caption: "Slice across the middle, with the skin of the model at rest (blue) and deformed (orange)",
+            wide: true,
             png: slices.to_png()?,
         },
     ])

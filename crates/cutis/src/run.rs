@@ -42,8 +42,8 @@ pub(crate) struct FrameRow {
 pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) -> Result<Report, Error> {
     let mut clock = Clock::new(progress);
     let folder = RunFolder(options.out.clone());
-    files::create_folder(&folder.0)?;
     let Prepared { source, body, dynamics, plan } = plan::prepare(loaded, &mut clock)?;
+    files::create_folder(&folder.0)?;
     plan.warnings.iter().for_each(|warning| progress.note(warning));
 
     let mut solver: Box<dyn Solver<f32>> = match loaded.scene.solver.backend {
@@ -136,7 +136,8 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
         warnings: plan.warnings.into_iter().chain(products.warnings.iter().cloned()).collect(),
     };
     if loaded.scene.output.report {
-        files::write(&folder.frames(), frames_csv(&rows).as_bytes())?;
+        let earlier = if options.resume { earlier_frames(&folder, done)? } else { String::new() };
+        files::write(&folder.frames(), frames_csv(&earlier, &rows).as_bytes())?;
         output::write_html(&report, &rows, &products, &folder)?;
         report.write(&folder.report())?;
     }
@@ -155,14 +156,27 @@ fn frame_times(rows: &[FrameRow]) -> Frames {
     }
 }
 
+/// The lines of `frames.csv` that an earlier run wrote before frame `done`.
+fn earlier_frames(folder: &RunFolder, done: u32) -> Result<String, Error> {
+    if !folder.frames().exists() {
+        return Ok(String::new());
+    }
+    let text = String::from_utf8_lossy(&files::read(&folder.frames())?).into_owned();
+    let before = |line: &&str| {
+        line.split(',').next().and_then(|frame| frame.parse::<u32>().ok()).is_some_and(|frame| frame < done)
+    };
+    Ok(text.lines().filter(before).flat_map(|line| [line, "\n"]).collect())
+}
+
 /// `frames.csv`: the first line is the state before the first frame.
-fn frames_csv(rows: &[FrameRow]) -> String {
+fn frames_csv(earlier: &str, rows: &[FrameRow]) -> String {
     let wounds = rows.first().map_or(0, |row| row.gapes.len());
     let mut out = String::from("frame,time_s,ms");
     for n in 0..wounds {
         let _ = write!(out, ",gape_{n}_mean_mm,gape_{n}_mid_mm");
     }
     out.push('\n');
+    out.push_str(earlier);
     for row in rows {
         let _ = write!(out, "{},{},{:.3}", row.frame, row.time_s, row.ms);
         for gape in &row.gapes {

@@ -88,7 +88,7 @@ fn table(plan: &Plan) -> String {
         format!("tetrahedra       {}", sizes.tets),
         format!("skin triangles   {}", sizes.skin_triangles),
         format!("projections      {}", plan.projections),
-        format!("memory, volume   {:.1} MB", plan.volume_bytes as f64 / 1e6),
+        format!("memory, CT       {:.1} MB", plan.volume_bytes as f64 / 1e6),
     ];
     for part in &plan.memory {
         let colors = plan.colors.get(&part.part).map(|n| format!(", {n} colours")).unwrap_or_default();
