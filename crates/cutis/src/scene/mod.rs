@@ -1,7 +1,7 @@
 //! The scene file: everything that a run depends on, as plain data with units in the key names.
 //!
 //! Positions are world millimetres in the volume's RAS+ frame. Unknown keys are refused. [`Scene::load`] reads a
-//! file, applies overrides and checks every value; the sections are in [`sections`].
+//! file, applies overrides and checks every value; each section is a struct of this module.
 
 mod load;
 mod reference;
