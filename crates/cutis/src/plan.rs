@@ -55,7 +55,7 @@ pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Erro
 
 /// Reads the CT, builds body and system.
 pub(crate) fn prepare(loaded: &LoadedScene, clock: &mut Clock<'_>) -> Result<Prepared, Error> {
-    let backend = choose_backend(loaded)?;
+    let backend = choose_backend(loaded).map_err(loaded.blame("solver.backend"))?;
     let source = clock.stage("read the CT", 0, |_| source::load(loaded))?;
     let body = clock.stage("lattice, skin, incision", 0, |_| Body::build(loaded, &source.volume))?;
     let dynamics = clock.stage("constraints and colours", 0, |_| dynamics::build(loaded, &body))?;

@@ -87,8 +87,11 @@ impl Scene {
         directory: &Path,
         overrides: &[Override],
     ) -> Result<LoadedScene, Error> {
-        let table: toml::Table = toml::from_str(text)
-            .map_err(|e| Error::SceneSyntax { file: file.into(), why: e.to_string().trim_end().into() })?;
+        let table: toml::Table = toml::from_str(text).map_err(|e| {
+            // The message quotes the line, which in a file that is no scene may be the whole file.
+            let lines: Vec<String> = e.to_string().trim_end().lines().map(shorten).collect();
+            Error::SceneSyntax { file: file.into(), why: lines.join("\n") }
+        })?;
         let mut value = toml::Value::Table(table);
         for Override { key, value: new } in overrides {
             set(&mut value, key, parse_value(new)).map_err(|why| Error::SceneKey {
@@ -164,9 +167,9 @@ fn lookup<'a>(value: &'a toml::Value, path: &str) -> Option<&'a toml::Value> {
     })
 }
 
-/// At most 80 characters of a value.
+/// At most 120 characters of a text.
 fn shorten(text: &str) -> String {
-    match text.char_indices().nth(80) {
+    match text.char_indices().nth(120) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.into(),
     }
