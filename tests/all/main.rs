@@ -1,2 +1,14 @@
-//! The one integration test binary.
+//! The one integration test binary: the whole pipeline end to end, and problems whose answers are known.
+
+mod bad_scenes;
+mod bad_values;
+mod determinism;
+mod identity;
+mod left_out;
 mod problems;
+mod random_scenes;
+mod resume;
+mod scene_files;
+mod scenes;
+mod skin_counts;
+mod wound;

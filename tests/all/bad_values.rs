@@ -1,0 +1,224 @@
+//! Every key of a scene refuses what it cannot use, naming file, key and value. The keys come from the scene reference, so
+//! that a new one is tested the day it is added.
+
+use std::path::Path;
+
+use cutis::{Error, LoadedScene, Scene};
+
+use crate::scenes::overrides;
+
+/// A scene that has every section, so that any key can be set alone.
+const EVERYTHING: &str = r#"
+[volume]
+phantom = { size = [8, 8, 8] }
+[tissue]
+cut_planes = [{ point_mm = [0, 0, 0], normal = [0, 0, 1] }]
+[constraints.distance]
+youngs_modulus_pa = 1e4
+[constraints.volume]
+bulk_modulus_pa = 1e5
+[constraints.stc]
+area_modulus_n_per_m = 50
+near_incision = { radius_mm = 10 }
+[fixed]
+boxes = [{ min_mm = [0, 0, 0], max_mm = [1, 1, 1] }]
+planes = [{ point_mm = [0, 0, 0], normal = [0, 0, 1] }]
+[[incision]]
+from_mm = [0, 0, 0]
+to_mm = [1, 0, 0]
+depth_mm = 1
+width_mm = 1
+[[handle]]
+at_mm = [0, 0, 0]
+radius_mm = 1
+move_mm = [1, 0, 0]
+"#;
+
+fn parse(set: &[(&str, &str)]) -> Result<LoadedScene, Error> {
+    Scene::parse(EVERYTHING, Path::new("every.toml"), Path::new(""), &overrides(set))
+}
+
+/// `(key as --set takes it, key as a message names it, kind of value)` of every row of the reference.
+fn keys() -> Vec<(String, String, String)> {
+    let mut keys = Vec::new();
+    let (mut path, mut name) = (String::new(), String::new());
+    for line in cutis::scene::reference().lines() {
+        if let Some(heading) = line.strip_prefix("##") {
+            let heading = heading.trim_matches(['#', ' ', '`']);
+            let section = heading.trim_matches(['[', ']']);
+            let list = heading.starts_with("[[");
+            path = if list { format!("{section}.0.") } else { format!("{section}.") };
+            name = if list { format!("{section}[0].") } else { format!("{section}.") };
+            if !heading.starts_with('[') {
+                (path, name) = Default::default();
+            }
+        } else if let Some((key, rest)) = line.strip_prefix("| `").and_then(|row| row.split_once("` | ")) {
+            let kind = rest.split(" | ").next().unwrap_or_default();
+            keys.push((format!("{path}{key}"), format!("{name}{key}"), kind.to_owned()));
+        }
+    }
+    keys
+}
+
+/// Fails unless setting `key` is refused with a message that names file, key and value.
+fn refused(key: &str, name: &str, value: &str) -> Result<(), String> {
+    let Err(error) = parse(&[(key, value)]) else { return Err(format!("{key} = {value} was accepted")) };
+    let Error::SceneKey { key: found, .. } = &error else {
+        return Err(format!("{key} = {value}: {error:?}"));
+    };
+    // A wrong value inside a list or a table may be named by its own key.
+    if !found.starts_with(name) && !name.starts_with(found.as_str()) {
+        return Err(format!("{key} = {value}: names {found}: {error}"));
+    }
+    let text = error.to_string();
+    if !text.contains("every.toml") || !error.is_bad_input() {
+        return Err(format!("{key} = {value}: {text}"));
+    }
+    Ok(())
+}
+
+#[test]
+fn the_scene_with_everything_is_valid_and_has_every_section() {
+    parse(&[]).unwrap();
+    let keys = keys();
+    assert!(keys.len() > 60, "{} keys: the reference is not read", keys.len());
+    for (key, _, kind) in keys.iter().filter(|(_, _, kind)| kind == "number") {
+        // 1 is in the range of every number but the share of `paper` and the like.
+        let set = parse(&[(key, "1.0")]);
+        assert!(set.is_ok() || key.starts_with("lattice."), "{key} ({kind}): {:?}", set.err());
+    }
+}
+
+#[test]
+fn no_number_may_be_nan_or_infinite_and_no_value_of_another_type() {
+    let mut failures = Vec::new();
+    for (key, name, kind) in keys() {
+        let values: &[&str] = match kind.as_str() {
+            "number" => &["nan", "inf", "-inf", "\"text\"", "true", "[1.0]", "{ a = 1 }"],
+            "[number, number, number]" => {
+                &["[nan, 0, 0]", "[0, inf, 0]", "[0, 0, -inf]", "[1, 2]", "[1, 2, 3, 4]", "1.0", "\"text\""]
+            }
+            "[whole number, whole number, whole number]" => {
+                &["[-1, 2, 2]", "[1.5, 2, 2]", "[2, 2]", "2", "[2, 2, nan]"]
+            }
+            "whole number" => &["-1", "1.5", "nan", "\"text\"", "[1]", "99999999999999999999"],
+            "boolean" => &["1", "\"true\"", "[true]"],
+            "string" => &["1", "[\"a\"]"],
+            _ if kind.starts_with("section") => &["1", "\"text\"", "{ unheard_of = 1 }"],
+            _ if kind.starts_with("list of sections") => &["1", "\"text\"", "[1]", "[{ unheard_of = 1 }]"],
+            _ if kind.starts_with("string or list") => &["1", "[1]", "[[1]]", "[[\"a\", 1]]"],
+            _ if kind.starts_with("list of `") => &["[\"unheard of\"]", "\"i\"", "1"],
+            _ if kind.starts_with('`') => &["\"unheard of\"", "1", "[]"],
+            other => panic!("{key}: unknown kind {other}"),
+        };
+        failures.extend(values.iter().filter_map(|value| refused(&key, &name, value).err()));
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+fn numbers_out_of_range_are_refused() {
+    let positive = [
+        "lattice.spacing_mm",
+        "constraints.distance.youngs_modulus_pa",
+        "constraints.volume.bulk_modulus_pa",
+        "constraints.stc.area_modulus_n_per_m",
+        "constraints.stc.rest_area_scale",
+        "constraints.stc.near_incision.radius_mm",
+        "constraints.stc.near_incision.rest_area_factor",
+        "constraints.stc.near_incision.stiffness_factor",
+        "incision.0.depth_mm",
+        "incision.0.width_mm",
+        "handle.0.radius_mm",
+        "handle.0.over_s",
+        "solver.dt_s",
+    ];
+    let shares =
+        ["constraints.distance.stiffness", "constraints.volume.stiffness", "constraints.stc.stiffness"];
+    let others = [
+        ("constraints.stc.amplification", "-0.5"),
+        ("solver.damping_per_s", "-1"),
+        ("solver.substeps", "0"),
+        ("solver.iterations", "0"),
+        ("solver.threads", "1025"),
+        ("lattice.vertices", "[1, 8, 8]"),
+        ("tissue.cut_planes.0.normal", "[0, 0, 0]"),
+        ("fixed.planes.0.normal", "[0, 0, 0]"),
+        ("fixed.boxes.0.max_mm", "[1, -1, 1]"),
+        ("incision.0.to_mm", "[0, 0, 0]"),
+        ("tissue.air_below_hu", "1e300"),
+        ("fixed.bone_above_hu", "-1e300"),
+    ];
+    let rows = positive.iter().flat_map(|&key| [(key, "0"), (key, "-1.5")]);
+    let rows = rows.chain(shares.iter().flat_map(|&key| [(key, "-0.1"), (key, "1.1")])).chain(others);
+    let name = |key: &str| key.replace(".0.", "[0].");
+    let failures: Vec<String> =
+        rows.filter_map(|(key, value)| refused(key, &name(key), value).err()).collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+
+    // The value is in the message, as a person would write it.
+    for (key, value, shown) in [
+        ("solver.dt_s", "-1.5", "-1.5"),
+        ("solver.dt_s", "-1e300", "-1e300"),
+        ("solver.substeps", "0", "= 0"),
+        ("handle.0.at_mm", "[0, nan, 0]", "[0.0, NaN, 0.0]"),
+        ("solver.backend", "tpu", "\"tpu\""),
+    ] {
+        let text = parse(&[(key, value)]).unwrap_err().to_string();
+        assert!(text.contains(shown), "{text}");
+    }
+}
+
+#[test]
+fn values_that_do_not_go_together_are_refused() {
+    let cases: [(&[(&str, &str)], &str); 6] = [
+        (&[("volume.path", "ct.nii")], "volume"),
+        (&[("volume", "{}")], "volume"),
+        (&[("volume", "{ path = \"\" }")], "volume.path"),
+        (&[("lattice", "{ spacing_mm = 2.0, vertices = [8, 8, 8] }")], "lattice"),
+        (&[("constraints.stc.form", "paper")], "constraints.stc.form"),
+        (
+            &[
+                ("solver.formulation", "pbd"),
+                ("constraints.stc.form", "paper"),
+                ("constraints.stc.stiffness", "0"),
+            ],
+            "constraints.stc.stiffness",
+        ),
+    ];
+    for (set, expected) in cases {
+        match parse(set) {
+            Err(Error::SceneKey { key, file, .. }) => {
+                assert_eq!((key.as_str(), file.as_path()), (expected, Path::new("every.toml")));
+            }
+            other => panic!("{set:?}: {other:?}"),
+        }
+    }
+    parse(&[("solver.formulation", "pbd"), ("constraints.stc.form", "paper")]).unwrap();
+}
+
+#[test]
+fn unknown_keys_are_refused_everywhere() {
+    for (key, name, _) in keys() {
+        let sibling = |key: &str| match key.rsplit_once('.') {
+            Some((section, _)) => format!("{section}.unheard_of"),
+            None => "unheard_of".into(),
+        };
+        refused(&sibling(&key), &sibling(&name), "1").unwrap();
+    }
+}
+
+#[test]
+fn overrides_that_lead_nowhere_are_refused() {
+    for key in
+        ["", ".", "incision.1.depth_mm", "incision.x.depth_mm", "incision.-1", "solver.dt_s.x", "run..frames"]
+    {
+        let error = parse(&[(key, "1")]).unwrap_err();
+        assert!(matches!(error, Error::SceneKey { .. }), "{key}: {error:?}");
+    }
+    // Long enough to overflow the stack of a recursive descent.
+    let long = vec!["a"; 100_000].join(".");
+    let error = parse(&[(&long, "1")]).unwrap_err().to_string();
+    assert!(error.contains("parts") && error.len() < 1000, "{error}");
+    assert!("=1".parse::<cutis::Override>().is_err() && "frames".parse::<cutis::Override>().is_err());
+}

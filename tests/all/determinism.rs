@@ -1,0 +1,64 @@
+//! The result does not depend on the number of threads, nor on which CPU backend ran, bit for bit.
+
+use crate::scenes::{Run, SMALL, real, scene};
+
+const OUTPUT: (&str, &str) = ("output", "{ volume = true, surface = true }");
+
+/// The state without the checkpoint's header, which names the scene, and its seal.
+fn state(run: &Run) -> Vec<u8> {
+    let bytes = run.bytes("checkpoint.bin");
+    bytes[40..bytes.len() - 32].to_vec()
+}
+
+#[test]
+fn small_phantom_for_any_number_of_threads() {
+    for formulation in ["xpbd", "pbd"] {
+        let run = |set: &[(&str, &str)]| {
+            let common = [
+                OUTPUT,
+                ("run.frames", "6"),
+                ("run.checkpoint_every", "6"),
+                ("solver.formulation", formulation),
+            ];
+            Run::of(&scene(SMALL, &[&common, set].concat()))
+        };
+        let one = run(&[("solver.threads", "1")]);
+        for threads in ["2", "3", "8"] {
+            let other = run(&[("solver.threads", threads)]);
+            assert_eq!(other.report.backend.threads.to_string(), threads);
+            for file in ["checkpoint.bin", "skin.vtu", "deformed.nii.gz"] {
+                assert!(
+                    one.bytes(file) == other.bytes(file),
+                    "{formulation}: {file} differs with {threads} threads"
+                );
+            }
+        }
+        let reference = run(&[("solver.backend", "reference")]);
+        assert_eq!(reference.report.backend.name, "reference");
+        assert!(state(&one) == state(&reference), "{formulation}: the reference backend differs");
+        // The comparison sees one substep more.
+        let control = run(&[("solver.substeps", "11")]);
+        assert!(state(&one) != state(&control) && one.bytes("skin.vtu") != control.bytes("skin.vtu"));
+    }
+}
+
+#[test]
+fn real_abdomen_for_any_number_of_threads() {
+    let Some(volume) = real("abdomen_ts_64x53x58.nii.gz") else { return };
+    let run = |threads| {
+        let set = [
+            ("volume.path", volume.as_str()),
+            ("solver.threads", threads),
+            ("solver.substeps", "2"),
+            ("run.checkpoint_every", "30"),
+            ("output", "{}"),
+        ];
+        let run = Run::of(&scene("abdomen-reference.toml", &set));
+        assert!(run.report.frames.count == 30 && run.report.max_displacement_mm > 1.0);
+        run.bytes("checkpoint.bin")
+    };
+    let one = run("1");
+    for threads in ["2", "3", "8"] {
+        assert!(one == run(threads), "differs with {threads} threads");
+    }
+}

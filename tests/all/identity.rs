@@ -1,0 +1,57 @@
+//! Where nothing moves, the CT that comes out is the CT that went in, voxel for voxel and at the same millimetres.
+
+use cutis::volume::{AIR_HU, Volume, nifti, phantom::Phantom};
+
+use crate::scenes::{Run, SMALL, scene};
+
+const VOLUME_ONLY: (&str, &str) = ("output", "{ volume = true }");
+const UNCUT: (&str, &str) = ("incision", "[]");
+
+fn deformed(set: &[(&str, &str)]) -> Volume {
+    let run = Run::of(&scene(SMALL, set));
+    let read = nifti::read(run.path("deformed.nii.gz")).unwrap();
+    assert!(read.warnings.is_empty(), "{:?}", read.warnings);
+    read.volume
+}
+
+fn original() -> Volume {
+    Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap()
+}
+
+#[test]
+fn a_body_at_rest_gives_the_input_back() {
+    let original = original();
+    let still: [&[(&str, &str)]; 4] = [
+        &[("constraints", "{}"), ("run.frames", "0")],
+        &[("run.frames", "0")],
+        &[("constraints", "{}"), ("run.frames", "5")],
+        &[("constraints.stc.rest_area_scale", "1.0"), ("run.frames", "5")],
+    ];
+    for set in still {
+        let set = [set, &[VOLUME_ONLY, UNCUT]].concat();
+        let found = deformed(&set);
+        assert_eq!(found.grid(), original.grid(), "{set:?}");
+        assert!(found.voxels() == original.voxels(), "{set:?}: voxels differ");
+    }
+}
+
+#[test]
+fn skin_tension_changes_the_volume() {
+    let found = deformed(&[VOLUME_ONLY, UNCUT, ("run.frames", "5")]);
+    assert_eq!(found.grid(), original().grid());
+    assert!(found.voxels() != original().voxels());
+}
+
+/// What an incision takes away becomes air, near the incision and nowhere else.
+#[test]
+fn a_cut_that_does_not_move_only_takes_tissue_away() {
+    let (original, found) = (original(), deformed(&[VOLUME_ONLY, ("run.frames", "0")]));
+    let pairs = original.voxels().iter().zip(found.voxels());
+    let changed: Vec<usize> = pairs.enumerate().filter(|(_, (a, b))| a != b).map(|(n, _)| n).collect();
+    assert!(changed.len() > 100, "{}", changed.len());
+    for n in changed {
+        assert_eq!(f32::from(found.voxels()[n]), AIR_HU);
+        let [x, y, z]: [f64; 3] = original.grid().mm(original.grid().point(n)).into();
+        assert!((x - 30.0).abs() < 25.0 && y > 60.0 && z.abs() < 75.0, "{:?}", [x, y, z]);
+    }
+}

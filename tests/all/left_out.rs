@@ -1,0 +1,129 @@
+//! A scene pays only for what it names: what it leaves out is neither stored, nor computed, nor written, and is said.
+
+use cutis::constraints::{Constraint, Distance, SkinTension, Volume};
+use cutis::{LoadedScene, Plan, Silent};
+
+use crate::scenes::{Run, SMALL, scene};
+
+fn plan(loaded: &LoadedScene) -> Plan {
+    cutis::check(loaded, &Silent).unwrap()
+}
+
+/// Bytes of one part of the plan, if it is there.
+fn bytes(plan: &Plan, part: &str) -> Option<usize> {
+    plan.memory.iter().find(|p| p.part == part).map(|p| p.bytes)
+}
+
+fn says(lines: &[String], topic: &str) -> bool {
+    lines.iter().any(|line| line.starts_with(&format!("{topic}:")))
+}
+
+/// What a kind needs: indices, parameters and compliance of each constraint, and where each colour ends.
+fn needed<const N: usize, C: Constraint<N>>(count: usize, colors: usize) -> usize {
+    count * (N * size_of::<u32>() + size_of::<C::Params<f32>>() + size_of::<f32>())
+        + (colors + 1) * size_of::<u32>()
+}
+
+#[test]
+fn a_kind_costs_its_own_bytes_and_no_others() {
+    let full = scene(SMALL, &[]);
+    let whole = plan(&full);
+    let kinds = [
+        ("distance", needed::<2, Distance>(whole.sizes.edges, whole.colors["distance"])),
+        ("volume", needed::<4, Volume>(whole.sizes.tets, whole.colors["volume"])),
+        ("stc", needed::<3, SkinTension>(whole.sizes.skin_triangles, whole.colors["stc"])),
+    ];
+    assert!(whole.sizes.skin_triangles > 1000);
+    for (kind, expected) in kinds {
+        assert_eq!(bytes(&whole, kind), Some(expected), "{kind}");
+        assert!(!says(&whole.left_out, kind), "{kind} is there: {:?}", whole.left_out);
+
+        let mut without = full.clone();
+        let constraints = &mut without.scene.constraints;
+        match kind {
+            "distance" => constraints.distance = None,
+            "volume" => constraints.volume = None,
+            _ => constraints.stc = None,
+        }
+        let less = plan(&without);
+        assert_eq!(bytes(&less, kind), None);
+        assert!(!less.colors.contains_key(kind) && less.colors.len() == 2, "{:?}", less.colors);
+        assert!(says(&less.left_out, kind), "{:?}", less.left_out);
+        let others: Vec<_> = whole.memory.iter().filter(|part| part.part != kind).cloned().collect();
+        assert_eq!(less.memory, others, "leaving {kind} out changes what the others take");
+        assert!(less.projections < whole.projections);
+    }
+}
+
+#[test]
+fn without_any_kind_only_the_vertices_are_stored() {
+    let plan = plan(&scene(SMALL, &[("constraints", "{}")]));
+    let parts: Vec<&str> = plan.memory.iter().map(|part| part.part.as_str()).collect();
+    assert_eq!((parts, plan.projections), (vec!["vertices"], 0));
+    assert!(plan.warnings.iter().any(|line| line.contains("no constraint kind")), "{:?}", plan.warnings);
+}
+
+#[test]
+fn a_handle_is_stored_only_if_there_is_one() {
+    let handle = "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5] }]";
+    let with = plan(&scene(SMALL, &[("handle", handle)]));
+    assert!(bytes(&with, "handles").is_some_and(|bytes| bytes > 0) && !says(&with.left_out, "handle"));
+    let without = plan(&scene(SMALL, &[]));
+    assert!(bytes(&without, "handles").is_none() && says(&without.left_out, "handle"));
+}
+
+/// The skin is looked for only if tension, an incision, a surface or a picture needs it.
+#[test]
+fn the_skin_is_detected_only_if_needed() {
+    let bare = [
+        ("constraints", "{ distance = { youngs_modulus_pa = 5e3 } }"),
+        ("incision", "[]"),
+        ("run.frames", "0"),
+    ];
+    let run = |set: &[(&str, &str)]| Run::of(&scene(SMALL, &[&bare, set].concat())).report;
+    let without = run(&[("output", "{ report = true }")]);
+    assert_eq!(without.sizes.skin_triangles, 0);
+    assert!(without.skin.is_none() && says(&without.left_out, "skin"), "{:?}", without.left_out);
+    let with = run(&[("output", "{ surface = true }")]);
+    assert!(with.skin.is_some() && with.sizes.skin_triangles > 0 && !says(&with.left_out, "skin"));
+}
+
+#[test]
+fn only_named_outputs_are_written() {
+    let run = |output: &[(&str, &str)]| Run::of(&scene(SMALL, &[&[("run.frames", "1")], output].concat()));
+    let report = ["frames.csv", "report.html", "report.json"];
+    let cases: [(&str, &[&str]); 6] = [
+        ("{}", &[]),
+        ("{ report = true }", &report),
+        ("{ volume = true }", &["deformed.nii.gz"]),
+        ("{ surface = true }", &["skin.vtu"]),
+        ("{ tissue = true }", &["tissue.vtu"]),
+        ("{ pictures = true }", &["after.png", "before.png", "slice.png"]),
+    ];
+    for (output, expected) in cases {
+        let run = run(&[("output", output)]);
+        assert_eq!(run.names(), expected, "{output}");
+        let resampled = output.contains("volume") || output.contains("pictures");
+        assert_eq!(run.report.resample.is_some(), resampled, "{output}");
+        assert_eq!(run.report.stages.iter().any(|stage| stage.name == "resample the CT"), resampled);
+        for (topic, key) in
+            [("surface", "surface"), ("tissue", "tissue"), ("pictures", "pictures"), ("report", "report")]
+        {
+            assert_eq!(says(&run.report.left_out, topic), !output.contains(key), "{output}: {topic}");
+        }
+    }
+    // No section at all: everything but the tissue mesh.
+    let all = [
+        "after.png",
+        "before.png",
+        "deformed.nii.gz",
+        "frames.csv",
+        "report.html",
+        "report.json",
+        "skin.vtu",
+        "slice.png",
+    ];
+    assert_eq!(run(&[]).names(), all);
+    // A checkpoint only if it is asked for.
+    assert_eq!(run(&[("output", "{}"), ("run.checkpoint_every", "1")]).names(), ["checkpoint.bin"]);
+}

@@ -1,0 +1,46 @@
+//! Scenes that are shipped can be used, and the page about them says what the program says.
+
+use std::path::Path;
+
+use cutis::Scene;
+
+use crate::scenes::{folder, names};
+
+#[test]
+fn every_fixture_scene_is_valid() {
+    let scenes = names(&folder());
+    assert!(scenes.len() >= 4, "{scenes:?}");
+    for name in scenes {
+        let loaded = Scene::load(&folder().join(&name), &[]);
+        assert!(loaded.is_ok(), "{name}: {}", loaded.unwrap_err());
+    }
+}
+
+#[test]
+fn the_template_and_the_demo_are_valid() {
+    let template = Scene::parse(cutis::scene::template(), Path::new("template"), Path::new(""), &[]).unwrap();
+    let demo = cutis::demo(&[]).unwrap();
+    for loaded in [template, demo] {
+        // What a report holds of a scene is a scene.
+        let text = serde_json::to_string(&loaded.scene).unwrap();
+        assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), loaded.scene);
+    }
+}
+
+/// A relative path starts at the scene file; one from the command line at the current folder.
+#[test]
+fn paths_start_where_they_are_written() {
+    let scene = folder().join("abdomen-incision.toml");
+    let loaded = Scene::load(&scene, &[]).unwrap();
+    assert_eq!(loaded.scene.volume.path, Some(folder().join("abdomen_ts_122x101x112.nii.gz")));
+    let set = crate::scenes::overrides(&[("volume.path", "here.nii")]);
+    assert_eq!(Scene::load(&scene, &set).unwrap().scene.volume.path, Some("here.nii".into()));
+}
+
+#[test]
+fn the_scene_reference_is_up_to_date() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/book/scene-reference.md");
+    let written = std::fs::read_to_string(page).unwrap();
+    let hint = "write it with `cargo run -- scene reference > docs/book/scene-reference.md`";
+    assert!(written == cutis::scene::reference(), "{page} is out of date: {hint}");
+}
