@@ -1,0 +1,117 @@
+//! 0 done, 1 failed while running, 2 bad input or usage; the message names file, key and value.
+
+use crate::Desk;
+
+#[test]
+fn what_works_ends_with_zero() {
+    let desk = Desk::new();
+    for call in [
+        "--help",
+        "--version",
+        "scene new",
+        "check scene.toml",
+        "run scene.toml --out run",
+        "run scene.toml --frames 0",
+    ] {
+        let done = desk.cutis(&call.split(' ').collect::<Vec<_>>()).expect_success();
+        assert!(!done.stdout.is_empty() && !done.stderr.contains("error"), "{call}: {}", done.stderr);
+    }
+    assert!(desk.path("run/report.json").is_file() && desk.path("scene-run/report.json").is_file());
+}
+
+#[test]
+fn usage_errors_end_with_two() {
+    let desk = Desk::new();
+    let calls: [&[&str]; 13] = [
+        &[],
+        &["unheard-of"],
+        &["run"],
+        &["run", "scene.toml", "--unheard-of"],
+        &["run", "scene.toml", "--set", "frames"],
+        &["run", "scene.toml", "--set", "=1"],
+        &["run", "scene.toml", "--frames", "-1"],
+        &["run", "scene.toml", "--without", "skin"],
+        &["check", "scene.toml", "--lattice", "1,2"],
+        &["skin", "a.nii", "--mode", "unheard-of"],
+        &["phantom", "--size", "8,8", "--out", "a.nii"],
+        &["render", "a.nii", "--out", "a.png", "--side", "inside"],
+        &["render", "a.nii", "--out", "a.png", "--slice", "axial@1", "--side", "left"],
+    ];
+    for call in calls {
+        let done = desk.cutis(call);
+        assert_eq!(done.code, 2, "{call:?}: {}", done.stderr);
+        assert!(done.stdout.is_empty() && done.stderr.contains("--help"), "{call:?}: {}", done.stderr);
+    }
+    assert_eq!(desk.names("."), ["scene.toml"]);
+}
+
+#[test]
+fn bad_input_ends_with_two_and_is_named() {
+    let desk = Desk::new();
+    desk.put("typo.toml", crate::SCENE.replace("depth_mm", "depht_mm"));
+    desk.put("type.toml", crate::SCENE.replace("rest_area_scale = 0.8", "rest_area_scale = \"tight\""));
+    desk.put("syntax.toml", "[volume\n");
+    desk.put("text.nii", "this is no volume");
+    desk.cutis(&["phantom", "--size", "16,16,12", "--out", "good.nii"]).expect_success();
+    let bytes = std::fs::read(desk.path("good.nii")).unwrap();
+    desk.put("half.nii", &bytes[..bytes.len() / 2]);
+    desk.cutis(&["phantom", "--size", "16,16,12", "--out", "good.nii.gz"]).expect_success();
+    let bytes = std::fs::read(desk.path("good.nii.gz")).unwrap();
+    desk.put("half.nii.gz", &bytes[..bytes.len() / 2]);
+    desk.put("hostile.nii", hostile_header());
+    let cases: [(&str, &[&str]); 23] = [
+        ("run missing.toml", &["missing.toml", "read"]),
+        ("run typo.toml", &["typo.toml", "incision[0].depht_mm", "depth_mm"]),
+        ("run type.toml", &["type.toml", "constraints.stc.rest_area_scale", "tight"]),
+        ("run syntax.toml", &["syntax.toml", "line 1"]),
+        ("run scene.toml --set solver.dt_s=-1", &["scene.toml", "solver.dt_s", "-1", "above 0"]),
+        ("run scene.toml --set run.frame=1", &["scene.toml", "run.frame", "frames"]),
+        ("run scene.toml --backend gpu", &["scene.toml", "solver.backend", "gpu", "cpu"]),
+        ("run scene.toml --backend tpu", &["scene.toml", "solver.backend", "tpu", "reference"]),
+        ("run scene.toml --set tissue.air_below_hu=5000", &["scene.toml", "tissue", "no tissue"]),
+        ("run scene.toml --resume --out nothing-there", &["nothing-there/checkpoint.bin", "read"]),
+        ("check scene.toml --set volume.path=a.nii", &["scene.toml", "volume", "exactly one"]),
+        ("check scene.toml --set volume={path='half.nii'}", &["half.nii", "truncated"]),
+        ("check scene.toml --lattice 0.0001", &["scene.toml", "lattice", "at most"]),
+        ("inspect missing.nii.gz", &["missing.nii.gz", "No such file"]),
+        ("inspect scene.toml", &["scene.toml", "not a NIfTI file"]),
+        ("inspect text.nii", &["text.nii"]),
+        ("inspect half.nii", &["half.nii", "truncated"]),
+        ("inspect half.nii.gz", &["half.nii.gz"]),
+        ("inspect hostile.nii", &["hostile.nii", "truncated"]),
+        ("skin hostile.nii", &["hostile.nii", "truncated"]),
+        ("skin good.nii --out skin.obj", &["skin.obj", ".vtu"]),
+        ("render good.nii --out a.png --slice axial", &["--slice axial", "axial@MM"]),
+        ("phantom --size 8,0,8 --out a.nii", &["[8, 0, 8]"]),
+    ];
+    for (call, words) in cases {
+        desk.cutis(&call.split(' ').collect::<Vec<_>>()).expect_error(2, words);
+    }
+    for file in ["skin.obj", "a.png", "a.nii"] {
+        assert!(!desk.path(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_run_that_fails_ends_with_one() {
+    let desk = Desk::new();
+    let done = desk.cutis(&["run", "scene.toml", "--out", "run", "--set", "solver.gravity_m_s2=[1e300,0,0]"]);
+    done.expect_error(1, &["finite"]);
+    assert!(desk.names("run").is_empty(), "{:?}", desk.names("run"));
+}
+
+/// 1 KB that says it holds 32767³ voxels, 70 TB.
+fn hostile_header() -> Vec<u8> {
+    let mut bytes = vec![0_u8; 1024];
+    let mut put = |offset: usize, value: &[u8]| bytes[offset..offset + value.len()].copy_from_slice(value);
+    put(0, &348_i32.to_le_bytes());
+    for (n, size) in [3_i16, 32767, 32767, 32767, 1, 1, 1, 1].iter().enumerate() {
+        put(40 + 2 * n, &size.to_le_bytes());
+        put(76 + 4 * n, &1_f32.to_le_bytes());
+    }
+    put(70, &4_i16.to_le_bytes());
+    put(72, &16_i16.to_le_bytes());
+    put(108, &352_f32.to_le_bytes());
+    put(344, b"n+1\0");
+    bytes
+}

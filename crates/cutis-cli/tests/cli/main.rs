@@ -1,0 +1,120 @@
+//! The program as users and scripts meet it: exit codes, messages, JSON, and files that are whole or not there.
+
+mod disk;
+mod exit_codes;
+mod json;
+mod printed;
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+/// The program under test.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_cutis");
+
+/// A torso of a few thousand vertices with an incision; fractions of a second per run.
+const SCENE: &str = r#"
+[volume]
+phantom = { size = [48, 48, 36], seed = 1 }
+[lattice]
+spacing_mm = 12.0
+[constraints.distance]
+youngs_modulus_pa = 5.0e3
+[constraints.volume]
+bulk_modulus_pa = 5.0e4
+[constraints.stc]
+area_modulus_n_per_m = 100.0
+rest_area_scale = 0.8
+[fixed]
+bone_above_hu = 250.0
+end_layers = ["k"]
+[[incision]]
+from_mm = [30.0, 110.0, -50.0]
+to_mm = [30.0, 110.0, 50.0]
+depth_mm = 20.0
+width_mm = 10.0
+[run]
+frames = 2
+"#;
+
+/// An empty folder with `scene.toml` in it, in which the program runs.
+struct Desk {
+    folder: TempDir,
+}
+
+/// What a call of the program left.
+struct Done {
+    call: String,
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file.
+    fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), bytes).unwrap();
+    }
+
+    /// Names of the files of a folder, sorted; none if there is no such folder.
+    fn names(&self, folder: &str) -> Vec<String> {
+        let Ok(entries) = std::fs::read_dir(self.path(folder)) else { return Vec::new() };
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// Runs the program in the folder.
+    fn cutis(&self, args: &[&str]) -> Done {
+        self.finish(args, Command::new(PROGRAM).args(args))
+    }
+
+    /// Runs a bash script in the folder, with the program as `$cutis`.
+    fn script(&self, script: &str) -> Done {
+        self.finish(&[script], Command::new("bash").args(["-c", script]).env("cutis", PROGRAM))
+    }
+
+    fn finish(&self, what: &[&str], command: &mut Command) -> Done {
+        let Output { status, stdout, stderr } =
+            command.current_dir(self.folder.path()).env("RUST_BACKTRACE", "1").output().unwrap();
+        let done = Done {
+            call: what.join(" "),
+            code: status.code().unwrap_or(-1),
+            stdout: String::from_utf8(stdout).unwrap(),
+            stderr: String::from_utf8(stderr).unwrap(),
+        };
+        for sign in ["panicked", "stack backtrace", "RUST_BACKTRACE", "overflowed its stack"] {
+            assert!(!done.stderr.contains(sign), "{}: {}", done.call, done.stderr);
+        }
+        done
+    }
+}
+
+impl Done {
+    /// Fails unless it went well.
+    fn expect_success(self) -> Self {
+        assert_eq!(self.code, 0, "{}: {}", self.call, self.stderr);
+        self
+    }
+
+    /// Fails unless it ended with `code`, nothing on standard output, and one `error:` that has all the words.
+    fn expect_error(&self, code: i32, words: &[&str]) {
+        assert_eq!(self.code, code, "{}: {}", self.call, self.stderr);
+        assert!(self.stdout.is_empty(), "{}: {}", self.call, self.stdout);
+        assert_eq!(self.stderr.matches("error: ").count(), 1, "{}: {}", self.call, self.stderr);
+        for word in words {
+            assert!(self.stderr.contains(word), "{}: no {word:?} in: {}", self.call, self.stderr);
+        }
+    }
+}
