@@ -84,9 +84,14 @@ fn ends_well(result: Result<LoadedScene, Error>) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// The keys of a scene, some of its lists' entries, and text that is no key.
+/// The keys of a scene, some of its lists' entries, text below them, and text that is no key.
 fn key() -> impl Strategy<Value = String> {
-    prop_oneof![select(&KEYS[..]).prop_map(String::from), "[a-z_.0-9]{0,40}", ".{0,20}"]
+    let known = || select(&KEYS[..]).prop_map(String::from);
+    prop_oneof![
+        known(),
+        (known(), ".{0,200}").prop_map(|(key, rest)| format!("{key}.{rest}")),
+        "[a-z_.0-9]{0,40}"
+    ]
 }
 
 /// Values in and out of range, and text that is none.
