@@ -5,8 +5,11 @@ use rayon::prelude::*;
 
 /// The trilinear value at a continuous index, rounded to the nearest stored value (halves upwards). Positions outside the
 /// grid are clamped to it, so the value always lies between the smallest and the largest of the voxels read.
+///
+/// Of the voxels read, those outside `scanned` are padding: where they meet voxels inside it, they count as its nearest
+/// end (air), so that padding never bleeds into tissue. Among themselves, and at a voxel's centre, they keep their value.
 #[inline]
-pub fn trilinear(voxels: &[i16], shape: [usize; 3], position: [f64; 3]) -> i16 {
+pub fn trilinear(voxels: &[i16], shape: [usize; 3], scanned: [i16; 2], position: [f64; 3]) -> i16 {
     let (mut base, mut stride) = (0, 1);
     let mut step = [0; 3];
     let mut fraction = [0.0; 3];
@@ -20,15 +23,26 @@ pub fn trilinear(voxels: &[i16], shape: [usize; 3], position: [f64; 3]) -> i16 {
     }
     let [sx, sy, sz] = step;
     let [fx, fy, fz] = fraction;
-    let along_x = |at: usize| {
-        let (a, b) = (f64::from(voxels[at]), f64::from(voxels[at + sx]));
+    let mut corners: [i16; 8] = std::array::from_fn(|corner| {
+        let [x, y, z] = [corner & 1, corner >> 1 & 1, corner >> 2];
+        voxels[base + x * sx + y * sy + z * sz]
+    });
+    let padding = corners.iter().filter(|&&value| value < scanned[0] || value > scanned[1]).count();
+    if padding > 0 && padding < 8 {
+        if fraction == [0.0; 3] {
+            return voxels[base];
+        }
+        corners = corners.map(|value| value.clamp(scanned[0], scanned[1]));
+    }
+    let along_x = |low: usize| {
+        let (a, b) = (f64::from(corners[low]), f64::from(corners[low + 1]));
         a + fx * (b - a)
     };
-    let along_y = |at: usize| {
-        let (a, b) = (along_x(at), along_x(at + sy));
+    let along_y = |low: usize| {
+        let (a, b) = (along_x(low), along_x(low + 2));
         a + fy * (b - a)
     };
-    let (a, b) = (along_y(base), along_y(base + sz));
+    let (a, b) = (along_y(0), along_y(4));
     // Shifted to positive numbers, where the conversion's truncation is a floor.
     let shift = 32768.0;
     (((a + fz * (b - a)) + (shift + 0.5)) as i32 - shift as i32) as i16
@@ -44,10 +58,34 @@ pub fn stored_air(volume: &Volume) -> i16 {
     (exact.round() as i16).max(low).min(high)
 }
 
+/// The stored values that can come from a scan: air (as [`stored_air`] gives it) and all denser ones. What lies beyond is
+/// padding.
+pub fn scanned_range(volume: &Volume, air: i16) -> [i16; 2] {
+    if volume.slope() > 0.0 { [air, i16::MAX] } else { [i16::MIN, air] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use cutis_volume::{Affine, Grid};
+
+    const ALL: [i16; 2] = [i16::MIN, i16::MAX];
+
+    #[test]
+    fn padding_does_not_bleed_into_tissue() {
+        let scanned = [-1024, i16::MAX];
+        let at = |voxels: &[i16], x: f64| trilinear(voxels, [2, 1, 1], scanned, [x, 0.0, 0.0]);
+        assert_eq!(at(&[-3024, 40], 0.5), -492, "as air");
+        assert_eq!(trilinear(&[-3024, 40], [2, 1, 1], ALL, [0.5, 0.0, 0.0]), -1492, "the control: bled");
+        assert_eq!(at(&[-3024, 40], 0.0), -3024, "kept at its own place");
+        assert_eq!(at(&[-3024, -3024], 0.5), -3024, "and among itself");
+        assert_eq!(at(&[-1000, 40], 0.5), -480);
+        assert_eq!(
+            trilinear(&[3024, -40], [2, 1, 1], [i16::MIN, 1024], [0.5, 0.0, 0.0]),
+            492,
+            "negative slope"
+        );
+    }
 
     #[test]
     fn trilinear_is_exact_at_voxels_and_rounds_between() {
@@ -56,15 +94,15 @@ mod tests {
             for j in 0..2 {
                 for i in 0..2 {
                     let at = [i as f64, j as f64, k as f64];
-                    assert_eq!(trilinear(&voxels, [2, 2, 2], at), voxels[i + 2 * (j + 2 * k)]);
+                    assert_eq!(trilinear(&voxels, [2, 2, 2], ALL, at), voxels[i + 2 * (j + 2 * k)]);
                 }
             }
         }
-        assert_eq!(trilinear(&voxels, [2, 2, 2], [0.25, 0.0, 0.0]), -750);
-        assert_eq!(trilinear(&voxels, [2, 2, 2], [0.0, 0.5, 0.0]), -300);
-        assert_eq!(trilinear(&[0, 1], [2, 1, 1], [0.49, 0.0, 0.0]), 0);
-        assert_eq!(trilinear(&[0, -1], [2, 1, 1], [0.51, 0.0, 0.0]), -1);
-        assert_eq!(trilinear(&voxels, [2, 2, 2], [-5.0, 9.0, -1.0]), 400);
+        assert_eq!(trilinear(&voxels, [2, 2, 2], ALL, [0.25, 0.0, 0.0]), -750);
+        assert_eq!(trilinear(&voxels, [2, 2, 2], ALL, [0.0, 0.5, 0.0]), -300);
+        assert_eq!(trilinear(&[0, 1], [2, 1, 1], ALL, [0.49, 0.0, 0.0]), 0);
+        assert_eq!(trilinear(&[0, -1], [2, 1, 1], ALL, [0.51, 0.0, 0.0]), -1);
+        assert_eq!(trilinear(&voxels, [2, 2, 2], ALL, [-5.0, 9.0, -1.0]), 400);
     }
 
     #[test]

@@ -25,6 +25,8 @@ pub struct Source<'a> {
     pub shape: [usize; 3],
     /// Stored value of a vacated voxel.
     pub air: i16,
+    /// Stored values that are no padding.
+    pub scanned: [i16; 2],
 }
 
 /// A box of output voxels, a few slices thick.
@@ -50,7 +52,7 @@ impl<'a> Slab<'a> {
 
     /// Gives the voxels of a deformed tet to it. Tets must come in ascending order.
     pub fn deform(&mut self, tet: usize) {
-        let Source { warp, space, voxels, shape, .. } = *self.source;
+        let Source { warp, space, voxels, shape, scanned, .. } = *self.source;
         let vertices = warp.tets[tet].map(|v| v as usize);
         let [a, b, c, d] = vertices;
         let place = |positions: &[Point3<f32>]| {
@@ -90,7 +92,7 @@ impl<'a> Slab<'a> {
                         *state |= MOVED;
                         let centre = [i as f64, j as f64, k as f64];
                         let rest = if inside { map.at(centre) } else { map.nearest(raster.lambda(centre)) };
-                        trilinear(voxels, shape, rest)
+                        trilinear(voxels, shape, scanned, rest)
                     }
                 };
             }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::ResampleError;
 use crate::buckets::Buckets;
 use crate::report::ResampleReport;
-use crate::sample::stored_air;
+use crate::sample::{scanned_range, stored_air};
 use crate::slab::{Slab, Source};
 use crate::space::IndexSpace;
 
@@ -114,12 +114,14 @@ fn resample_in_slabs(
     warp.validate()?;
     let grid = sub_grid(volume.grid(), &region)?;
     let space = IndexSpace::new(&volume.grid().affine, warp.origin_mm, [warp.rest, warp.deformed]);
+    let air = stored_air(volume);
     let source = Source {
         warp,
         space: &space,
         voxels: volume.voxels(),
         shape: volume.grid().shape,
-        air: stored_air(volume),
+        air,
+        scanned: scanned_range(volume, air),
     };
     let slices = region[2].clone();
     let slabs = slices.len().div_ceil(slab_slices);
