@@ -85,7 +85,9 @@ impl Workspace {
             .map_or_else(|| self.root.join("../shared/data"), PathBuf::from);
         match folder.is_dir() {
             true => Ok(Some(folder)),
-            false if self.ci => bail!("{} is missing; in CI the real volumes must be there", folder.display()),
+            false if self.ci => {
+                bail!("{} is missing; in CI the real volumes must be there", folder.display())
+            }
             false => Ok(None),
         }
     }

@@ -10,7 +10,7 @@ use cutis::volume::sample::LatticeSize;
 ///
 /// Exit codes: 0 done, 1 failed while running, 2 bad input or usage.
 #[derive(Debug, Parser)]
-#[command(version, max_term_width = 100)]
+#[command(name = "cutis", version, max_term_width = 100)]
 pub(crate) struct Args {
     #[command(subcommand)]
     pub(crate) command: Command,

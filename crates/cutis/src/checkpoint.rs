@@ -68,8 +68,11 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::File`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or of another scene.
     pub(crate) fn read(path: &Path, fingerprint: &[u8; 32], vertices: usize) -> Result<Self, Error> {
-        let bytes = files::read(path)?;
         let fail = |why: String| Error::Checkpoint { path: path.into(), why };
+        if !path.exists() {
+            return Err(fail("there is none; a run with run.checkpoint_every above 0 writes it".into()));
+        }
+        let bytes = files::read(path)?;
         let expected = HEADER + 24 * vertices + SEAL;
         if bytes.len() < HEADER + SEAL || &bytes[..8] != MAGIC {
             return Err(fail("it does not begin as one".into()));

@@ -24,6 +24,8 @@ pub(crate) struct Dynamics {
     pub(crate) system: System<f32>,
     pub(crate) settings: Settings,
     pub(crate) colors: BTreeMap<String, usize>,
+    /// Mean over the skin of √(Σ w|∇A|²/α), 1/s: how fast a skin element alone would swing. None without XPBD skin tension.
+    pub(crate) skin_rate: Option<f64>,
 }
 
 impl SolverSection {
@@ -49,7 +51,8 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
     let xpbd = scene.solver.formulation == FormulationChoice::Xpbd;
     let mesh = &body.mesh;
     let mut colors = BTreeMap::new();
-    let mut builder = SystemBuilder::<f32>::new(&mesh.positions, &body.inverse_masses(loaded)?)?;
+    let inverse_masses = body.inverse_masses(loaded)?;
+    let mut builder = SystemBuilder::<f32>::new(&mesh.positions, &inverse_masses)?;
 
     if let Some(distance) = &scene.constraints.distance {
         let groups = Groups::from_colors(&mesh.edge_classes(&mesh.edges))?;
@@ -69,6 +72,8 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
             add_skin_tension(builder, loaded, stc, body, &groups).map_err(loaded.blame("constraints.stc"))?;
         colors.insert("stc".into(), groups.len());
     }
+    let skin_rate = scene.constraints.stc.as_ref().filter(|_| xpbd && !body.skin.is_empty());
+    let skin_rate = skin_rate.map(|stc| skin_rate_of(body, stc, &inverse_masses));
     for (n, handle) in scene.handle.iter().enumerate() {
         let radius_m = handle.radius_mm / 1000.0;
         let center = mesh.frame.to_local(Point3::from(handle.at_mm)).map(f64::from);
@@ -88,7 +93,7 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
             .handle(Handle { vertices, move_m, over_s: handle.over_s })
             .map_err(loaded.blame(&format!("handle[{n}]")))?;
     }
-    Ok(Dynamics { system: builder.build(), settings: scene.solver.settings(), colors })
+    Ok(Dynamics { system: builder.build(), settings: scene.solver.settings(), colors, skin_rate })
 }
 
 /// Adds a spring along each edge.
@@ -199,6 +204,22 @@ fn add_skin_tension(
             Ok(builder.add::<SkinTensionPaper, 3>(&body.skin, &params, shares(), groups)?)
         }
     }
+}
+
+/// Mean over the triangles of √(Σ w|∇A|²/α) with the scene's general modulus, 1/s.
+fn skin_rate_of(body: &Body, stc: &StcSection, inverse_masses: &[f32]) -> f64 {
+    let material = SkinTensionMaterial { rest_area_scale: stc.rest_area_scale, amplification: 0.0 };
+    let rate = |triangle: &[u32; 3]| {
+        let x = triangle.map(|v| at(&body.mesh, v));
+        let params = SkinTension::from_rest(&x, &material);
+        let gradients = SkinTension::eval(&x, &params).grad;
+        let weighted = |(v, gradient): (&u32, &Vector3<f64>)| {
+            f64::from(inverse_masses[*v as usize]) * gradient.norm_squared()
+        };
+        let sum: f64 = triangle.iter().zip(&gradients).map(weighted).sum();
+        (sum * stc.area_modulus_n_per_m / params[0]).sqrt()
+    };
+    body.skin.iter().map(rate).sum::<f64>() / body.skin.len() as f64
 }
 
 /// One compliance per element.

@@ -94,6 +94,13 @@ impl Scene {
         })?;
         let mut value = toml::Value::Table(table);
         for Override { key, value: new } in overrides {
+            // An override changes what the scene would do: it starts from the outputs that hold without the section.
+            if key.starts_with("output.") && value.get("output").is_none() {
+                let defaults = toml::Value::try_from(super::OutputSection::default());
+                if let (toml::Value::Table(table), Ok(defaults)) = (&mut value, defaults) {
+                    table.insert("output".into(), defaults);
+                }
+            }
             set(&mut value, key, parse_value(new)).map_err(|why| Error::SceneKey {
                 file: file.into(),
                 key: shorten(key),
@@ -125,6 +132,8 @@ impl Scene {
 
 /// Sets the value under a dotted key, making the tables on the way. Entries of lists are addressed by number.
 fn set(mut at: &mut toml::Value, key: &str, new: toml::Value) -> Result<(), String> {
+    // As messages write it (`incision[0].depth_mm`) or with dots alone.
+    let key = &key.replace('[', ".").replace(']', "");
     let parts = key.split('.').count();
     if parts > MAX_KEY_PARTS {
         return Err(format!("has {parts} parts; a key of a scene has at most {MAX_KEY_PARTS}"));
