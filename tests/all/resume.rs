@@ -70,8 +70,8 @@ fn a_checkpoint_that_does_not_fit_is_refused_by_name() {
         assert!(text.contains(file.to_str().unwrap()) && text.contains(expected), "{what}: {text}");
         error
     };
-    let missing = refused("missing", &dragged("5"), "read");
-    assert!(matches!(missing, Error::File { .. }), "{missing:?}");
+    let missing = refused("missing", &dragged("5"), "run.checkpoint_every");
+    assert!(matches!(missing, Error::Checkpoint { .. }), "{missing:?}");
 
     run_in(folder.path(), &dragged("5"), false).unwrap();
     let good = std::fs::read(&file).unwrap();

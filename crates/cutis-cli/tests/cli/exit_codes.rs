@@ -69,7 +69,10 @@ fn bad_input_ends_with_two_and_is_named() {
         ("run scene.toml --backend gpu", &["scene.toml", "solver.backend", "gpu", "cpu"]),
         ("run scene.toml --backend tpu", &["scene.toml", "solver.backend", "tpu", "reference"]),
         ("run scene.toml --set tissue.air_below_hu=5000", &["scene.toml", "tissue", "no tissue"]),
-        ("run scene.toml --resume --out nothing-there", &["nothing-there/checkpoint.bin", "read"]),
+        (
+            "run scene.toml --resume --out nothing-there",
+            &["nothing-there/checkpoint.bin", "run.checkpoint_every"],
+        ),
         ("check scene.toml --set volume.path=a.nii", &["scene.toml", "volume", "exactly one"]),
         ("check scene.toml --set volume={path='half.nii'}", &["half.nii", "truncated"]),
         ("check scene.toml --lattice 0.0001", &["scene.toml", "lattice", "at most"]),
