@@ -8,6 +8,7 @@ use cutis_volume::PartialFile;
 use sha2::{Digest, Sha256};
 
 use crate::Error;
+use crate::scene::OutputSection;
 
 /// Writes a whole file under a temporary name in the same folder and renames it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
@@ -99,4 +100,23 @@ paths! {
     slice = "slice.png";
     /// State from which a run goes on.
     checkpoint = "checkpoint.bin";
+}
+
+impl RunFolder {
+    /// Names of files that are there although a run with these outputs does not write them.
+    pub(crate) fn left_from_before(&self, output: &OutputSection) -> Vec<String> {
+        let files = [
+            (output.report, self.report()),
+            (output.report, self.html()),
+            (output.report, self.frames()),
+            (output.volume, self.volume()),
+            (output.surface, self.skin()),
+            (output.tissue, self.tissue()),
+            (output.pictures, self.before()),
+            (output.pictures, self.after()),
+            (output.pictures, self.slice()),
+        ];
+        let stale = files.iter().filter(|(written, path)| !written && path.exists());
+        stale.filter_map(|(_, path)| Some(path.file_name()?.to_string_lossy().into_owned())).collect()
+    }
 }

@@ -42,7 +42,7 @@ pub(crate) struct FrameRow {
 pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) -> Result<Report, Error> {
     let mut clock = Clock::new(progress);
     let folder = RunFolder(options.out.clone());
-    let Prepared { source, body, dynamics, plan } = plan::prepare(loaded, &mut clock)?;
+    let Prepared { source, body, dynamics, mut plan } = plan::prepare(loaded, &mut clock)?;
     files::create_folder(&folder.0)?;
     plan.warnings.iter().for_each(|warning| progress.note(warning));
 
@@ -55,6 +55,16 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
                 .map_err(loaded.blame("solver"))?,
         ),
     };
+    let stale = folder.left_from_before(&loaded.scene.output);
+    if !stale.is_empty() && !options.resume {
+        let note = format!(
+            "{} holds files of an earlier run that this one does not write: {}",
+            folder.0.display(),
+            stale.join(", ")
+        );
+        progress.note(&note);
+        plan.warnings.push(note);
+    }
     let fingerprint = checkpoint::fingerprint(&loaded.scene, &source.sha256);
     let rest = &body.mesh.positions;
     let mut done = 0;

@@ -45,6 +45,10 @@ pub struct HuStats {
 /// [`VolumeError::Truncated`], [`VolumeError::TooLarge`], [`VolumeError::Range`], [`VolumeError::Infinite`].
 pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
     let path = path.as_ref();
+    if path.is_dir() {
+        let reason = "it is a folder; DICOM is not read yet, dcm2niix converts a series to one file";
+        return Err(VolumeError::NotNifti { path: path.into(), reason });
+    }
     let pair = pair(path)?;
     let header_path = pair.as_ref().map_or(path, |(header, _)| header);
     let mut source = Source::open(header_path)?;
