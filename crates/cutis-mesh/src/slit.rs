@@ -41,7 +41,7 @@ impl Slit {
     /// Finds the slit's frame and the skin's height along it.
     ///
     /// The segment must come within `reach` = max(depth, a quarter of the length, two lattice steps) of the centre of a skin triangle: enough for
-    /// the chord of a strongly curved belly.
+    /// the chord of a strongly curved belly. Along at least half of it there must be skin within reach above or below.
     pub(crate) fn place(
         mesh: &TetMesh,
         skin: &[[u32; 3]],
@@ -65,15 +65,16 @@ impl Slit {
             let s = (facet.center - start).dot(&along).clamp(0.0, length);
             (facet.center - (start + along * s)).norm()
         };
+        let off_skin = |distance: f64| MeshError::IncisionOffSkin {
+            incision: number,
+            from_mm: cut.from_mm,
+            to_mm: cut.to_mm,
+            distance_mm: distance * 1000.0,
+            reach_mm: reach * 1000.0,
+        };
         let distance = facets.iter().map(from_segment).fold(f64::INFINITY, f64::min);
         if distance > reach {
-            return Err(MeshError::IncisionOffSkin {
-                incision: number,
-                from_mm: cut.from_mm,
-                to_mm: cut.to_mm,
-                distance_mm: distance * 1000.0,
-                reach_mm: reach * 1000.0,
-            });
+            return Err(off_skin(distance));
         }
         let near: Vec<&Facet> =
             facets.iter().filter(|facet| from_segment(facet) <= reach + 2.0 * step).collect();
@@ -94,12 +95,20 @@ impl Slit {
         let lateral = inward.cross(&along);
         let mut slit =
             Self { start, along, lateral, inward, length, half_width, depth, above: reach, skin: Vec::new() };
-        slit.skin = slit.heights(mesh, skin, &facets, step);
+        let (heights, on_skin) = slit.heights(mesh, skin, &facets, step);
+        if 2 * on_skin < heights.len() {
+            let from = |end: Point3<f64>| {
+                facets.iter().map(|facet| (facet.center - end).norm()).fold(f64::INFINITY, f64::min)
+            };
+            return Err(off_skin(from(start).max(from(end))));
+        }
+        slit.skin = heights;
         Ok(slit)
     }
 
-    /// Mean height of the skin in bins of about two lattice steps; bins without skin take theirs from their neighbours.
-    fn heights(&self, mesh: &TetMesh, skin: &[[u32; 3]], facets: &[Facet], step: f64) -> Vec<f64> {
+    /// Mean height of the skin in bins of about two lattice steps, and in how many of them there is skin. The others take theirs
+    /// from their neighbours.
+    fn heights(&self, mesh: &TetMesh, skin: &[[u32; 3]], facets: &[Facet], step: f64) -> (Vec<f64>, usize) {
         let count = (self.length / (2.0 * step)).floor().clamp(1.0, MOST_BINS) as usize;
         let mut bins: Vec<Vec<f64>> = vec![Vec::new(); count];
         let facing = skin.iter().zip(facets).filter(|(_, facet)| facet.area_vector.dot(&self.inward) < 0.0);
@@ -121,7 +130,7 @@ impl Slit {
             .filter(|(_, heights)| !heights.is_empty())
             .map(|(bin, heights)| (bin as f64, steady_mean(heights, 2.0 * step)))
             .collect();
-        (0..count).map(|bin| interpolate(&known, bin as f64)).collect()
+        ((0..count).map(|bin| interpolate(&known, bin as f64)).collect(), known.len())
     }
 
     /// Coordinates of a position at rest.

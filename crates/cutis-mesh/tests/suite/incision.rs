@@ -227,6 +227,12 @@ fn unusable_incisions_are_refused_by_name() {
         matches!(off, MeshError::IncisionOffSkin { distance_mm, .. } if (distance_mm - 50.0).abs() < 1.0),
         "{off}"
     );
+    // One end on the skin, the other far beyond the block: most of the segment runs through air.
+    let mostly_off = refuse(incision([50.0, 20.0, 20.0], [150.0, 20.0, 20.0], 6.0, 4.0));
+    assert!(
+        matches!(mostly_off, MeshError::IncisionOffSkin { distance_mm, .. } if distance_mm > 80.0),
+        "{mostly_off}"
+    );
     let through = refuse(incision([20.0, 20.0, 24.0], [20.0, 20.0, 16.0], 6.0, 4.0));
     assert!(matches!(through, MeshError::IncisionThroughSkin { .. }), "{through}");
     let empty = refuse(incision([20.5, 20.6, 20.0], [20.6, 20.6, 20.0], 0.1, 0.1));
