@@ -203,7 +203,11 @@ fn pairs_need_both_halves() {
     fs::remove_file(&header).unwrap();
     assert!(matches!(nifti::read(&voxels), Err(VolumeError::MissingPartner { .. })));
     assert!(matches!(nifti::read(folder.path().join("none.hdr")), Err(VolumeError::Io { .. })));
-    assert!(matches!(nifti::read(folder.path()), Err(VolumeError::Io { .. })));
+    let error = nifti::read(folder.path()).unwrap_err();
+    assert!(
+        matches!(error, VolumeError::NotNifti { .. }) && error.to_string().contains("dcm2niix"),
+        "{error}"
+    );
 }
 
 fn bytes_of<const N: usize, T: Copy>(values: &[T], encode: fn(T) -> [u8; N]) -> Vec<u8> {
