@@ -11,4 +11,5 @@ mod resume;
 mod scene_files;
 mod scenes;
 mod skin_counts;
+mod warnings;
 mod wound;

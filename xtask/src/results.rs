@@ -64,7 +64,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         if scene == "abdomen-incision" {
             same_for_any_thread_count(workspace, scene, &set, &scratch)?;
             notes.push(format!(
-                "`{scene}`, {THREAD_FRAMES} frames: the same bits for 1, 2, 3 and 8 threads, and other bits for another \
+                "`{scene}`, {THREAD_FRAMES} frames of 5 substeps: the same bits for 1, 2, 3 and 8 threads, and other bits for another \
                  stiffness (the control)."
             ));
         }
