@@ -44,6 +44,9 @@ fn five_and_five_frames_are_ten() {
     }
     assert_eq!(frames(whole.path()), frames(halves.path()));
     assert_eq!((whole_report.frames.count, resumed_report.frames.count), (10, 5));
+    let table = std::fs::read_to_string(halves.path().join("frames.csv")).unwrap();
+    let frames: Vec<&str> = table.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(frames, ["0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10"], "the first half is kept");
     let wound =
         |report: &cutis::report::Report| report.wound.as_ref().map(|w| (w.initial_mm, w.final_mm, w.mid_mm));
     assert_eq!(wound(&whole_report), wound(&resumed_report));
