@@ -23,8 +23,10 @@ use MayUse::{AnyBelow, These};
 /// The table of `docs/ARCHITECTURE.md`. A new crate gets a row here first.
 const LAYERS: &[Layer] = &[
     Layer { name: "cutis-coloring", level: 0, may_use: These(&[]) },
+    Layer { name: "cutis-shaders", level: 0, may_use: These(&[]) },
     Layer { name: "cutis-volume", level: 1, may_use: These(&[]) },
-    Layer { name: "cutis-constraints", level: 1, may_use: These(&[]) },
+    Layer { name: "cutis-constraints", level: 1, may_use: These(&["cutis-shaders"]) },
+    Layer { name: "cutis-gpu", level: 1, may_use: These(&[]) },
     Layer { name: "cutis-mesh", level: 2, may_use: These(&["cutis-volume"]) },
     Layer { name: "cutis-solver", level: 2, may_use: These(&["cutis-constraints", "cutis-coloring"]) },
     Layer {
@@ -32,8 +34,34 @@ const LAYERS: &[Layer] = &[
         level: 3,
         may_use: These(&["cutis-solver", "cutis-constraints", "cutis-coloring"]),
     },
-    Layer { name: "cutis-resample", level: 3, may_use: These(&["cutis-volume", "cutis-mesh"]) },
-    Layer { name: "cutis-render", level: 3, may_use: These(&["cutis-volume", "cutis-mesh"]) },
+    Layer {
+        name: "cutis-solver-gpu",
+        level: 3,
+        may_use: These(&["cutis-solver", "cutis-constraints", "cutis-gpu", "cutis-shaders"]),
+    },
+    Layer {
+        name: "cutis-resample",
+        level: 3,
+        may_use: These(&["cutis-volume", "cutis-mesh", "cutis-gpu", "cutis-shaders"]),
+    },
+    Layer {
+        name: "cutis-render",
+        level: 3,
+        may_use: These(&["cutis-volume", "cutis-mesh", "cutis-gpu", "cutis-shaders"]),
+    },
+    Layer {
+        name: "cutis-conformance",
+        level: 4,
+        may_use: These(&[
+            "cutis-solver-cpu",
+            "cutis-solver-gpu",
+            "cutis-solver",
+            "cutis-constraints",
+            "cutis-coloring",
+            "cutis-gpu",
+            "cutis-shaders",
+        ]),
+    },
     Layer { name: "cutis", level: 5, may_use: AnyBelow },
     Layer { name: "cutis-cli", level: 6, may_use: AnyBelow },
 ];

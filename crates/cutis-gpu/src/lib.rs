@@ -1,0 +1,2 @@
+//! Compute on any GPU, through wgpu.
+#![forbid(unsafe_code)]

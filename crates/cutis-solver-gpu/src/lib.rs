@@ -1,0 +1,2 @@
+//! GPU backend of the solver.
+#![forbid(unsafe_code)]
