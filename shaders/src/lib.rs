@@ -4,6 +4,9 @@
 //! choice of parts, not a condition inside one.
 #![forbid(unsafe_code)]
 
+pub mod constraints;
+pub mod solver;
+
 /// Joins parts to one source, in order, each beginning on a line of its own.
 pub fn link(parts: &[&str]) -> String {
     let mut source = String::with_capacity(parts.iter().map(|part| part.len() + 1).sum());

@@ -22,12 +22,17 @@ pub trait Params<T>: Copy + Debug + Send + Sync + PartialEq + AsRef<[T]> {
     const LEN: usize;
     /// Builds the array from its `k`-th scalars.
     fn from_fn(f: impl FnMut(usize) -> T) -> Self;
+    /// The scalars of many constraints, one after the other: what a GPU is given.
+    fn flat(many: &[Self]) -> &[T];
 }
 
 impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T; K] {
     const LEN: usize = K;
     fn from_fn(f: impl FnMut(usize) -> T) -> Self {
         std::array::from_fn(f)
+    }
+    fn flat(many: &[Self]) -> &[T] {
+        many.as_flattened()
     }
 }
 
@@ -69,6 +74,14 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 /// lanes gathered from several constraints, and a solver can store, upload and transpose them knowing only `K`.
 /// Destructure them by name at the head of `eval`.
 ///
+/// # The same in WGSL
+/// [`WGSL`](Constraint::WGSL) is the twin of `eval` for the GPU: `struct Params` with the scalars of the parameters in their
+/// order (`f32`, nothing else), and `fn eval(x: array<vec3f, N>, p: Params) -> Eval`, where `N` and `Eval` (`c: f32`,
+/// `grad: array<vec3f, N>`) stand above it already. With the operations `+ − * /`, `sqrt`, `dot`, `cross`, `length`, `abs`,
+/// `floor`, `clamp`, `min`, `max` and `select`, in the same order as in Rust, a software device gives the bits of the CPU.
+/// `normalize`, `mix`, `fma`, `pow` and the transcendental functions differ. A denominator that may be zero is replaced by
+/// `select` before the division. The battery of the crate `cutis-conformance` holds one against the other.
+///
 /// # Example
 /// A constraint of one's own: a point that should stay on the plane `z = height`.
 /// ```
@@ -79,6 +92,11 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 ///
 /// impl Constraint<1> for OnPlane {
 ///     const NAME: &'static str = "on plane";
+///     const WGSL: &'static str = "
+///         struct Params { height: f32 }
+///         fn eval(x: array<vec3f, N>, p: Params) -> Eval {
+///             return Eval(x[0].z - p.height, array<vec3f, N>(vec3f(0.0, 0.0, 1.0)));
+///         }";
 ///     type Params<T: Real> = [T; 1];
 ///     type Material = ();
 ///     fn from_rest<T: Real>([point]: &[Point3<T>; 1], _: &()) -> [T; 1] {
@@ -98,6 +116,8 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 pub trait Constraint<const N: usize>: Send + Sync + 'static {
     /// Name in reports, benchmarks and tests.
     const NAME: &'static str;
+    /// `struct Params` and `fn eval`, the twin of [`eval`](Self::eval) in WGSL.
+    const WGSL: &'static str;
     /// Per-constraint scalars, `[T; K]`.
     type Params<T: Real>: Params<T>;
     /// What the caller chooses when a constraint is built from its rest shape (for example a rest-area scale).

@@ -41,6 +41,7 @@ impl DistanceMaterial {
 
 impl Constraint<2> for Distance {
     const NAME: &'static str = "distance";
+    const WGSL: &'static str = cutis_shaders::constraints::DISTANCE;
     type Params<T: Real> = [T; 1];
     type Material = DistanceMaterial;
 

@@ -72,6 +72,7 @@ pub(crate) fn stretch<T: Real>(c: T, rest_area: T) -> T {
 
 impl Constraint<3> for SkinTension {
     const NAME: &'static str = "stc";
+    const WGSL: &'static str = cutis_shaders::constraints::SKIN_TENSION;
     type Params<T: Real> = [T; 2];
     type Material = SkinTensionMaterial;
 

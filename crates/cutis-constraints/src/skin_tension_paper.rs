@@ -69,6 +69,7 @@ impl SkinTensionPaperMaterial {
 
 impl Constraint<3> for SkinTensionPaper {
     const NAME: &'static str = "stc_paper";
+    const WGSL: &'static str = cutis_shaders::constraints::SKIN_TENSION_PAPER;
     type Params<T: Real> = [T; 3];
     type Material = SkinTensionPaperMaterial;
 

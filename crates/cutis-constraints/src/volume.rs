@@ -61,6 +61,7 @@ fn volume_and_gradient<T: Real>([x1, x2, x3, x4]: &[Point3<T>; 4]) -> (T, [Vecto
 
 impl Constraint<4> for Volume {
     const NAME: &'static str = "volume";
+    const WGSL: &'static str = cutis_shaders::constraints::VOLUME;
     type Params<T: Real> = [T; 1];
     type Material = VolumeMaterial;
 

@@ -99,5 +99,8 @@ fn a_scene_pays_only_for_what_it_names() {
     let solver = SolverReference::new(body(false), settings(1)).unwrap();
     let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();
     assert_eq!(bytes[0], lattice.positions.len() * 40);
-    assert_eq!(bytes[1], lattice.edges.len() * 12 + solver.system().kinds()[0].offsets().len() * 4);
+    assert_eq!(
+        bytes[1],
+        lattice.edges.len() * 12 + solver.simulation().system().kinds()[0].offsets().len() * 4
+    );
 }

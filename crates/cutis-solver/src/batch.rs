@@ -255,6 +255,22 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
         self.indices.as_flattened()
     }
 
+    fn param_count(&self) -> usize {
+        <C::Params<T> as Params<T>>::LEN
+    }
+
+    fn params(&self) -> &[T] {
+        Params::flat(&self.params)
+    }
+
+    fn rest_size(&self, k: usize) -> T {
+        C::rest_size(&self.params[k])
+    }
+
+    fn wgsl(&self) -> &'static str {
+        C::WGSL
+    }
+
     fn stiffness(&self) -> &Stiffness<T> {
         &self.stiffness
     }

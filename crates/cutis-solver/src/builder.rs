@@ -7,9 +7,8 @@ use cutis_constraints::{Constraint, Scalar};
 use nalgebra::{Point3, Vector3};
 
 use crate::batch::Batch;
-use crate::handle::Carried;
 use crate::system::check_finite;
-use crate::{Handle, SolverError, Stiffness, System, Vertex};
+use crate::{Carried, Handle, SolverError, Stiffness, System, Vertex};
 
 /// Collects vertices, kinds of constraints and handles into a [`System`].
 pub struct SystemBuilder<T: Scalar> {

@@ -1,6 +1,6 @@
 //! Everything that can be wrong with a system, its settings or a run.
 
-use crate::Formulation;
+use crate::{Clock, Formulation, Settings};
 
 /// Why a system was refused or a step stopped.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -148,4 +148,22 @@ pub enum SolverError {
         /// Time of the state that was kept, in seconds.
         time_s: f64,
     },
+    /// The device of a backend failed. What the host last read of the body is kept, and is that of `time_s`.
+    #[error("the {backend} backend stopped: {reason}; the last state that was read is that of {time_s} s")]
+    Device {
+        /// Which backend.
+        backend: &'static str,
+        /// What happened.
+        reason: String,
+        /// Time of the state that was kept, in seconds.
+        time_s: f64,
+    },
+}
+
+impl SolverError {
+    /// [`NotFinite`](Self::NotFinite) for a body whose state is that of `clock`.
+    pub fn not_finite(vertex: usize, clock: Clock, settings: &Settings) -> Self {
+        let Clock { frame, substep } = clock;
+        Self::NotFinite { vertex, frame, substep, time_s: clock.time_s(settings) }
+    }
 }

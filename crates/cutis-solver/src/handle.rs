@@ -23,7 +23,7 @@ pub struct Handle {
 
 /// A checked handle with the rest positions of its vertices.
 #[derive(Clone, Debug)]
-pub(crate) struct Carried<T: Scalar> {
+pub struct Carried<T: Scalar> {
     vertices: Vec<u32>,
     rest: Vec<Point3<T>>,
     move_m: [f64; 3],
@@ -61,10 +61,26 @@ impl<T: Scalar> Carried<T> {
         Ok(Self { vertices: handle.vertices, rest, move_m: handle.move_m, over_s: handle.over_s })
     }
 
+    /// The vertices it moves.
+    pub fn vertices(&self) -> &[u32] {
+        &self.vertices
+    }
+
+    /// Where they began, relative to [`System::origin`](crate::System::origin), in the order of
+    /// [`vertices`](Self::vertices).
+    pub fn rest(&self) -> &[Point3<T>] {
+        &self.rest
+    }
+
+    /// How far they have come at `time_s`, in metres.
+    pub fn path(&self, time_s: f64) -> Vector3<T> {
+        let share = if time_s < self.over_s { time_s / self.over_s } else { 1.0 };
+        Vector3::from(self.move_m.map(|d| T::constant(d * share)))
+    }
+
     /// Puts the vertices where they are at `time_s`.
     pub(crate) fn carry(&self, vertices: &mut [Vertex<T>], time_s: f64) {
-        let share = if time_s < self.over_s { time_s / self.over_s } else { 1.0 };
-        let path = Vector3::from(self.move_m.map(|d| T::constant(d * share)));
+        let path = self.path(time_s);
         for (&vertex, rest) in self.vertices.iter().zip(&self.rest) {
             vertices[vertex as usize].set_position(rest + path);
         }

@@ -29,7 +29,7 @@
 //! let settings = Settings { formulation: Formulation::Xpbd, dt_s: 0.01, substeps: 10, ..Settings::default() };
 //! let mut solver = SolverReference::new(system, settings)?;
 //! solver.step(5)?;
-//! assert!(solver.positions()[1].x < 1.1);
+//! assert!(solver.positions()?[1].x < 1.1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -39,6 +39,7 @@
 
 mod batch;
 mod builder;
+mod clock;
 mod coloured;
 mod error;
 mod handle;
@@ -56,12 +57,13 @@ mod system;
 mod vertex;
 
 pub use builder::SystemBuilder;
+pub use clock::Clock;
 pub use coloured::Coloured;
 pub use error::SolverError;
-pub use handle::Handle;
+pub use handle::{Carried, Handle};
 pub use kernel::{Pbd, Projection, Rule, Xpbd, project};
 pub use measures::{Energy, MemoryPart, Momentum, Residual};
-pub use passes::{Motion, VertexBlock};
+pub use passes::{Integrator, Motion, VertexBlock};
 pub use reference::{Serial, SolverReference};
 pub use schedule::{Schedule, Sweep};
 pub use set::{ConstraintSet, Kind, Step};

@@ -54,10 +54,13 @@ pub enum Motion {
 
 /// The numbers of a substep in the solver's own type.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Integrator<T> {
-    h: T,
-    velocity_factor: T,
-    gravity_h: Vector3<T>,
+pub struct Integrator<T> {
+    /// Length of a substep, `h`, in s.
+    pub h: T,
+    /// `exp(−damping·h)/h` in 1/s: from a displacement to a velocity.
+    pub velocity_factor: T,
+    /// Gravity times `h`, in m/s.
+    pub gravity_h: Vector3<T>,
 }
 
 impl<T: Scalar> Integrator<T> {

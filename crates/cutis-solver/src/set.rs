@@ -30,6 +30,17 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     fn offsets(&self) -> &[u32];
     /// The vertices of each constraint, `arity` of them in a row, ordered by colour.
     fn indices(&self) -> &[u32];
+    /// Scalars of one constraint's parameters.
+    fn param_count(&self) -> usize;
+    /// The parameters of each constraint, `param_count` scalars in a row, ordered by colour.
+    fn params(&self) -> &[T];
+    /// The size that the value of constraint `k` (in the order of the colours) is compared with.
+    ///
+    /// # Panics
+    /// If there is no such constraint.
+    fn rest_size(&self, k: usize) -> T;
+    /// The kind in WGSL, [`Constraint::WGSL`](cutis_constraints::Constraint::WGSL).
+    fn wgsl(&self) -> &'static str;
     /// Stiffness, ordered by colour where there is one for each constraint.
     fn stiffness(&self) -> &Stiffness<T>;
     /// `C` over rest size at the given positions; rest sizes of zero are left out.

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::passes::Integrator;
 use crate::{
-    ConstraintSet, Formulation, Motion, Schedule, Settings, SolverError, Step, Sweep, System, Vertex,
+    Clock, ConstraintSet, Formulation, Motion, Schedule, Settings, SolverError, Step, Sweep, System, Vertex,
     VertexBlock,
 };
 
@@ -36,8 +36,7 @@ pub struct Simulation<T: Scalar> {
     integrator: Integrator<T>,
     step: Step<T>,
     multipliers: Vec<Vec<T>>,
-    frame: u64,
-    substep: u32,
+    clock: Clock,
 }
 
 impl<T: Scalar> Simulation<T> {
@@ -70,8 +69,7 @@ impl<T: Scalar> Simulation<T> {
             multipliers,
             system,
             settings,
-            frame: 0,
-            substep: 0,
+            clock: Clock::default(),
         })
     }
 
@@ -90,9 +88,41 @@ impl<T: Scalar> Simulation<T> {
         &self.schedule
     }
 
+    /// Frames and substeps done.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
     /// Simulated time in seconds.
     pub fn time_s(&self) -> f64 {
-        self.frame as f64 * self.settings.dt_s + f64::from(self.substep) * self.settings.substep_s()
+        self.clock.time_s(&self.settings)
+    }
+
+    /// The numbers of a substep.
+    pub fn integrator(&self) -> &Integrator<T> {
+        &self.integrator
+    }
+
+    /// What a substep asks of every projection.
+    pub fn projection_step(&self) -> Step<T> {
+        self.step
+    }
+
+    /// Says how far a backend has come that keeps the state elsewhere.
+    pub fn set_clock(&mut self, clock: Clock) {
+        self.clock = clock;
+    }
+
+    /// Takes over a state that a backend has kept elsewhere, in the solver's own coordinates.
+    ///
+    /// # Errors
+    /// [`SolverError::VertexLength`] unless there is one of each per vertex; the state is then unchanged.
+    pub fn set_state(
+        &mut self,
+        vertices: &[Vertex<T>],
+        velocities: impl ExactSizeIterator<Item = Vector3<T>>,
+    ) -> Result<(), SolverError> {
+        self.system.set_state(vertices, velocities)
     }
 
     /// Bytes of the stored multipliers; 0 unless XPBD runs more than one iteration.
@@ -107,21 +137,17 @@ impl<T: Scalar> Simulation<T> {
     /// start of this substep, with all velocities zero, and may be stepped on.
     pub fn run(&mut self, frames: usize, execute: &impl Execute<T>) -> Result<(), SolverError> {
         let mut motion = Motion::Predict;
-        let end = self.frame.saturating_add(frames as u64);
-        while self.frame < end {
+        let end = self.clock.frame.saturating_add(frames as u64);
+        while self.clock.frame < end {
             self.move_vertices(motion, execute);
             self.system.carry_handles(self.time_s() + self.settings.substep_s());
             self.project(execute);
             if let Some(vertex) = execute.first_not_finite(&self.system.vertices) {
                 self.move_vertices(Motion::Restore, execute);
-                let (frame, substep, time_s) = (self.frame, self.substep, self.time_s());
-                return Err(SolverError::NotFinite { vertex, frame, substep, time_s });
+                return Err(SolverError::not_finite(vertex, self.clock, &self.settings));
             }
             motion = Motion::FinishAndPredict;
-            self.substep += 1;
-            if self.substep == self.schedule.substeps {
-                (self.frame, self.substep) = (self.frame + 1, 0);
-            }
+            self.clock.tick(&self.settings);
         }
         if motion == Motion::FinishAndPredict {
             self.move_vertices(Motion::Finish, execute);
@@ -143,7 +169,7 @@ impl<T: Scalar> Simulation<T> {
         frame: u64,
     ) -> Result<(), SolverError> {
         self.system.restore(positions, velocities)?;
-        (self.frame, self.substep) = (frame, 0);
+        self.clock = Clock { frame, substep: 0 };
         Ok(())
     }
 

@@ -6,6 +6,9 @@ use nalgebra::{Point3, Vector3};
 use crate::{Energy, MemoryPart, Momentum, Residual, Schedule, Settings, Simulation, SolverError, System};
 
 /// A backend with a body in it. Object-safe; what is measured is computed when it is asked for.
+///
+/// A backend may keep the state on a device. Whatever looks at the state therefore takes `&mut self` and can fail: it reads
+/// what it needs from there, and no more. On a CPU backend it costs nothing and never fails.
 pub trait Solver<T: Scalar>: Send {
     /// Name in reports.
     fn name(&self) -> &'static str;
@@ -13,13 +16,13 @@ pub trait Solver<T: Scalar>: Send {
     /// Runs `frames` frames.
     ///
     /// # Errors
-    /// [`SolverError::NotFinite`]: see [`Simulation::run`].
+    /// [`SolverError::NotFinite`]: see [`Simulation::run`]; [`SolverError::Device`] if a device fails.
     fn step(&mut self, frames: usize) -> Result<(), SolverError>;
 
     /// Goes on from a saved state: positions in the caller's coordinates (m), velocities (m/s), frames done so far.
     ///
     /// # Errors
-    /// Wrong lengths or values that are not finite: see [`Simulation::restore`].
+    /// Wrong lengths or values that are not finite: see [`Simulation::restore`]; [`SolverError::Device`].
     fn restore(
         &mut self,
         positions: &[Point3<T>],
@@ -27,13 +30,56 @@ pub trait Solver<T: Scalar>: Send {
         frame: u64,
     ) -> Result<(), SolverError>;
 
-    /// The simulation in its present state.
+    /// Settings, schedule and clock as of now, and the body as it was when the host last read it: on a CPU backend as of
+    /// now, elsewhere at the last call of [`refresh`](Self::refresh).
     fn simulation(&self) -> &Simulation<T>;
 
-    /// The body in its present state.
-    fn system(&self) -> &System<T> {
-        self.simulation().system()
+    /// Brings the host's copy of the body up to date.
+    ///
+    /// # Errors
+    /// [`SolverError::Device`].
+    fn refresh(&mut self) -> Result<(), SolverError> {
+        Ok(())
     }
+
+    /// Positions of chosen vertices in the caller's coordinates (m), in the order asked for.
+    ///
+    /// # Errors
+    /// [`SolverError::Vertex`] for a vertex that does not exist; [`SolverError::Device`].
+    fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<T>>, SolverError> {
+        self.system()?.positions_of(vertices)
+    }
+
+    /// The body in its present state.
+    ///
+    /// # Errors
+    /// As for [`refresh`](Self::refresh); the same for all that follow.
+    fn system(&mut self) -> Result<&System<T>, SolverError> {
+        self.refresh()?;
+        Ok(self.simulation().system())
+    }
+    /// Positions in the caller's coordinates (m), in the caller's order.
+    fn positions(&mut self) -> Result<Vec<Point3<T>>, SolverError> {
+        Ok(self.system()?.positions())
+    }
+    /// Velocities in m/s.
+    fn velocities(&mut self) -> Result<&[Vector3<T>], SolverError> {
+        Ok(self.system()?.velocities())
+    }
+    /// `C` over rest size, per kind.
+    fn residuals(&mut self) -> Result<Vec<Residual>, SolverError> {
+        Ok(self.system()?.residuals())
+    }
+    /// Kinetic, elastic and gravitational energy.
+    fn energy(&mut self) -> Result<Energy, SolverError> {
+        let gravity = self.settings().gravity_m_s2;
+        Ok(self.system()?.energy(gravity))
+    }
+    /// Linear and angular momentum.
+    fn momentum(&mut self) -> Result<Momentum, SolverError> {
+        Ok(self.system()?.momentum())
+    }
+
     /// The settings in use.
     fn settings(&self) -> &Settings {
         self.simulation().settings()
@@ -46,30 +92,11 @@ pub trait Solver<T: Scalar>: Send {
     fn time_s(&self) -> f64 {
         self.simulation().time_s()
     }
-    /// Positions in the caller's coordinates (m), in the caller's order.
-    fn positions(&self) -> Vec<Point3<T>> {
-        self.system().positions()
-    }
-    /// Velocities in m/s.
-    fn velocities(&self) -> &[Vector3<T>] {
-        self.system().velocities()
-    }
-    /// `C` over rest size, per kind.
-    fn residuals(&self) -> Vec<Residual> {
-        self.system().residuals()
-    }
-    /// Kinetic, elastic and gravitational energy.
-    fn energy(&self) -> Energy {
-        self.system().energy(self.settings().gravity_m_s2)
-    }
-    /// Linear and angular momentum.
-    fn momentum(&self) -> Momentum {
-        self.system().momentum()
-    }
-    /// Bytes stored on the host, part by part.
+    /// Bytes stored, part by part.
     fn bytes(&self) -> Vec<MemoryPart> {
-        let mut parts = self.system().bytes();
-        let bytes = self.simulation().multiplier_bytes();
+        let simulation = self.simulation();
+        let mut parts = simulation.system().bytes();
+        let bytes = simulation.multiplier_bytes();
         if bytes > 0 {
             parts.push(MemoryPart { name: "multipliers", bytes });
         }

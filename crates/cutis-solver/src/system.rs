@@ -3,8 +3,7 @@
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
-use crate::handle::Carried;
-use crate::{Energy, Kind, MemoryPart, Momentum, Residual, SolverError, Vertex, VertexBlock};
+use crate::{Carried, Energy, Kind, MemoryPart, Momentum, Residual, SolverError, Vertex, VertexBlock};
 
 /// A body ready to be solved; built and checked by [`SystemBuilder`](crate::SystemBuilder).
 ///
@@ -35,6 +34,32 @@ impl<T: Scalar> System<T> {
         self.vertices.iter().map(|vertex| vertex.position() + self.origin).collect()
     }
 
+    /// Positions of chosen vertices in the caller's coordinates (m), in the order asked for.
+    ///
+    /// # Errors
+    /// [`SolverError::Vertex`] for a vertex that does not exist.
+    pub fn positions_of(&self, vertices: &[u32]) -> Result<Vec<Point3<T>>, SolverError> {
+        self.check_vertices(vertices)?;
+        Ok(vertices.iter().map(|&v| self.vertices[v as usize].position() + self.origin).collect())
+    }
+
+    /// Refuses the first vertex that does not exist.
+    ///
+    /// # Errors
+    /// [`SolverError::Vertex`].
+    pub fn check_vertices(&self, vertices: &[u32]) -> Result<(), SolverError> {
+        let count = self.vertices.len();
+        match vertices.iter().find(|&&vertex| vertex as usize >= count) {
+            None => Ok(()),
+            Some(&vertex) => Err(SolverError::Vertex {
+                vertex: vertex as usize,
+                what: "index",
+                value: vertex.into(),
+                expected: "a vertex of the body",
+            }),
+        }
+    }
+
     /// Velocities in m/s.
     pub fn velocities(&self) -> &[Vector3<T>] {
         &self.velocities
@@ -43,6 +68,11 @@ impl<T: Scalar> System<T> {
     /// The kinds of constraints, in the order they were added.
     pub fn kinds(&self) -> &[Kind<T>] {
         &self.kinds
+    }
+
+    /// The handles, in the order they were added.
+    pub fn handles(&self) -> &[Carried<T>] {
+        &self.handles
     }
 
     /// The vertices to be moved and the kinds that say where, for use with [`Coloured`](crate::Coloured).
@@ -75,6 +105,24 @@ impl<T: Scalar> System<T> {
             vertex.set_position(position - self.origin);
         }
         self.velocities.copy_from_slice(velocities);
+        Ok(())
+    }
+
+    pub(crate) fn set_state(
+        &mut self,
+        vertices: &[Vertex<T>],
+        velocities: impl ExactSizeIterator<Item = Vector3<T>>,
+    ) -> Result<(), SolverError> {
+        let expected = self.vertices.len();
+        for (what, found) in [("vertices", vertices.len()), ("velocities", velocities.len())] {
+            if found != expected {
+                return Err(SolverError::VertexLength { what, found, expected });
+            }
+        }
+        self.vertices.copy_from_slice(vertices);
+        for (place, velocity) in self.velocities.iter_mut().zip(velocities) {
+            *place = velocity;
+        }
         Ok(())
     }
 

@@ -126,11 +126,11 @@ fn a_handle_carries_its_vertices_along_the_path_and_holds_them() {
     let heights: Vec<f64> = (0..5)
         .map(|_| {
             solver.step(1).unwrap();
-            solver.positions()[2].y
+            solver.positions().unwrap()[2].y
         })
         .collect();
     assert_eq!(heights, [1.0, 2.0, 3.0, 3.0, 3.0]);
-    assert!(solver.positions()[1].y < 0.0, "a vertex without a handle falls");
+    assert!(solver.positions().unwrap()[1].y < 0.0, "a vertex without a handle falls");
 }
 
 #[test]
@@ -154,12 +154,12 @@ fn numbers_that_explode_are_named_and_the_state_before_is_kept() {
     let mut solver = SolverReference::new(system.build(), settings).unwrap();
     let error = solver.step(5).unwrap_err();
     assert_eq!(error, SolverError::NotFinite { vertex: 2, frame: 0, substep: 1, time_s: 2.0 });
-    let kept = solver.positions();
+    let kept = solver.positions().unwrap();
     assert_eq!(kept[2].x, 2e38);
-    assert!(solver.velocities().iter().all(|v| *v == Vector3::zeros()));
+    assert!(solver.velocities().unwrap().iter().all(|v| *v == Vector3::zeros()));
     assert_eq!(solver.time_s(), 2.0);
     solver.step(1).unwrap();
-    assert_eq!(solver.positions(), kept, "at rest it stays where it is");
+    assert_eq!(solver.positions().unwrap(), kept, "at rest it stays where it is");
 }
 
 #[test]

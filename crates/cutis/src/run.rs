@@ -4,10 +4,9 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use cutis_mesh::WoundGape;
+use cutis_mesh::{Gape, WoundGape};
 use cutis_solver::{Solver, SolverReference};
 use cutis_solver_cpu::SolverCpu;
-use nalgebra::Point3;
 
 use crate::checkpoint::{self, Checkpoint};
 use crate::files::RunFolder;
@@ -78,16 +77,14 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
         }
         solver.restore(&saved.positions, &saved.velocities, u64::from(saved.frame))?;
     }
-    let measure =
-        |positions: &[Point3<f32>]| body.cut.gapes.iter().map(|gape| gape.measure(positions)).collect();
+    let lips = Lips::new(&body.cut.gapes);
     let first =
-        FrameRow { frame: done, time_s: solver.time_s(), ms: 0.0, gapes: measure(&solver.positions()) };
+        FrameRow { frame: done, time_s: solver.time_s(), ms: 0.0, gapes: lips.measure(&mut *solver)? };
     let frames = loaded.scene.run.frames;
     let every = loaded.scene.run.checkpoint_every;
-    let save = |solver: &dyn Solver<f32>, frame| {
-        let state =
-            Checkpoint { frame, positions: solver.positions(), velocities: solver.velocities().to_vec() };
-        state.write(&folder.checkpoint(), &fingerprint)
+    let save = |solver: &mut dyn Solver<f32>, frame| {
+        let (positions, velocities) = (solver.positions()?, solver.velocities()?.to_vec());
+        Checkpoint { frame, positions, velocities }.write(&folder.checkpoint(), &fingerprint)
     };
     let rows = clock.stage("simulate", u64::from(frames.saturating_sub(done)), |progress| {
         let mut rows = vec![first];
@@ -95,20 +92,20 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
             let start = Instant::now();
             solver.step(1)?;
             let ms = start.elapsed().as_secs_f64() * 1e3;
-            let gapes = if body.cut.gapes.is_empty() { Vec::new() } else { measure(&solver.positions()) };
+            let gapes = lips.measure(&mut *solver)?;
             rows.push(FrameRow { frame, time_s: solver.time_s(), ms, gapes });
             if every > 0 && (frame % every == 0 || frame == frames) {
-                save(&*solver, frame)?;
+                save(&mut *solver, frame)?;
             }
             progress.advance(u64::from(frame - done));
         }
         Ok(rows)
     })?;
 
-    let deformed = solver.positions();
+    let deformed = solver.positions()?;
     let outcome = Outcome { loaded, source: &source, body: &body, deformed: &deformed, folder: &folder };
     let products = output::write(&outcome, &mut clock)?;
-    let at_rest: Vec<WoundGape> = measure(rest);
+    let at_rest: Vec<WoundGape> = body.cut.gapes.iter().map(|gape| gape.measure(rest)).collect();
     let wounds: Vec<Wound> = at_rest
         .iter()
         .zip(rows.last().map(|row| row.gapes.as_slice()).unwrap_or_default())
@@ -137,7 +134,7 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
         wounds,
         resample: products.resample.clone(),
         residuals: solver
-            .residuals()
+            .residuals()?
             .iter()
             .map(|r| KindResidual { kind: r.name.into(), rms: r.rms, max: r.max })
             .collect(),
@@ -152,6 +149,36 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
         report.write(&folder.report())?;
     }
     Ok(report)
+}
+
+/// The vertices that the openings are measured at: what a frame needs of the state, and all that is read of it.
+struct Lips<'a> {
+    gapes: &'a [Gape],
+    /// Ascending.
+    vertices: Vec<u32>,
+}
+
+impl<'a> Lips<'a> {
+    fn new(gapes: &'a [Gape]) -> Self {
+        let mut vertices: Vec<u32> =
+            gapes.iter().flat_map(|gape| gape.left().iter().chain(gape.right())).copied().collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        Self { gapes, vertices }
+    }
+
+    /// Opening of each wound at the solver's present state.
+    fn measure(&self, solver: &mut dyn Solver<f32>) -> Result<Vec<WoundGape>, Error> {
+        if self.gapes.is_empty() {
+            return Ok(Vec::new());
+        }
+        let positions = solver.positions_of(&self.vertices)?;
+        let position = |vertex: u32| {
+            let place = self.vertices.partition_point(|&v| v < vertex);
+            positions[place].cast()
+        };
+        Ok(self.gapes.iter().map(|gape| gape.measure_by(&position)).collect())
+    }
 }
 
 fn frame_times(rows: &[FrameRow]) -> Frames {

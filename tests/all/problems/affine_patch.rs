@@ -62,7 +62,7 @@ fn deviation<T: Scalar>(
     };
     let mut solver = SolverReference::new(system, settings).unwrap();
     solver.step(2).unwrap();
-    let moved = super::positions(&solver, scale);
+    let moved = super::positions(&mut solver, scale);
     lattice.positions.iter().zip(&moved).map(|(p, x)| (x - map * p).norm()).fold(0.0, f64::max)
 }
 

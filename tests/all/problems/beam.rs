@@ -34,7 +34,7 @@ fn tip<T: Scalar>(size: [usize; 3], edges: &Groups, tets: &Groups, iterations: u
     };
     let mut solver = SolverCpu::new(system, settings, Some(2)).unwrap();
     solver.step(21).unwrap();
-    solver.positions().last().unwrap().y.to_f64()
+    solver.positions().unwrap().last().unwrap().y.to_f64()
 }
 
 fn in_lattice_order<T: Scalar>(size: [usize; 3], iterations: u32) -> f64 {

@@ -71,11 +71,12 @@ fn run<T: Scalar>(formulation: Formulation, substeps: u32, scale: f64, pinned: b
         .build();
     let settings = Settings { formulation, dt_s: 1.0, substeps, iterations: 2, ..Settings::default() };
     let mut solver = SolverReference::new(system, settings).unwrap();
-    let before = solver.momentum();
+    let before = solver.momentum().unwrap();
     solver.step(1).unwrap();
-    let speeds = solver.velocities().iter().map(|v| v.map(|x| x.to_f64()).norm());
+    let after = solver.momentum().unwrap();
+    let speeds = solver.velocities().unwrap().iter().map(|v| v.map(|x| x.to_f64()).norm());
     let heavy = masses.iter().map(|&w| if w > 0.0 { 1.0 / w } else { 0.0 });
-    Run { before, after: solver.momentum(), flow: speeds.zip(heavy).map(|(speed, mass)| speed * mass).sum() }
+    Run { before, after, flow: speeds.zip(heavy).map(|(speed, mass)| speed * mass).sum() }
 }
 
 fn linear_drift(run: &Run, bound: f64) -> Result<(), String> {

@@ -44,7 +44,7 @@ fn sag<T: Scalar>(springs: usize, softness: f64, scale: f64) -> f64 {
     };
     let mut solver = SolverReference::new(system, settings).unwrap();
     solver.step(1).unwrap();
-    -1.0 - positions(&solver, scale)[springs].y
+    -1.0 - positions(&mut solver, scale)[springs].y
 }
 
 #[test]

@@ -48,7 +48,7 @@ fn volume_error<T: Scalar>(iterations: u32, softness: f64, scale: f64) -> f64 {
     };
     let mut solver = SolverReference::new(system, settings).unwrap();
     solver.step(1).unwrap();
-    solver.residuals().iter().find(|residual| residual.name == "volume").unwrap().rms
+    solver.residuals().unwrap().iter().find(|residual| residual.name == "volume").unwrap().rms
 }
 
 /// The error must fall whenever the iterations are taken sixteenfold, and be below `bound` at last.

@@ -23,8 +23,8 @@ fn scaled(points: &[Point3<f64>], scale: f64) -> Vec<Point3<f64>> {
 }
 
 /// The solver's positions in double precision, divided by `scale`.
-fn positions<T: Scalar>(solver: &impl Solver<T>, scale: f64) -> Vec<Point3<f64>> {
-    solver.positions().iter().map(|p| p.map(|x| x.to_f64() / scale)).collect()
+fn positions<T: Scalar>(solver: &mut impl Solver<T>, scale: f64) -> Vec<Point3<f64>> {
+    solver.positions().unwrap().iter().map(|p| p.map(|x| x.to_f64() / scale)).collect()
 }
 
 /// Fails unless `found` is within `tolerance` of `expected`, relative to `expected`.

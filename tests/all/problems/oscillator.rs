@@ -33,13 +33,13 @@ fn period<T: Scalar>(compliance: f64, substeps: u32, scale: f64) -> f64 {
     let dt_s = expected() / f64::from(substeps);
     let settings = Settings { formulation: Formulation::Xpbd, dt_s, substeps: 1, ..Settings::default() };
     let mut solver = SolverReference::new(system, settings).unwrap();
-    let stretch = |solver: &SolverReference<T>| solver.positions()[1].x.to_f64() / scale - 1.0;
+    let stretch = |solver: &mut SolverReference<T>| solver.positions().unwrap()[1].x.to_f64() / scale - 1.0;
     let mut passes = Vec::new();
     while passes.len() < 3 {
         assert!(solver.time_s() < 10.0 * expected(), "no swing");
-        let before = stretch(&solver);
+        let before = stretch(&mut solver);
         solver.step(1).unwrap();
-        let after = stretch(&solver);
+        let after = stretch(&mut solver);
         if before < 0.0 && after >= 0.0 {
             passes.push(solver.time_s() - dt_s * after / (after - before));
         }

@@ -64,7 +64,7 @@ fn gape<T: Scalar>(case: &Case, scale: f64) -> f64 {
     };
     let mut solver = SolverCpu::new(system.build(), settings, None).unwrap();
     solver.step(1).unwrap();
-    sheet.opening(&positions(&solver, scale))
+    sheet.opening(&positions(&mut solver, scale))
 }
 
 fn check<T: Scalar>(case: &Case, scale: f64) -> Result<(), String> {

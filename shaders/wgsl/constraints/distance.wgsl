@@ -1,0 +1,13 @@
+// Distance: an edge keeps its length. The twin of `Distance::eval`.
+struct Params {
+    rest_length: f32,
+}
+
+fn eval(x: array<vec3f, N>, p: Params) -> Eval {
+    let d = x[0] - x[1];
+    let length = sqrt(dot(d, d));
+    let apart = length > 0.0;
+    let inverse = select(0.0, 1.0 / select(1.0, length, apart), apart);
+    let direction = d * inverse;
+    return Eval(length - p.rest_length, array<vec3f, N>(direction, -direction));
+}

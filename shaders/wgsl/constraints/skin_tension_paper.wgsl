@@ -1,0 +1,14 @@
+// Skin tension, paper form. The twin of `SkinTensionPaper::eval`.
+struct Params {
+    rest_area: f32,
+    amplification: f32,
+    max_amplification: f32,
+}
+
+fn eval(x: array<vec3f, N>, p: Params) -> Eval {
+    let triangle = area_and_gradient(x);
+    let c = triangle.area - p.rest_area;
+    let amplified = 1.0 + p.amplification * stretch(c, p.rest_area);
+    let clamped = select(p.max_amplification, amplified, amplified < p.max_amplification);
+    return Eval(c * clamped, triangle.grad);
+}

@@ -1,0 +1,16 @@
+// Volume: a tetrahedron keeps its signed volume. The twin of `Volume::eval`.
+struct Params {
+    rest_volume: f32,
+}
+
+fn eval(x: array<vec3f, N>, p: Params) -> Eval {
+    let a = x[1] - x[0];
+    let b = x[2] - x[0];
+    let c = x[3] - x[0];
+    let sixth = 1.0 / 6.0;
+    let grad2 = cross(b, c) * sixth;
+    let grad3 = cross(c, a) * sixth;
+    let grad4 = cross(a, b) * sixth;
+    let grad1 = -((grad2 + grad3) + grad4);
+    return Eval(dot(a, grad2) - p.rest_volume, array<vec3f, N>(grad1, grad2, grad3, grad4));
+}

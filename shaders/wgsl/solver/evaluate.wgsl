@@ -1,0 +1,21 @@
+// Value and gradients of constraints on their own, `N` positions after `N` positions: for tests of a constraint.
+@group(0) @binding(0) var<storage, read> points: array<vec4f>;
+@group(0) @binding(1) var<storage, read> params: array<Params>;
+// Per constraint `N` vectors: a gradient, and the value in the fourth component.
+@group(0) @binding(2) var<storage, read_write> found: array<vec4f>;
+
+@compute @workgroup_size(64)
+fn evaluate(@builtin(global_invocation_id) id: vec3u) {
+    let k = id.x;
+    if (k >= arrayLength(&params)) {
+        return;
+    }
+    var x: array<vec3f, N>;
+    for (var i = 0u; i < N; i++) {
+        x[i] = points[k * N + i].xyz;
+    }
+    var done = eval(x, params[k]);
+    for (var i = 0u; i < N; i++) {
+        found[k * N + i] = vec4f(done.grad[i], done.c);
+    }
+}

@@ -1,0 +1,32 @@
+// Projects a chunk of one colour of one kind: no two of its constraints share a vertex. The twin of `project`.
+@group(0) @binding(0) var<storage, read_write> vertices: array<vec4f>;
+@group(0) @binding(1) var<uniform> settings: Settings;
+@group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;
+@group(1) @binding(1) var<storage, read> params: array<Params>;
+
+@compute @workgroup_size(64)
+fn project(@builtin(global_invocation_id) id: vec3u) {
+    let k = id.x;
+    if (k >= arrayLength(&tuples)) {
+        return;
+    }
+    var tuple = tuples[k];
+    var x: array<vec3f, N>;
+    var w: array<f32, N>;
+    for (var i = 0u; i < N; i++) {
+        let vertex = vertices[tuple[i]];
+        x[i] = vertex.xyz;
+        w[i] = vertex.w;
+    }
+    var found = eval(x, params[k]);
+    var weighted_square = 0.0;
+    for (var i = 0u; i < N; i++) {
+        weighted_square = weighted_square + w[i] * dot(found.grad[i], found.grad[i]);
+    }
+    let multiplier = multiplier_of(k);
+    let change = multiplier_change(found.c, weighted_square, stiffness_of(k), multiplier);
+    keep_multiplier(k, multiplier + change);
+    for (var i = 0u; i < N; i++) {
+        vertices[tuple[i]] = vec4f(x[i] + found.grad[i] * (w[i] * change), w[i]);
+    }
+}

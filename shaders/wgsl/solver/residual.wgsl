@@ -1,0 +1,38 @@
+// Value over rest size of a chunk of constraints: per workgroup the sum of squares and the largest absolute value.
+@group(0) @binding(0) var<storage, read> vertices: array<vec4f>;
+@group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;
+@group(1) @binding(1) var<storage, read> params: array<Params>;
+// Zero where there is no rest size to compare with.
+@group(1) @binding(2) var<storage, read> inverse_rest_size: array<f32>;
+@group(1) @binding(3) var<storage, read_write> partial: array<vec2f>;
+
+var<workgroup> sums: array<vec2f, 64>;
+
+@compute @workgroup_size(64)
+fn residual(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) group: vec3u,
+) {
+    let k = id.x;
+    var ratio = 0.0;
+    if (k < arrayLength(&tuples)) {
+        var tuple = tuples[k];
+        var x: array<vec3f, N>;
+        for (var i = 0u; i < N; i++) {
+            x[i] = vertices[tuple[i]].xyz;
+        }
+        ratio = abs(eval(x, params[k]).c * inverse_rest_size[k]);
+    }
+    sums[local] = vec2f(ratio * ratio, ratio);
+    for (var half = 32u; half > 0u; half = half / 2u) {
+        workgroupBarrier();
+        if (local < half) {
+            let other = sums[local + half];
+            sums[local] = vec2f(sums[local].x + other.x, max(sums[local].y, other.y));
+        }
+    }
+    if (local == 0u) {
+        partial[group.x] = sums[0];
+    }
+}

@@ -1,0 +1,6 @@
+// One stiffness for the whole kind.
+@group(1) @binding(2) var<uniform> stiffness: f32;
+
+fn stiffness_of(k: u32) -> f32 {
+    return stiffness;
+}
