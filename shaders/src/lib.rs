@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod constraints;
+pub mod render;
 pub mod solver;
 
 /// Joins parts to one source, in order, each beginning on a line of its own.
