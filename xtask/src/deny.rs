@@ -72,13 +72,13 @@ impl Rules {
     }
 }
 
-/// Checks both workspaces.
+/// Checks every workspace.
 pub fn run(workspace: &Workspace) -> Result<()> {
     let rules =
         Rules::parse(&std::fs::read_to_string(workspace.root.join("deny.toml")).context("deny.toml")?)?;
     let mut complaints = BTreeSet::new();
     let mut count = 0;
-    for manifest in [workspace.root.join("Cargo.toml"), workspace.xtask_manifest()] {
+    for manifest in workspace.manifests() {
         let metadata = workspace.metadata(&manifest, true)?;
         let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
         count += packages.len();

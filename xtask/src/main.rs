@@ -6,6 +6,7 @@ mod results;
 mod spdx;
 mod steps;
 mod tidy;
+mod vulkan;
 mod workspace;
 
 use std::process::ExitCode;
@@ -21,6 +22,8 @@ usage: cargo xtask COMMAND
   tidy                layers, file headers, unsafe, paths named in the docs, links, manifests
   licences            licences, bans and sources of every dependency, by deny.toml
   python              outputs and awkward inputs compared with nibabel and SimpleITK
+  parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
+                      lists the options, and the exit code is that of the comparison
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
   publish --dry-run   packages every crate as for crates.io and builds it from the package";
 
@@ -28,7 +31,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match dispatch(&words) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("\nerror: {error:#}");
             ExitCode::FAILURE
@@ -36,7 +39,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn dispatch(words: &[&str]) -> Result<()> {
+fn dispatch(words: &[&str]) -> Result<ExitCode> {
     let workspace = Workspace::find()?;
     match words {
         ["test"] => steps::run_all(&workspace, false),
@@ -45,6 +48,9 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["tidy"] => tidy::run(&workspace),
         ["licences"] => deny::run(&workspace),
         ["python"] => steps::build_program(&workspace).and_then(|()| python::run(&workspace)),
+        ["parity", arguments @ ..] => {
+            return workspace::exit_code(&mut steps::parity_command(&workspace, arguments));
+        }
         ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
         ["publish", "--dry-run"] => steps::publish_dry_run(&workspace),
         ["publish"] => bail!(
@@ -56,4 +62,5 @@ fn dispatch(words: &[&str]) -> Result<()> {
         }
         other => bail!("unknown command `{}`\n\n{USAGE}", other.join(" ")),
     }
+    .map(|()| ExitCode::SUCCESS)
 }

@@ -70,7 +70,8 @@ fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
     Ok(python)
 }
 
-const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
+/// The name of the interpreter.
+pub const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 
 /// The version of the system's Python, such as `Python 3.13.5`; an error says what to install.
 pub fn require(workspace: &Workspace) -> Result<String> {

@@ -1,11 +1,12 @@
 //! The steps of `cargo xtask test`, in order, each timed; the first failure ends the run.
 
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
 use crate::workspace::{Workspace, execute};
-use crate::{deny, python, tidy};
+use crate::{deny, python, tidy, vulkan};
 
 struct Step {
     name: &'static str,
@@ -22,6 +23,8 @@ const STEPS: &[Step] = &[
     Step { name: "xtask", quick: true, run: xtask },
     Step { name: "clippy", quick: true, run: clippy },
     Step { name: "tests", quick: true, run: tests },
+    Step { name: "third-party", quick: false, run: third_party },
+    Step { name: "parity", quick: false, run: parity },
     Step { name: "documentation", quick: false, run: documentation },
     Step { name: "program", quick: false, run: build_program },
     Step { name: "python", quick: false, run: python::run },
@@ -80,13 +83,16 @@ fn tools(workspace: &Workspace) -> Result<()> {
         }
     }
     let python = python::require(workspace)?;
-    println!("rustfmt, clippy and {python} are there");
+    let adapters = vulkan::require(workspace)?;
+    println!("rustfmt, clippy and {python} are there; adapters for GPU tests: {adapters}");
     Ok(())
 }
 
 fn format(workspace: &Workspace) -> Result<()> {
-    execute(workspace.cargo("fmt").args(["--all", "--check"]))?;
-    execute(workspace.cargo("fmt").arg("--manifest-path").arg(workspace.xtask_manifest()).arg("--check"))
+    for manifest in workspace.manifests() {
+        execute(workspace.cargo("fmt").arg("--manifest-path").arg(manifest).args(["--all", "--check"]))?;
+    }
+    Ok(())
 }
 
 fn xtask(workspace: &Workspace) -> Result<()> {
@@ -110,7 +116,32 @@ fn clippy(workspace: &Workspace) -> Result<()> {
 
 /// Unit tests, integration tests and doctests.
 fn tests(workspace: &Workspace) -> Result<()> {
-    execute(workspace.cargo("test").args(["--workspace", "--no-fail-fast"]))
+    execute(vulkan::for_gpu_tests(workspace.cargo("test").args(["--workspace", "--no-fail-fast"])))
+}
+
+/// The crate that adds constraints from outside, as a user's would. It shares the folder of builds: what does not differ
+/// is not built again.
+fn third_party(workspace: &Workspace) -> Result<()> {
+    let (manifest, target) = (workspace.third_party_manifest(), workspace.target_dir()?);
+    let cargo = |subcommand: &str| {
+        let mut command = workspace.cargo(subcommand);
+        command.arg("--manifest-path").arg(&manifest).env("CARGO_TARGET_DIR", &target);
+        command
+    };
+    execute(cargo("clippy").args(["--all-targets", "--quiet"]).args(DENY))?;
+    execute(vulkan::for_gpu_tests(&mut cargo("test")))
+}
+
+/// The comparison of the backends that `cargo xtask parity` runs.
+pub fn parity_command(workspace: &Workspace, arguments: &[&str]) -> Command {
+    let mut command = workspace.cargo("run");
+    command.args(["--quiet", "--package", "cutis-tests", "--bin", "parity", "--"]).args(arguments);
+    vulkan::for_gpu_tests(&mut command);
+    command
+}
+
+fn parity(workspace: &Workspace) -> Result<()> {
+    execute(&mut parity_command(workspace, &["--quick"]))
 }
 
 /// Libraries only: the program `cutis` and the crate `cutis` would write the same page.

@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
@@ -35,6 +35,16 @@ impl Workspace {
         self.root.join("xtask/Cargo.toml")
     }
 
+    /// The manifest of the crate that uses the project from outside, in a workspace of its own too.
+    pub fn third_party_manifest(&self) -> PathBuf {
+        self.root.join("tests/third-party/Cargo.toml")
+    }
+
+    /// The manifests of all workspaces of the checkout.
+    pub fn manifests(&self) -> [PathBuf; 3] {
+        [self.root.join("Cargo.toml"), self.xtask_manifest(), self.third_party_manifest()]
+    }
+
     /// A program to be run from the root, told whether this is CI.
     pub fn command(&self, program: impl Into<OsString>) -> Command {
         let mut command = Command::new(program.into());
@@ -56,7 +66,7 @@ impl Workspace {
         command
     }
 
-    /// `cargo metadata` of one of the two workspaces; with `dependencies`, of every package they resolve to.
+    /// `cargo metadata` of one of the workspaces; with `dependencies`, of every package they resolve to.
     pub fn metadata(&self, manifest: &Path, dependencies: bool) -> Result<Value> {
         let mut command = self.cargo("metadata");
         command.args(["--format-version", "1", "--manifest-path"]).arg(manifest);
@@ -110,6 +120,15 @@ pub fn execute(command: &mut Command) -> Result<()> {
         bail!("`{line}` ended with {status}");
     }
     Ok(())
+}
+
+/// Runs a program as [`execute`] does, and gives what it ended with.
+pub fn exit_code(command: &mut Command) -> Result<ExitCode> {
+    let line = command_line(command);
+    println!("$ {line}");
+    let status = command.status().with_context(|| format!("cannot start `{line}`"))?;
+    let code = status.code().with_context(|| format!("`{line}` ended with {status}"))?;
+    Ok(u8::try_from(code).map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
 fn command_line(command: &Command) -> String {
