@@ -24,7 +24,7 @@ const DIRECTIONS: usize = 16;
 const REACHES: [f64; 3] = [0.2, 0.5, 1.0];
 
 /// Linear light, 0 to 1.
-type Light = Vector3<f32>;
+pub type Light = Vector3<f32>;
 
 /// Colours the surface of one field under one view.
 pub struct Shader<'a> {
@@ -67,10 +67,6 @@ impl<'a> Shader<'a> {
             toward: axes.toward,
             light: (axes.toward * 0.75 + axes.up * 0.55 - axes.right * 0.4).normalize(),
         }
-    }
-
-    pub fn background(&self) -> Light {
-        decode(BACKGROUND)
     }
 
     pub fn color(&self, hit: &Hit) -> Light {
@@ -153,7 +149,7 @@ fn smooth_step(x: f32) -> f32 {
 }
 
 /// Stored colour → linear light, with a gamma of 2.
-fn decode(color: Rgb) -> Light {
+pub fn decode(color: Rgb) -> Light {
     Light::from(color.map(|c| (f32::from(c) / 255.0).powi(2)))
 }
 

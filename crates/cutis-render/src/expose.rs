@@ -1,0 +1,63 @@
+//! From light to a picture: one ray for each pixel, and more where the picture has an edge.
+
+use rayon::prelude::*;
+
+use crate::shade::{Light, encode};
+use crate::{Image, RenderError};
+
+/// Places of the picture that are looked at together.
+pub const BATCH: usize = 1 << 16;
+/// Difference between neighbouring pixels that calls for more rays.
+const EDGE: u8 = 12;
+
+/// Fills a picture with the light that comes to its places, which are given in pixels from its top left corner and at most
+/// [`BATCH`] at a time. A pixel on an edge gets the mean over `samples × samples` places.
+///
+/// # Errors
+/// Those of `light_at`, which must give as many lights as there are places.
+pub fn expose(
+    image: &mut Image,
+    samples: usize,
+    mut light_at: impl FnMut(&[[f64; 2]]) -> Result<Vec<Light>, RenderError>,
+) -> Result<(), RenderError> {
+    let width = image.width;
+    for (batch, pixels) in image.rgb.chunks_mut(3 * BATCH).enumerate() {
+        let place = |pixel: usize| [(pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5];
+        let first = batch * BATCH;
+        let places: Vec<_> = (first..first + pixels.len() / 3).map(place).collect();
+        for (pixel, light) in pixels.chunks_exact_mut(3).zip(light_at(&places)?) {
+            pixel.copy_from_slice(&encode(light));
+        }
+    }
+    if samples == 1 {
+        return Ok(());
+    }
+    // More rays where the picture has an edge: elsewhere they would find the same.
+    let edges: Vec<usize> =
+        (0..image.rgb.len() / 3).into_par_iter().filter(|&pixel| on_edge(image, pixel)).collect();
+    let count = samples * samples;
+    for pixels in edges.chunks(BATCH / count) {
+        let part = |sample: usize| (sample as f64 + 0.5) / samples as f64;
+        let places_of = |&pixel: &usize| {
+            let (x, y) = ((pixel % width) as f64, (pixel / width) as f64);
+            (0..count).map(move |sample| [x + part(sample % samples), y + part(sample / samples)])
+        };
+        let places: Vec<_> = pixels.iter().flat_map(places_of).collect();
+        for (pixel, lights) in pixels.iter().zip(light_at(&places)?.chunks_exact(count)) {
+            let mean = lights.iter().sum::<Light>() / count as f32;
+            image.rgb[3 * pixel..][..3].copy_from_slice(&encode(mean));
+        }
+    }
+    Ok(())
+}
+
+/// True if a neighbour's colour differs by more than [`EDGE`] in a channel.
+fn on_edge(image: &Image, pixel: usize) -> bool {
+    let (width, x, y) = (image.width, pixel % image.width, pixel / image.width);
+    let color = |pixel: usize| &image.rgb[3 * pixel..][..3];
+    let differs = |other: usize| color(pixel).iter().zip(color(other)).any(|(a, b)| a.abs_diff(*b) > EDGE);
+    (x > 0 && differs(pixel - 1))
+        || (x + 1 < width && differs(pixel + 1))
+        || (y > 0 && differs(pixel - width))
+        || (y + 1 < image.height && differs(pixel + width))
+}
