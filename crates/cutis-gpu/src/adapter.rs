@@ -1,0 +1,200 @@
+//! The adapters of the machine: their order, their names and the choice of one.
+
+use std::{convert::Infallible, fmt, str::FromStr, sync::LazyLock};
+
+use crate::{GpuError, Limits, limits};
+
+/// One adapter that can be opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Adapter {
+    /// Place in the order of [`adapters`]: best hardware first, software last.
+    pub index: usize,
+    /// The driver's name of the adapter.
+    pub name: String,
+    /// What sort of adapter it is.
+    pub kind: AdapterKind,
+    /// The interface that it is reached by: `"vulkan"`, `"metal"` or `"dx12"`.
+    pub api: &'static str,
+    /// Name and version of the driver.
+    pub driver: String,
+    /// What a device of it offers, unless only the baseline is asked for.
+    pub limits: Limits,
+    /// Whether it can time its work.
+    pub timestamps: bool,
+}
+
+/// What sort of adapter it is, from best to last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum AdapterKind {
+    /// A card with its own memory.
+    Discrete,
+    /// A GPU that shares the memory of the CPU.
+    Integrated,
+    /// A GPU lent to a virtual machine.
+    Virtual,
+    /// The driver does not say.
+    Unknown,
+    /// No GPU: the CPU computes.
+    Software,
+}
+
+impl fmt::Display for AdapterKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            AdapterKind::Discrete => "discrete",
+            AdapterKind::Integrated => "integrated",
+            AdapterKind::Virtual => "virtual",
+            AdapterKind::Unknown => "unknown",
+            AdapterKind::Software => "software",
+        })
+    }
+}
+
+/// Which adapter to open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Select {
+    /// The first of [`adapters`]: the best hardware, a software adapter if there is nothing else.
+    #[default]
+    First,
+    /// The adapter with this [`Adapter::index`].
+    Index(usize),
+    /// The first adapter whose name has this part, upper or lower case alike.
+    Name(String),
+}
+
+impl FromStr for Select {
+    type Err = Infallible;
+
+    /// A number is an index, `first` is the first, anything else a part of a name.
+    fn from_str(text: &str) -> Result<Select, Infallible> {
+        let text = text.trim();
+        Ok(match text.parse() {
+            Ok(index) => Select::Index(index),
+            Err(_) if text.eq_ignore_ascii_case("first") => Select::First,
+            Err(_) => Select::Name(text.to_owned()),
+        })
+    }
+}
+
+impl fmt::Display for Select {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Select::First => f.write_str("first"),
+            Select::Index(index) => write!(f, "{index}"),
+            Select::Name(part) => f.write_str(part),
+        }
+    }
+}
+
+/// The adapters of this machine that can be opened, each once, best hardware first and software last. No device is
+/// made. Empty when there is no driver.
+pub fn adapters() -> Vec<Adapter> {
+    enumerate().into_iter().map(|(adapter, _)| adapter).collect()
+}
+
+/// The adapters with wgpu's handles.
+pub(crate) fn enumerate() -> Vec<(Adapter, wgpu::Adapter)> {
+    let Some(instance) = instance() else { return Vec::new() };
+    let mut found: Vec<_> = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
+        .into_iter()
+        .map(|handle| (handle.get_info(), handle))
+        .collect();
+    found.sort_by_cached_key(|(info, _)| {
+        (kind(info.device_type), api(info.backend).0, info.device_pci_bus_id.clone(), info.name.clone())
+    });
+    let mut once: Vec<(wgpu::AdapterInfo, wgpu::Adapter)> = Vec::with_capacity(found.len());
+    for (info, handle) in found {
+        if !once.iter().any(|(other, _)| same_adapter(other, &info)) {
+            once.push((info, handle));
+        }
+    }
+    once.into_iter()
+        .enumerate()
+        .map(|(index, (info, handle))| (describe(index, info, &handle), handle))
+        .collect()
+}
+
+/// The adapter that `select` means.
+pub(crate) fn choose(select: &Select) -> Result<(Adapter, wgpu::Adapter), GpuError> {
+    let mut all = enumerate();
+    if all.is_empty() {
+        return Err(GpuError::NoAdapter);
+    }
+    let place = match select {
+        Select::First => Some(0),
+        Select::Index(index) => (*index < all.len()).then_some(*index),
+        Select::Name(part) => {
+            let part = part.to_lowercase();
+            all.iter().position(|(adapter, _)| adapter.name.to_lowercase().contains(&part))
+        }
+    };
+    match place {
+        Some(place) => Ok(all.swap_remove(place)),
+        None => Err(GpuError::NoSuchAdapter {
+            asked: select.to_string(),
+            found: all.iter().map(|(adapter, _)| format!("{}: {}", adapter.index, adapter.name)).collect(),
+        }),
+    }
+}
+
+/// One instance for the whole process, so that a resource of one device given to another is told apart by wgpu. None
+/// when no interface of this platform is built in.
+fn instance() -> Option<&'static wgpu::Instance> {
+    static INSTANCE: LazyLock<Option<wgpu::Instance>> = LazyLock::new(|| {
+        (!wgpu::Instance::enabled_backend_features().is_empty()).then(|| {
+            wgpu::Instance::new(wgpu::InstanceDescriptor {
+                flags: wgpu::InstanceFlags::empty().with_env(),
+                ..wgpu::InstanceDescriptor::new_without_display_handle()
+            })
+        })
+    });
+    INSTANCE.as_ref()
+}
+
+fn describe(index: usize, info: wgpu::AdapterInfo, handle: &wgpu::Adapter) -> Adapter {
+    let offered = handle.limits();
+    Adapter {
+        index,
+        name: info.name,
+        kind: kind(info.device_type),
+        api: api(info.backend).1,
+        driver: [info.driver, info.driver_info].join(" ").trim().to_owned(),
+        limits: Limits::of(&limits::requested(&offered, false).unwrap_or(offered)),
+        timestamps: handle.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+    }
+}
+
+fn kind(device_type: wgpu::DeviceType) -> AdapterKind {
+    match device_type {
+        wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,
+        wgpu::DeviceType::IntegratedGpu => AdapterKind::Integrated,
+        wgpu::DeviceType::VirtualGpu => AdapterKind::Virtual,
+        wgpu::DeviceType::Cpu => AdapterKind::Software,
+        wgpu::DeviceType::Other => AdapterKind::Unknown,
+    }
+}
+
+/// Rank and name of an interface.
+fn api(backend: wgpu::Backend) -> (u8, &'static str) {
+    match backend {
+        wgpu::Backend::Vulkan => (0, "vulkan"),
+        wgpu::Backend::Metal => (1, "metal"),
+        wgpu::Backend::Dx12 => (2, "dx12"),
+        wgpu::Backend::Gl => (3, "gl"),
+        wgpu::Backend::BrowserWebGpu => (4, "webgpu"),
+        wgpu::Backend::Noop => (5, "none"),
+    }
+}
+
+/// Whether two entries mean the same piece of hardware, reached by two interfaces or two drivers. The place on the bus
+/// tells cards apart; where it is not given, equal names are the same adapter only across interfaces or in software
+/// (two equal cards stay two).
+fn same_adapter(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
+    if (kind(a.device_type), a.vendor, a.device) != (kind(b.device_type), b.vendor, b.device) {
+        return false;
+    }
+    if !a.device_pci_bus_id.is_empty() && !b.device_pci_bus_id.is_empty() {
+        return a.device_pci_bus_id == b.device_pci_bus_id;
+    }
+    a.name == b.name && (a.backend != b.backend || kind(a.device_type) == AdapterKind::Software)
+}

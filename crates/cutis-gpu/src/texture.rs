@@ -1,0 +1,113 @@
+//! Volumes of 16-bit integers as 3-D textures.
+
+use std::{fmt, sync::Arc};
+
+use crate::{
+    Binding, Gpu, GpuError,
+    buffer::PART,
+    counters::{Tally, add, take},
+};
+
+/// A volume on the device: signed 16-bit integers, x fastest. A kernel sees it as `texture_3d<i32>` and reads it with
+/// `textureLoad(volume, vec3<i32>(x, y, z), 0)`.
+pub struct Texture3d {
+    view: wgpu::TextureView,
+    label: String,
+    shape: [usize; 3],
+    bytes: u64,
+    tally: Arc<Tally>,
+}
+
+impl Gpu {
+    /// A volume of `shape` = `[nx, ny, nz]` voxels with these values, x fastest.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::Limit`] when a side is longer than the device takes, [`GpuError::Validation`] when a side is 0 or
+    /// the number of voxels is not that of the shape, [`GpuError::OutOfMemory`], [`GpuError::Lost`].
+    pub fn texture_3d(&self, label: &str, shape: [usize; 3], voxels: &[i16]) -> Result<Texture3d, GpuError> {
+        let what = || format!("volume '{label}' of {} x {} x {} voxels", shape[0], shape[1], shape[2]);
+        self.alive()?;
+        let most = self.limits().max_texture_3d;
+        if let Some(&side) = shape.iter().find(|side| **side > most as usize) {
+            return Err(self.over_limit(what(), side as u64, u64::from(most)));
+        }
+        let voxel_count = shape.iter().try_fold(1_usize, |count, &side| count.checked_mul(side));
+        if voxel_count != Some(voxels.len()) || voxels.is_empty() {
+            let message =
+                format!("{} values given; one per voxel, and at least one voxel, needed", voxels.len());
+            return Err(GpuError::Validation { what: what(), message });
+        }
+        let [nx, ny, nz] = shape.map(|side| side as u32); // within max_texture_3d
+        let bytes = size_of_val(voxels) as u64;
+        let descriptor = wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: nz },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D3,
+            format: wgpu::TextureFormat::R16Sint,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        };
+        let raw =
+            self.checked(|fault| fault.of(what(), bytes), || self.shared.device.create_texture(&descriptor))?;
+
+        let slice = shape[0] * shape[1];
+        let layers = (PART / (2 * slice)).max(1);
+        for (index, part) in voxels.chunks(layers * slice).enumerate() {
+            let at = wgpu::TexelCopyTextureInfo {
+                texture: &raw,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: 0, z: (index * layers) as u32 },
+                aspect: wgpu::TextureAspect::All,
+            };
+            let layout = wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(2 * nx),
+                rows_per_image: Some(ny),
+            };
+            let depth = (part.len() / slice) as u32;
+            let size = wgpu::Extent3d { width: nx, height: ny, depth_or_array_layers: depth };
+            self.checked(
+                |fault| fault.of(what(), size_of_val(part) as u64),
+                || self.shared.queue.write_texture(at, bytemuck::cast_slice(part), layout, size),
+            )?;
+            if part.len() < voxels.len() {
+                self.flush(&what)?;
+            }
+        }
+        let view = self.checked(|fault| fault.of(what(), 0), || raw.create_view(&Default::default()))?;
+        let tally = Arc::clone(&self.shared.tally);
+        add(&tally.textures, 1);
+        add(&tally.texture_bytes, bytes);
+        Ok(Texture3d { view, label: label.to_owned(), shape, bytes, tally })
+    }
+}
+
+impl Texture3d {
+    /// The volume, to bind to a kernel.
+    pub fn whole(&self) -> Binding<'_> {
+        Binding::texture(&self.view)
+    }
+
+    /// Voxels along x, y and z.
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
+}
+
+impl Drop for Texture3d {
+    fn drop(&mut self) {
+        take(&self.tally.texture_bytes, self.bytes);
+    }
+}
+
+impl fmt::Debug for Texture3d {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Texture3d")
+            .field("label", &self.label)
+            .field("shape", &self.shape)
+            .finish_non_exhaustive()
+    }
+}
