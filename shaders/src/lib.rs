@@ -6,6 +6,7 @@
 
 pub mod constraints;
 pub mod render;
+pub mod resample;
 pub mod solver;
 
 /// Joins parts to one source, in order, each beginning on a line of its own.

@@ -1,0 +1,53 @@
+// The volume, the region of it that is filled, and the way from the positions of vertices to it.
+//
+// Places are voxel indices relative to the voxel `centre` of the volume, so that the numbers are small near the body.
+struct Grid {
+    // place = linear · position + offset
+    xx: f32, xy: f32, xz: f32,
+    yx: f32, yy: f32, yz: f32,
+    zx: f32, zy: f32, zz: f32,
+    offset_x: f32, offset_y: f32, offset_z: f32,
+    // A length in voxels below which two positions cannot be told apart.
+    tolerance: f32,
+    // The region: place of its first voxel, and its shape.
+    region_x: f32, region_y: f32, region_z: f32,
+    columns: u32, rows: u32, slices: u32,
+    // The volume: places of its first and last voxel, and its voxel at place zero.
+    first_x: f32, first_y: f32, first_z: f32,
+    last_x: f32, last_y: f32, last_z: f32,
+    centre_i: i32, centre_j: i32, centre_k: i32,
+    // Stored values: what a vacated voxel becomes, and the range that is no padding.
+    air: i32, scanned_low: i32, scanned_high: i32,
+    unused: u32,
+}
+
+// The slices of the region that one pass fills.
+struct Slab {
+    first: u32,
+    slices: u32,
+    voxels: u32,
+    // Number of lists of large tets; their lengths come first in `large`.
+    lists: u32,
+    // Where the counts of this slab begin in `counters`.
+    counts: u32,
+    unused_1: u32, unused_2: u32, unused_3: u32,
+}
+
+// Tets that lie side by side in one buffer.
+struct Chunk {
+    // Number of its first tet among all.
+    first: u32,
+    count: u32,
+    // How many of them, the first ones, are the body's.
+    body: u32,
+    // Its list of large tets.
+    list: u32,
+}
+
+fn is_finite(x: f32) -> bool {
+    return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
+}
+
+fn is_finite_3(x: vec3f) -> bool {
+    return is_finite(x.x) && is_finite(x.y) && is_finite(x.z);
+}
