@@ -19,7 +19,7 @@ usage: cargo xtask COMMAND
 
   test [--quick]      everything a change must pass; --quick leaves out the slow steps and lists them
   ci                  the same with CI=true: nothing may be skipped, the lock files must be up to date
-  tidy                layers, file headers, unsafe, paths named in the docs, links, manifests
+  tidy                layers, file headers, unsafe, shaders, paths named in the docs, links, manifests
   licences            licences, bans and sources of every dependency, by deny.toml
   python              outputs and awkward inputs compared with nibabel and SimpleITK
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`

@@ -3,9 +3,11 @@
 
 mod docs;
 mod files;
+mod gpu_access;
 mod layers;
 mod manifests;
 mod rules;
+mod shaders;
 mod source;
 
 use std::fmt;
@@ -66,7 +68,14 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     for path in files.with_extension("rs") {
         let source = Source::parse(path, &files.read(path)?);
         findings.extend(rules::ALL.iter().flat_map(|rule| rule(&source)));
+        findings.extend(gpu_access::in_source(&source));
         sources += 1;
+    }
+    let mut shaders = 0;
+    for path in files.with_extension("wgsl") {
+        let source = Source::parse(path, &files.read(path)?);
+        findings.extend(shaders::ALL.iter().flat_map(|rule| rule(&source)));
+        shaders += 1;
     }
     let mut pages = 0;
     for path in files.with_extension("md") {
@@ -79,6 +88,9 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         }
         pages += 1;
     }
+    for path in files.with_extension("toml").filter(|path| path.ends_with("Cargo.toml")) {
+        findings.extend(gpu_access::in_manifest(path, &files.read(path)?));
+    }
     for path in manifests::members(&metadata, &workspace.root)? {
         let text = files.read(&path)?;
         findings.extend(manifests::check(&path, &text));
@@ -90,7 +102,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     }
     let failures = findings.iter().filter(|finding| finding.severity == Severity::Failure).count();
     println!(
-        "tidy: {sources} sources, {pages} pages, {failures} failures, {} warnings",
+        "tidy: {sources} sources, {shaders} shaders, {pages} pages, {failures} failures, {} warnings",
         findings.len() - failures
     );
     if failures > 0 {

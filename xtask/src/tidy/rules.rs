@@ -69,7 +69,7 @@ fn explained(lines: &[Line]) -> bool {
 }
 
 /// Nothing is left for later: no markers in comments, no placeholders and debug prints in code.
-fn no_leftovers(source: &Source) -> Vec<Finding> {
+pub fn no_leftovers(source: &Source) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (index, line) in source.lines.iter().enumerate() {
         for marker in ["TODO", "FIXME", "XXX"] {
@@ -120,7 +120,7 @@ pub fn is_ignored_fence(line: &str) -> bool {
 }
 
 /// One idea a file.
-fn not_too_long(source: &Source) -> Vec<Finding> {
+pub fn not_too_long(source: &Source) -> Vec<Finding> {
     let count = source.lines.len();
     if count > TOO_LONG {
         vec![Finding::failure(&source.path, 0, format!("{count} lines, more than {TOO_LONG}: split it"))]
@@ -137,6 +137,16 @@ fn has_word_first(text: &str, word: &str) -> bool {
 
 fn has_word(text: &str, word: &str) -> bool {
     positions(text, word).next().is_some()
+}
+
+/// The identifiers, keywords and numbers of a line.
+pub fn words(code: &str) -> impl Iterator<Item = &str> {
+    code.split(|character: char| !character.is_alphanumeric() && character != '_')
+}
+
+/// Whether a line calls a function of this name.
+pub fn is_called(code: &str, name: &str) -> bool {
+    positions(code, name).any(|end| code[end..].trim_start().starts_with('('))
 }
 
 /// Ends of the whole-word occurrences of `word`.

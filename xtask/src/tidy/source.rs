@@ -1,4 +1,4 @@
-//! A Rust source split into code and comments, line by line, with the contents of literals removed: enough to look
+//! A source in Rust or WGSL split into code and comments, line by line, with the contents of literals removed: enough to look
 //! for words without mistaking a string or a comment for code.
 
 /// One source file.
