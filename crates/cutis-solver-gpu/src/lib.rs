@@ -1,2 +1,56 @@
-//! GPU backend of the solver.
+//! GPU backend: the simulation of `cutis-solver`, executed as WGSL.
+//!
+//! [`SolverGpu`] runs the schedule of the CPU backends, the same passes in the same order with the same operations. On a software
+//! device its results are those of [`SolverReference<f32>`](cutis_solver::SolverReference) bit for bit; a hardware
+//! device may fuse a multiplication with an addition, and then differs by rounding.
+//!
+//! - **The state stays on the device.** A frame is one submit. A call of `step` reads back twelve bytes, whether the body
+//!   is still finite; everything else is read when somebody asks for it, and no more than that:
+//!   [`positions_of`](cutis_solver::Solver::positions_of) reads the vertices it names,
+//!   [`residuals`](cutis_solver::Solver::residuals) two numbers per 64 constraints.
+//! - **Chunks.** The constraints of a colour are stored in parts that fit WebGPU's baseline limits on bindings, buffers and
+//!   workgroups. Parts of a colour share no vertex, so that the result does not depend on how it is split.
+//! - **Pipelines are built for what a body has**: a kind that was not added, handles, multipliers and measures that nobody asks
+//!   for have none.
+//!
+//! ```
+//! use cutis_constraints::Distance;
+//! use cutis_gpu::{Gpu, GpuOptions};
+//! use cutis_solver::{Settings, Solver, Stiffness, SystemBuilder};
+//! use cutis_solver_gpu::SolverGpu;
+//! use nalgebra::Point3;
+//!
+//! let positions = [Point3::new(0.0, 0.0, 0.0), Point3::new(1.1, 0.0, 0.0)];
+//! let spring = [[0, 1]];
+//! let groups = cutis_coloring::greedy(&spring, 2)?;
+//! let system = SystemBuilder::<f32>::new(&positions, &[0.0, 1.0])?
+//!     .add::<Distance, 2>(&spring, &[[1.0]], Stiffness::compliance(0.01), &groups)?
+//!     .build();
+//! match Gpu::open(&GpuOptions::default()) {
+//!     Ok(gpu) => {
+//!         let mut solver = SolverGpu::new(&gpu, system, Settings::default())?;
+//!         solver.step(5)?;
+//!         assert!(solver.positions()?[1].x < 1.1);
+//!     }
+//!     Err(error) => println!("no GPU here: {error}"),
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
+
+mod body;
+mod error;
+mod gather;
+mod handles;
+mod kind;
+mod memory;
+mod residual;
+mod solver;
+
+pub use error::GpuSolverError;
+pub use memory::device_bytes;
+pub use solver::SolverGpu;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -51,7 +51,8 @@ impl<T: Scalar> Stiffness<T> {
         }
     }
 
-    pub(crate) fn values(&self) -> &Values<T> {
+    /// The numbers, whatever they mean.
+    pub fn values(&self) -> &Values<T> {
         match self {
             Self::Pbd(values) | Self::Compliance(values) => values,
         }

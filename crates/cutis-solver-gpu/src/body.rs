@@ -1,0 +1,129 @@
+//! The vertices on the device and the passes over them.
+
+use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
+use cutis_shaders::solver;
+use cutis_solver::{Simulation, Step};
+use nalgebra::Vector3;
+
+/// A binding may begin at every sixteenth element of 16 bytes: 256 bytes.
+pub(crate) const ALIGNMENT: usize = 16;
+
+/// No vertex: all are finite.
+const NONE: u32 = u32::MAX;
+
+/// The state of the body: positions with inverse masses, positions before the substep, velocities.
+pub(crate) struct Body {
+    pub(crate) vertices: Buffer<[f32; 4]>,
+    pub(crate) velocities: Buffer<[f32; 4]>,
+    pub(crate) settings: Buffer<[f32; 8]>,
+    /// First vertex that is not finite, substeps that ended finite, whether one began after one that did not.
+    status: Buffer<u32>,
+    pub(crate) predict: VertexPass,
+    pub(crate) finish_and_predict: VertexPass,
+    pub(crate) finish: VertexPass,
+    pub(crate) check: VertexPass,
+    pub(crate) restore: VertexPass,
+}
+
+/// How a step went.
+pub(crate) struct Status {
+    /// The first vertex that left the finite numbers.
+    pub(crate) vertex: Option<usize>,
+    /// Substeps that ended finite.
+    pub(crate) substeps: u32,
+}
+
+/// One kernel over all vertices, in parts.
+pub(crate) struct VertexPass {
+    kernel: Kernel,
+    parts: Vec<(BindGroup, usize)>,
+}
+
+impl VertexPass {
+    pub(crate) fn run(&self, pass: &mut Pass<'_>) {
+        for (group, threads) in &self.parts {
+            pass.dispatch(&self.kernel, &[group], *threads);
+        }
+    }
+}
+
+impl Body {
+    pub(crate) fn new(gpu: &Gpu, simulation: &Simulation<f32>) -> Result<Self, GpuError> {
+        let system = simulation.system();
+        let count = system.vertices().len();
+        let vertices = gpu.buffer::<[f32; 4]>("vertices", bytemuck::cast_slice(system.vertices()))?;
+        let previous = gpu.zeroed::<[f32; 4]>("previous positions", count)?;
+        let velocities = gpu.buffer("velocities", &padded(system.velocities()))?;
+        let settings = gpu.uniform("settings of a substep", &settings_of(simulation))?;
+        let status = gpu.buffer("status", &[NONE, 0, 0])?;
+
+        let part = (gpu.chunk_len(size_of::<[f32; 4]>()) / ALIGNMENT).max(1) * ALIGNMENT;
+        let mut parts = Vec::new();
+        for start in (0..count).step_by(part) {
+            let first = gpu.uniform("first vertex of a part", &u32::try_from(start).unwrap_or(u32::MAX))?;
+            parts.push((start..count.min(start + part), first));
+        }
+        let source = solver::vertices();
+        // Each entry point with the bindings that it uses.
+        let pass = |entry: &str, used: &[u32]| -> Result<VertexPass, GpuError> {
+            let kernel = gpu.kernel(&format!("vertices: {entry}"), &source, entry)?;
+            let mut groups = Vec::with_capacity(parts.len());
+            for (range, first) in &parts {
+                let binding = |&n: &u32| match n {
+                    0 => (n, vertices.range(range.clone())),
+                    1 => (n, previous.range(range.clone())),
+                    2 => (n, velocities.range(range.clone())),
+                    3 => (n, settings.whole()),
+                    4 => (n, first.whole()),
+                    _ => (n, status.whole()),
+                };
+                let bindings: Vec<_> = used.iter().map(binding).collect();
+                groups.push((gpu.bind(&kernel, 0, &bindings)?, range.len()));
+            }
+            Ok(VertexPass { kernel, parts: groups })
+        };
+        Ok(Self {
+            predict: pass("predict", &[0, 1, 2, 3])?,
+            finish_and_predict: pass("finish_and_predict", &[0, 1, 3, 4, 5])?,
+            finish: pass("finish", &[0, 1, 2, 3, 4, 5])?,
+            check: pass("check", &[0, 4, 5])?,
+            restore: pass("restore", &[0, 1, 2])?,
+            vertices,
+            velocities,
+            settings,
+            status,
+        })
+    }
+
+    /// Writes the host's positions and velocities.
+    pub(crate) fn upload(&self, gpu: &Gpu, simulation: &Simulation<f32>) -> Result<(), GpuError> {
+        gpu.write(&self.vertices, 0, bytemuck::cast_slice(simulation.system().vertices()))?;
+        gpu.write(&self.velocities, 0, &padded(simulation.system().velocities()))
+    }
+
+    /// Forgets how the last step went.
+    pub(crate) fn clear_status(&self, gpu: &Gpu) -> Result<(), GpuError> {
+        gpu.write(&self.status, 0, &[NONE, 0, 0])
+    }
+
+    /// Waits for what was submitted and reads twelve bytes.
+    pub(crate) fn status(&self, gpu: &Gpu) -> Result<Status, GpuError> {
+        let words = gpu.read(&self.status, 0..3)?;
+        Ok(Status { vertex: (words[0] != NONE).then_some(words[0] as usize), substeps: words[1] })
+    }
+}
+
+/// The struct `Settings` of the shaders.
+fn settings_of(simulation: &Simulation<f32>) -> [f32; 8] {
+    let numbers = simulation.integrator();
+    let inverse_h_squared = match simulation.projection_step() {
+        Step::Pbd => 0.0,
+        Step::Xpbd { inverse_h_squared } => inverse_h_squared,
+    };
+    let g = numbers.gravity_h;
+    [g.x, g.y, g.z, numbers.h, numbers.velocity_factor, inverse_h_squared, 0.0, 0.0]
+}
+
+fn padded(vectors: &[Vector3<f32>]) -> Vec<[f32; 4]> {
+    vectors.iter().map(|v| [v.x, v.y, v.z, 0.0]).collect()
+}

@@ -1,0 +1,234 @@
+//! The solver of this backend: the schedule, encoded.
+
+use cutis_gpu::{Buffer, Gpu, GpuError};
+use cutis_solver::{
+    Clock, MemoryPart, Residual, Schedule, Settings, Simulation, Solver, SolverError, System,
+};
+use nalgebra::{Point3, Vector3};
+
+use crate::body::Body;
+use crate::gather::Gather;
+use crate::handles::Handles;
+use crate::kind::Kind;
+use crate::residual::Reduction;
+use crate::{GpuSolverError, device_bytes};
+
+/// Frames that are submitted before the host looks whether the body is still finite.
+const FRAMES_PER_LOOK: u64 = 64;
+
+/// The solver on a GPU.
+///
+/// The host keeps the body as it was when it was last read. If the device is lost, that state stays, and
+/// [`simulation`](Solver::simulation) says which time it belongs to.
+pub struct SolverGpu {
+    gpu: Gpu,
+    /// The clock is that of the device; the body is that of `read_at`.
+    simulation: Simulation<f32>,
+    read_at: Clock,
+    /// Whether the host's body is that of the device.
+    fresh: bool,
+    body: Body,
+    kinds: Vec<Kind>,
+    handles: Option<Handles>,
+    gather: Option<Gather>,
+    reductions: Vec<Reduction>,
+}
+
+/// Why a step ended early.
+enum Stop {
+    Device(GpuError),
+    NotFinite(usize),
+}
+
+impl From<GpuError> for Stop {
+    fn from(error: GpuError) -> Self {
+        Self::Device(error)
+    }
+}
+
+impl SolverGpu {
+    /// A solver for `system` on `gpu`: uploads the body and compiles one kernel per kind, and one for each pass over the
+    /// vertices.
+    ///
+    /// # Errors
+    /// Settings that cannot be used, a kind with a stiffness of the other formulation, a body that does not fit the
+    /// device's limits, a kind whose WGSL is wrong.
+    pub fn new(gpu: &Gpu, system: System<f32>, settings: Settings) -> Result<Self, GpuSolverError> {
+        let simulation = Simulation::new(system, settings)?;
+        let body = Body::new(gpu, &simulation)?;
+        let kind = |set: &cutis_solver::Kind<f32>| Kind::new(gpu, &body, &**set, &settings);
+        let kinds = simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?;
+        let handles = Handles::new(gpu, &body, simulation.system(), &settings)?;
+        Ok(Self {
+            gpu: gpu.clone(),
+            read_at: simulation.clock(),
+            simulation,
+            fresh: true,
+            body,
+            kinds,
+            handles,
+            gather: None,
+            reductions: Vec::new(),
+        })
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Positions relative to [`System::origin`] (m) and inverse masses (1/kg), on the device: for other kernels that
+    /// work on the body without a trip to the host.
+    pub fn vertices(&self) -> &Buffer<[f32; 4]> {
+        &self.body.vertices
+    }
+
+    /// Bytes on the device, part by part.
+    pub fn device_bytes(&self) -> Vec<MemoryPart> {
+        device_bytes(self.simulation.system(), self.simulation.settings())
+    }
+
+    /// Runs whole frames and the rest of one that was begun, one submit for each.
+    fn run(&mut self, frames: usize) -> Result<(), Stop> {
+        let end = self.simulation.clock().frame.saturating_add(frames as u64);
+        while self.simulation.clock().frame < end {
+            let look = end.min(self.simulation.clock().frame.saturating_add(FRAMES_PER_LOOK));
+            self.run_unseen(look)?;
+        }
+        Ok(())
+    }
+
+    /// Runs up to frame `end` and then looks whether the body is finite.
+    fn run_unseen(&mut self, end: u64) -> Result<(), Stop> {
+        let settings = *self.simulation.settings();
+        let mut clock = self.simulation.clock();
+        self.body.clear_status(&self.gpu)?;
+        self.fresh = false;
+        let mut predict = &self.body.predict;
+        while clock.frame < end {
+            let frame = clock.frame;
+            if let Some(handles) = &self.handles {
+                handles.write_paths(&self.gpu, self.simulation.system().handles(), clock, &settings)?;
+            }
+            let mut pass = self.gpu.pass("frame");
+            while clock.frame == frame {
+                predict.run(&mut pass);
+                predict = &self.body.finish_and_predict;
+                if let Some(handles) = &self.handles {
+                    handles.carry(&mut pass, clock.substep);
+                }
+                let Schedule { iterations, sweeps, .. } = self.simulation.schedule();
+                for iteration in 0..*iterations {
+                    for sweep in sweeps {
+                        self.kinds[sweep.kind].project(&mut pass, sweep, iteration);
+                    }
+                }
+                self.body.check.run(&mut pass);
+                clock.tick(&settings);
+            }
+            if clock.frame == end {
+                self.body.finish.run(&mut pass);
+            }
+            pass.submit()?;
+        }
+        let status = self.body.status(&self.gpu)?;
+        let Some(vertex) = status.vertex else {
+            self.simulation.set_clock(clock);
+            return Ok(());
+        };
+        let mut pass = self.gpu.pass("restore");
+        self.body.restore.run(&mut pass);
+        pass.submit()?;
+        let mut clock = self.simulation.clock();
+        for _ in 0..status.substeps {
+            clock.tick(&settings);
+        }
+        self.simulation.set_clock(clock);
+        Err(Stop::NotFinite(vertex))
+    }
+
+    /// The error of a device, with the host's state made consistent: its body belongs to the time it was read at.
+    fn stopped(&mut self, error: &GpuError) -> SolverError {
+        self.simulation.set_clock(self.read_at);
+        SolverError::Device {
+            backend: self.name(),
+            reason: error.to_string(),
+            time_s: self.simulation.time_s(),
+        }
+    }
+
+    fn read_body(&mut self) -> Result<(), GpuError> {
+        let count = self.body.vertices.len();
+        let vertices = self.gpu.read(&self.body.vertices, 0..count)?;
+        let velocities = self.gpu.read(&self.body.velocities, 0..count)?;
+        let velocities = velocities.iter().map(|&[x, y, z, _]| Vector3::new(x, y, z));
+        // The lengths are those of the body that was uploaded.
+        let taken = self.simulation.set_state(bytemuck::cast_slice(&vertices), velocities);
+        debug_assert!(taken.is_ok());
+        (self.fresh, self.read_at) = (true, self.simulation.clock());
+        Ok(())
+    }
+
+    fn reduce(&mut self) -> Result<Vec<Residual>, GpuError> {
+        for n in self.reductions.len()..self.kinds.len() {
+            let set = &*self.simulation.system().kinds()[n];
+            self.reductions.push(Reduction::new(&self.gpu, &self.body, &self.kinds[n], set)?);
+        }
+        self.reductions.iter().map(|reduction| reduction.run(&self.gpu)).collect()
+    }
+}
+
+impl Solver<f32> for SolverGpu {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn step(&mut self, frames: usize) -> Result<(), SolverError> {
+        match self.run(frames) {
+            Ok(()) => Ok(()),
+            Err(Stop::Device(error)) => Err(self.stopped(&error)),
+            Err(Stop::NotFinite(vertex)) => {
+                Err(SolverError::not_finite(vertex, self.simulation.clock(), self.simulation.settings()))
+            }
+        }
+    }
+
+    fn restore(
+        &mut self,
+        positions: &[Point3<f32>],
+        velocities: &[Vector3<f32>],
+        frame: u64,
+    ) -> Result<(), SolverError> {
+        self.simulation.restore(positions, velocities, frame)?;
+        (self.fresh, self.read_at) = (true, self.simulation.clock());
+        self.body.upload(&self.gpu, &self.simulation).map_err(|error| self.stopped(&error))
+    }
+
+    fn simulation(&self) -> &Simulation<f32> {
+        &self.simulation
+    }
+
+    fn refresh(&mut self) -> Result<(), SolverError> {
+        if self.fresh {
+            return Ok(());
+        }
+        self.read_body().map_err(|error| self.stopped(&error))
+    }
+
+    fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, SolverError> {
+        self.simulation.system().check_vertices(vertices)?;
+        if self.fresh {
+            return self.simulation.system().positions_of(vertices);
+        }
+        let found = Gather::read(&mut self.gather, &self.gpu, &self.body, vertices);
+        let found = found.map_err(|error| self.stopped(&error))?;
+        let origin = self.simulation.system().origin().coords;
+        Ok(found.iter().map(|&[x, y, z, _]| Point3::new(x, y, z) + origin).collect())
+    }
+
+    /// By reduction on the device. Sums of squares over 64 constraints are `f32`, so that it differs from the CPU's by some
+    /// 1e-7, relative.
+    fn residuals(&mut self) -> Result<Vec<Residual>, SolverError> {
+        self.reduce().map_err(|error| self.stopped(&error))
+    }
+}

@@ -1,0 +1,104 @@
+//! Bodies of every kind, formulation and way of storing.
+
+use cutis_coloring::{Groups, greedy};
+use cutis_constraints::{
+    Distance, Scalar, SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Volume,
+};
+use cutis_solver::{Formulation, Handle, Settings, Stiffness, System, SystemBuilder, Values};
+
+use crate::lattice::Kuhn;
+
+/// What a body is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts {
+    pub formulation: Formulation,
+    pub distance: bool,
+    pub volume: bool,
+    pub skin: bool,
+    pub paper: bool,
+    pub handle: bool,
+    /// A stiffness for each constraint, or one for all.
+    pub each: bool,
+    /// Length of a lattice step in m.
+    pub step: f64,
+}
+
+impl Parts {
+    pub fn all(formulation: Formulation) -> Self {
+        let paper = formulation == Formulation::Pbd;
+        let (distance, volume, skin, handle, each) = (true, true, true, true, true);
+        Self { formulation, distance, volume, skin, paper, handle, each, step: 0.1 }
+    }
+
+    pub fn none(formulation: Formulation) -> Self {
+        let (distance, volume, skin, handle, paper, each) = (false, false, false, false, false, true);
+        Self { formulation, distance, volume, skin, paper, handle, each, step: 0.1 }
+    }
+}
+
+/// One face fixed, unequal masses.
+pub fn body<T: Scalar>(parts: Parts) -> System<T> {
+    let lattice = Kuhn::new([12, 9, 7], parts.step);
+    let count = lattice.positions.len();
+    let masses: Vec<f64> = (0..count).map(|n| (n % 12).min(1) as f64 * (0.5 + (n % 7) as f64)).collect();
+    let skin: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(5).collect();
+    // Compliances in their own power of the length, so that a scaled body moves alike.
+    let stiffness = |count: usize, compliance: f64| {
+        let value = |n: usize| if parts.each { (1 + n % 3) as f64 } else { 1.0 };
+        let unit = match parts.formulation {
+            Formulation::Pbd => 0.3,
+            Formulation::Xpbd => compliance,
+        };
+        let values = match parts.each {
+            true => Values::Each((0..count).map(|n| T::constant(unit * value(n))).collect()),
+            false => Values::Uniform(T::constant(unit)),
+        };
+        match parts.formulation {
+            Formulation::Pbd => Stiffness::Pbd(values),
+            Formulation::Xpbd => Stiffness::Compliance(values),
+        }
+    };
+    let groups = |tuples: &[[u32; 2]]| greedy(tuples, count).unwrap();
+    let skin_groups: Groups = greedy(&skin, count).unwrap();
+    let scale = parts.step / 0.1;
+    let mut builder = SystemBuilder::<T>::new(&lattice.positions, &masses).unwrap();
+    if parts.distance {
+        let stiffness = stiffness(lattice.edges.len(), 1e-3);
+        let groups = groups(&lattice.edges);
+        builder = builder
+            .add_from_rest::<Distance, 2>(&lattice.edges, &Default::default(), stiffness, &groups)
+            .unwrap();
+    }
+    if parts.skin {
+        let material = SkinTensionMaterial { rest_area_scale: 0.8, amplification: 2.0 };
+        let stiffness = stiffness(skin.len(), 1e-5 * scale.powi(2));
+        builder = builder.add_from_rest::<SkinTension, 3>(&skin, &material, stiffness, &skin_groups).unwrap();
+    }
+    if parts.paper {
+        let material = SkinTensionPaperMaterial::for_stiffness(0.9, 0.8, 2.0).unwrap();
+        let stiffness = stiffness(skin.len(), 0.0);
+        builder =
+            builder.add_from_rest::<SkinTensionPaper, 3>(&skin, &material, stiffness, &skin_groups).unwrap();
+    }
+    if parts.volume {
+        let stiffness = stiffness(lattice.tets.len(), 1e-7 * scale.powi(4));
+        let groups = greedy(&lattice.tets, count).unwrap();
+        builder = builder
+            .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), stiffness, &groups)
+            .unwrap();
+    }
+    if parts.handle {
+        let move_m = [0.1 * scale, 0.2 * scale, 0.0];
+        for row in 0..2 {
+            let carried = (0..count as u32).filter(|n| n % 12 == 11 && (n / 12) % 9 == 8 * row).collect();
+            builder = builder.handle(Handle { vertices: carried, move_m, over_s: 0.03 }).unwrap();
+        }
+    }
+    builder.build()
+}
+
+pub fn settings(parts: &Parts, iterations: u32) -> Settings {
+    let gravity_m_s2 = [0.0, -9.81 * parts.step / 0.1, 0.0];
+    let formulation = parts.formulation;
+    Settings { formulation, dt_s: 0.01, substeps: 2, iterations, gravity_m_s2, damping_per_s: 0.5 }
+}

@@ -1,0 +1,90 @@
+//! Equal to the reference: bit for bit on software, within rounding on hardware; with controls that must differ.
+
+use cutis_gpu::{Gpu, GpuOptions};
+use cutis_solver::{Formulation, Settings, Solver, SolverReference};
+use cutis_solver_gpu::SolverGpu;
+use nalgebra::{Point3, Vector3};
+
+use crate::body::{Parts, body, settings};
+use crate::{is_exact, on_each_adapter};
+
+/// On hardware: the share of the body's extent by which positions may differ after a few frames.
+const TOLERANCE: f32 = 1e-6;
+
+fn state(solver: &mut dyn Solver<f32>) -> (Vec<Point3<f32>>, Vec<Vector3<f32>>) {
+    (solver.positions().unwrap(), solver.velocities().unwrap().to_vec())
+}
+
+/// Whether two solvers stand at the same place after `frames` frames, in steps of one and of the rest.
+fn agree(gpu: &Gpu, parts: Parts, on_gpu: Settings, on_cpu: Settings) -> bool {
+    let mut first = SolverGpu::new(gpu, body(parts), on_gpu).unwrap();
+    let mut second = SolverReference::<f32>::new(body(parts), on_cpu).unwrap();
+    for frames in [1, 2] {
+        first.step(frames).unwrap();
+        second.step(frames).unwrap();
+    }
+    let (found, expected) = (state(&mut first), state(&mut second));
+    assert_eq!(first.time_s(), second.time_s());
+    if is_exact(gpu) {
+        return found == expected;
+    }
+    let extent = 12.0 * parts.step as f32;
+    let apart = found.0.iter().zip(&expected.0).map(|(a, b)| (a - b).amax()).fold(0.0, f32::max);
+    apart <= TOLERANCE * extent
+}
+
+fn assert_parity(gpu: &Gpu, parts: Parts, iterations: u32) {
+    let settings = settings(&parts, iterations);
+    let name = &gpu.adapter().name;
+    assert!(agree(gpu, parts, settings, settings), "{name}: {parts:?}, {iterations} iterations");
+    // The control: other gravity must be seen.
+    let other = Settings { gravity_m_s2: settings.gravity_m_s2.map(|g| g * 1.001), ..settings };
+    assert!(!agree(gpu, parts, other, settings), "{name}: {parts:?}: another gravity goes unseen");
+}
+
+#[test]
+fn all_kinds_together_in_both_formulations() {
+    on_each_adapter(GpuOptions::default(), |gpu| {
+        for (formulation, iterations) in
+            [(Formulation::Pbd, 2), (Formulation::Xpbd, 1), (Formulation::Xpbd, 3)]
+        {
+            for step in [1e-4, 0.1, 100.0] {
+                for each in [true, false] {
+                    assert_parity(gpu, Parts { step, each, ..Parts::all(formulation) }, iterations);
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn every_kind_alone() {
+    on_each_adapter(GpuOptions::default(), |gpu| {
+        for formulation in [Formulation::Pbd, Formulation::Xpbd] {
+            let none = Parts::none(formulation);
+            let paper = formulation == Formulation::Pbd;
+            for parts in [
+                none,
+                Parts { distance: true, ..none },
+                Parts { volume: true, ..none },
+                Parts { skin: true, ..none },
+                Parts { paper, ..none },
+                Parts { handle: true, distance: true, ..none },
+            ] {
+                assert_parity(gpu, parts, 1);
+            }
+        }
+    });
+}
+
+/// Every colour and the vertices split many times, and the limits no better than WebGPU asks for.
+#[test]
+fn split_colours_and_baseline_limits() {
+    for chunk_cap in [Some(7), Some(100), None] {
+        on_each_adapter(GpuOptions { chunk_cap, baseline_limits: true, ..GpuOptions::default() }, |gpu| {
+            for iterations in [1, 2] {
+                assert_parity(gpu, Parts::all(Formulation::Xpbd), iterations);
+            }
+        });
+    }
+}
