@@ -62,6 +62,30 @@ pub enum Select {
     Name(String),
 }
 
+impl Select {
+    /// The one of `adapters`, as [`adapters`](fn@adapters) lists them, that is meant.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] if there is none at all, [`GpuError::NoSuchAdapter`] if none of them is meant.
+    pub fn among<'a>(&self, adapters: &'a [Adapter]) -> Result<&'a Adapter, GpuError> {
+        if adapters.is_empty() {
+            return Err(GpuError::NoAdapter);
+        }
+        let found = match self {
+            Select::First => adapters.first(),
+            Select::Index(index) => adapters.get(*index),
+            Select::Name(part) => {
+                let part = part.to_lowercase();
+                adapters.iter().find(|adapter| adapter.name.to_lowercase().contains(&part))
+            }
+        };
+        found.ok_or_else(|| GpuError::NoSuchAdapter {
+            asked: self.to_string(),
+            found: adapters.iter().map(|adapter| format!("{}: {}", adapter.index, adapter.name)).collect(),
+        })
+    }
+}
+
 impl FromStr for Select {
     type Err = Infallible;
 
@@ -117,24 +141,28 @@ pub(crate) fn enumerate() -> Vec<(Adapter, wgpu::Adapter)> {
 /// The adapter that `select` means.
 pub(crate) fn choose(select: &Select) -> Result<(Adapter, wgpu::Adapter), GpuError> {
     let mut all = enumerate();
-    if all.is_empty() {
+    let place = place(select, all.iter().map(|(adapter, _)| adapter))?;
+    Ok(all.swap_remove(place))
+}
+
+/// The place of the adapter that `select` means among these.
+fn place<'a>(
+    select: &Select,
+    mut all: impl ExactSizeIterator<Item = &'a Adapter> + Clone,
+) -> Result<usize, GpuError> {
+    if all.len() == 0 {
         return Err(GpuError::NoAdapter);
     }
+    let labels = all.clone().map(|adapter| format!("{}: {}", adapter.index, adapter.name));
     let place = match select {
         Select::First => Some(0),
         Select::Index(index) => (*index < all.len()).then_some(*index),
         Select::Name(part) => {
             let part = part.to_lowercase();
-            all.iter().position(|(adapter, _)| adapter.name.to_lowercase().contains(&part))
+            all.position(|adapter| adapter.name.to_lowercase().contains(&part))
         }
     };
-    match place {
-        Some(place) => Ok(all.swap_remove(place)),
-        None => Err(GpuError::NoSuchAdapter {
-            asked: select.to_string(),
-            found: all.iter().map(|(adapter, _)| format!("{}: {}", adapter.index, adapter.name)).collect(),
-        }),
-    }
+    place.ok_or_else(|| GpuError::NoSuchAdapter { asked: select.to_string(), found: labels.collect() })
 }
 
 /// One instance for the whole process, so that a resource of one device given to another is told apart by wgpu. None
@@ -197,4 +225,72 @@ fn same_adapter(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
         return a.device_pci_bus_id == b.device_pci_bus_id;
     }
     a.name == b.name && (a.backend != b.backend || kind(a.device_type) == AdapterKind::Software)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn adapter(index: usize, name: &str) -> Adapter {
+        Adapter {
+            index,
+            name: name.to_owned(),
+            kind: AdapterKind::Discrete,
+            api: "vulkan",
+            driver: String::new(),
+            limits: Limits::of(&wgpu::Limits::default()),
+            timestamps: false,
+        }
+    }
+
+    #[test]
+    fn an_adapter_is_chosen_by_order_index_and_part_of_the_name() {
+        let all = [adapter(0, "Fast Card 9000"), adapter(1, "llvmpipe (LLVM)")];
+        let chosen = |text: &str| place(&text.parse().unwrap(), all.iter());
+        assert_eq!(chosen("first"), Ok(0));
+        assert_eq!(chosen("1"), Ok(1));
+        assert_eq!(chosen("LLVMPIPE"), Ok(1));
+        assert_eq!(chosen("a"), Ok(0), "the first of several");
+        for missing in ["2", "other card"] {
+            let error = chosen(missing).unwrap_err().to_string();
+            assert_eq!(
+                error,
+                format!("no GPU adapter '{missing}'; there is: 0: Fast Card 9000, 1: llvmpipe (LLVM)")
+            );
+        }
+        assert_eq!(place(&Select::Index(0), [].iter()), Err(GpuError::NoAdapter));
+        assert!(GpuError::NoAdapter.to_string().contains("mesa-vulkan-drivers"));
+    }
+
+    #[test]
+    fn a_choice_is_written_as_it_is_read() {
+        for select in [Select::First, Select::Index(3), Select::Name("radeon".to_owned())] {
+            assert_eq!(select.to_string().parse(), Ok(select));
+        }
+    }
+
+    #[test]
+    fn two_ways_to_one_card_are_one_adapter_and_two_cards_are_two() {
+        let info = |backend, device_type, bus: &str| wgpu::AdapterInfo {
+            device_pci_bus_id: bus.to_owned(),
+            name: "card".to_owned(),
+            ..wgpu::AdapterInfo::new(device_type, backend)
+        };
+        use wgpu::{Backend::*, DeviceType::*};
+        let card = info(Vulkan, DiscreteGpu, "0000:01:00.0");
+        assert!(same_adapter(&card, &info(Dx12, DiscreteGpu, "0000:01:00.0")));
+        assert!(same_adapter(&card, &info(Dx12, DiscreteGpu, "")));
+        assert!(!same_adapter(&card, &info(Vulkan, DiscreteGpu, "0000:02:00.0")));
+        assert!(!same_adapter(&info(Metal, DiscreteGpu, ""), &info(Metal, DiscreteGpu, "")));
+        assert!(same_adapter(&info(Vulkan, Cpu, ""), &info(Vulkan, Cpu, "")));
+        assert!(!same_adapter(&card, &info(Vulkan, Cpu, "")));
+    }
+
+    #[test]
+    fn hardware_comes_before_software() {
+        use AdapterKind::*;
+        let mut kinds = [Software, Unknown, Virtual, Integrated, Discrete];
+        kinds.sort();
+        assert_eq!(kinds, [Discrete, Integrated, Virtual, Unknown, Software]);
+    }
 }
