@@ -141,28 +141,9 @@ pub(crate) fn enumerate() -> Vec<(Adapter, wgpu::Adapter)> {
 /// The adapter that `select` means.
 pub(crate) fn choose(select: &Select) -> Result<(Adapter, wgpu::Adapter), GpuError> {
     let mut all = enumerate();
-    let place = place(select, all.iter().map(|(adapter, _)| adapter))?;
+    let described: Vec<Adapter> = all.iter().map(|(adapter, _)| adapter.clone()).collect();
+    let place = select.among(&described)?.index;
     Ok(all.swap_remove(place))
-}
-
-/// The place of the adapter that `select` means among these.
-fn place<'a>(
-    select: &Select,
-    mut all: impl ExactSizeIterator<Item = &'a Adapter> + Clone,
-) -> Result<usize, GpuError> {
-    if all.len() == 0 {
-        return Err(GpuError::NoAdapter);
-    }
-    let labels = all.clone().map(|adapter| format!("{}: {}", adapter.index, adapter.name));
-    let place = match select {
-        Select::First => Some(0),
-        Select::Index(index) => (*index < all.len()).then_some(*index),
-        Select::Name(part) => {
-            let part = part.to_lowercase();
-            all.position(|adapter| adapter.name.to_lowercase().contains(&part))
-        }
-    };
-    place.ok_or_else(|| GpuError::NoSuchAdapter { asked: select.to_string(), found: labels.collect() })
 }
 
 /// One instance for the whole process, so that a resource of one device given to another is told apart by wgpu. None
@@ -246,7 +227,7 @@ mod tests {
     #[test]
     fn an_adapter_is_chosen_by_order_index_and_part_of_the_name() {
         let all = [adapter(0, "Fast Card 9000"), adapter(1, "llvmpipe (LLVM)")];
-        let chosen = |text: &str| place(&text.parse().unwrap(), all.iter());
+        let chosen = |text: &str| text.parse::<Select>().unwrap().among(&all).map(|adapter| adapter.index);
         assert_eq!(chosen("first"), Ok(0));
         assert_eq!(chosen("1"), Ok(1));
         assert_eq!(chosen("LLVMPIPE"), Ok(1));
@@ -258,7 +239,7 @@ mod tests {
                 format!("no GPU adapter '{missing}'; there is: 0: Fast Card 9000, 1: llvmpipe (LLVM)")
             );
         }
-        assert_eq!(place(&Select::Index(0), [].iter()), Err(GpuError::NoAdapter));
+        assert_eq!(Select::Index(0).among(&[]), Err(GpuError::NoAdapter));
         assert!(GpuError::NoAdapter.to_string().contains("mesa-vulkan-drivers"));
     }
 
