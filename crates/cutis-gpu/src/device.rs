@@ -143,6 +143,15 @@ impl Gpu {
         self.shared.tally.snapshot()
     }
 
+    /// Waits until all that was submitted is done, without reading anything: for timing work from the host.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::Lost`]; [`GpuError::Device`] when the driver cannot wait.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        self.flush(&|| "waiting for the device".to_owned())
+    }
+
     /// Destroys the device, as a reset of the driver would: every later call returns [`GpuError::Lost`]. For tests of
     /// what becomes of a program whose GPU goes away.
     pub fn lose(&self) {
@@ -238,4 +247,35 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 fn readable(error: &wgpu::Error) -> String {
     let text = error.to_string();
     text.strip_prefix("Validation Error\n\nCaused by:\n").unwrap_or(&text).trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_that_nobody_heard_is_told_by_the_next_call_and_once() {
+        let gpu = match Gpu::open(&GpuOptions::default()) {
+            Ok(gpu) => gpu,
+            Err(error) => {
+                assert!(std::env::var_os("CI").is_none(), "CI is set and there is no GPU: {error}");
+                eprintln!("skipped: {error}");
+                return;
+            }
+        };
+        let _ = gpu.shared.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("of no use"),
+            size: 4,
+            usage: wgpu::BufferUsages::empty(),
+            mapped_at_creation: false,
+        });
+        match gpu.zeroed::<u32>("next", 1) {
+            Err(GpuError::Validation { what, message }) => {
+                assert_eq!(what, "an earlier call");
+                assert!(message.contains("of no use"), "{message}");
+            }
+            other => panic!("{other:?}"),
+        }
+        assert!(gpu.zeroed::<u32>("after that", 1).is_ok());
+    }
 }

@@ -52,10 +52,11 @@ mod kernel;
 mod limits;
 mod pass;
 mod readback;
+mod select;
 mod texture;
 mod timing;
 
-pub use adapter::{Adapter, AdapterKind, Select, adapters};
+pub use adapter::{Adapter, AdapterKind, adapters};
 pub use buffer::Buffer;
 pub use counters::Counters;
 pub use device::{Gpu, GpuOptions};
@@ -63,6 +64,7 @@ pub use error::GpuError;
 pub use kernel::{BindGroup, Binding, Kernel};
 pub use limits::Limits;
 pub use pass::Pass;
+pub use select::Select;
 pub use texture::Texture3d;
 
 /// Threads of a workgroup in every kernel: `@compute @workgroup_size(64)`.

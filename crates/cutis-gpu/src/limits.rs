@@ -70,3 +70,34 @@ pub(crate) fn requested(offered: &wgpu::Limits, baseline_only: bool) -> Result<w
         ..baseline
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_than_the_baseline_is_asked_for_unless_it_is_not_wanted() {
+        let offered = wgpu::Limits {
+            max_buffer_size: 1 << 40,
+            max_compute_workgroups_per_dimension: u32::MAX,
+            max_bind_groups: 8,
+            min_storage_buffer_offset_alignment: 4,
+            ..wgpu::Limits::default()
+        };
+        assert_eq!(requested(&offered, true), Ok(wgpu::Limits::default()));
+        let asked = requested(&offered, false).unwrap();
+        assert_eq!(asked.max_buffer_size, 1 << 40);
+        assert_eq!(asked.max_bind_groups, 4, "no use for more");
+        assert_eq!(asked.min_storage_buffer_offset_alignment, 256, "the same on every device");
+        let threads = u64::from(asked.max_compute_workgroups_per_dimension) * WORKGROUP as u64;
+        assert!(threads <= u64::from(u32::MAX), "a thread index fits in 32 bits");
+    }
+
+    #[test]
+    fn an_adapter_below_the_baseline_is_refused_by_the_limit_it_misses() {
+        let offered = wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..wgpu::Limits::default() };
+        let expected = Shortfall { name: "max_storage_buffers_per_shader_stage", needed: 8, available: 4 };
+        assert_eq!(requested(&offered, false), Err(expected));
+        assert_eq!(requested(&offered, true), Err(expected));
+    }
+}
