@@ -62,7 +62,27 @@ pub enum ResampleError {
         /// The volume's shape.
         shape: [usize; 3],
     },
+    /// Voxels are numbered in 16 bits along each axis by the kernels of the GPU.
+    #[error("the volume's shape is {shape:?}, but a GPU resamples at most {limit} voxels along each axis")]
+    TooLarge {
+        /// The volume's shape.
+        shape: [usize; 3],
+        /// The largest number of voxels along an axis.
+        limit: usize,
+    },
+    /// There are slabs of so many slices only.
+    #[error("slab {slab} was asked for, but there are only {slabs}")]
+    NoSuchSlab {
+        /// The slab asked for.
+        slab: usize,
+        /// How many there are.
+        slabs: usize,
+    },
     /// The result is not a valid volume.
     #[error(transparent)]
     Volume(#[from] VolumeError),
+    /// The GPU refused or failed.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] cutis_gpu::GpuError),
 }

@@ -38,14 +38,20 @@
 
 mod buckets;
 mod error;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod raster;
 mod report;
 mod sample;
 mod slab;
 mod space;
+#[cfg(feature = "gpu")]
+pub mod twin;
 mod warp;
 
 pub use error::ResampleError;
+#[cfg(feature = "gpu")]
+pub use gpu::{ResamplerGpu, ResamplerOptions, SlabState, resample_gpu};
 pub use report::ResampleReport;
 pub use warp::{Warp, resample, resample_region};
 

@@ -6,8 +6,10 @@ use rayon::prelude::*;
 
 /// The affine map from local metres to voxel index, with the rounding error that `f32` positions have there.
 pub struct IndexSpace {
-    linear: Matrix3<f64>,
-    offset: Vector3<f64>,
+    /// Voxels per metre.
+    pub linear: Matrix3<f64>,
+    /// Index of the local origin.
+    pub offset: Vector3<f64>,
     /// Length in voxels below which two `f32` positions cannot be told apart.
     pub tolerance: f64,
 }

@@ -41,7 +41,7 @@ impl Warp<'_> {
         self.tets[tet].iter().any(|&v| self.rest[v as usize] != self.deformed[v as usize])
     }
 
-    fn validate(&self) -> Result<(), ResampleError> {
+    pub(crate) fn validate(&self) -> Result<(), ResampleError> {
         let vertices = self.rest.len();
         if vertices != self.deformed.len() {
             return Err(ResampleError::VertexCount { rest: vertices, deformed: self.deformed.len() });
@@ -56,13 +56,8 @@ impl Warp<'_> {
                 position: self.origin_mm.coords.into(),
             });
         }
-        for (which, positions) in [("rest", self.rest), ("deformed", self.deformed)] {
-            let finite = |p: &Point3<f32>| p.iter().all(|c| c.is_finite());
-            if let Some(vertex) = positions.par_iter().position_first(|p| !finite(p)) {
-                let position = positions[vertex].coords.map(f64::from).into();
-                return Err(ResampleError::NotFinite { which, vertex, position });
-            }
-        }
+        check_finite("rest", self.rest)?;
+        check_finite("deformed", self.deformed)?;
         for (which, tets) in [("tets", self.tets), ("removed", self.removed)] {
             let limit = u32::MAX as usize;
             if tets.len() > limit {
@@ -74,6 +69,18 @@ impl Warp<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// Refuses positions that are NaN or infinite.
+pub(crate) fn check_finite(which: &'static str, positions: &[Point3<f32>]) -> Result<(), ResampleError> {
+    let finite = |p: &Point3<f32>| p.iter().all(|c| c.is_finite());
+    match positions.par_iter().position_first(|p| !finite(p)) {
+        None => Ok(()),
+        Some(vertex) => {
+            let position = positions[vertex].coords.map(f64::from).into();
+            Err(ResampleError::NotFinite { which, vertex, position })
+        }
     }
 }
 
@@ -179,7 +186,8 @@ fn inverted_tets(warp: &Warp<'_>) -> usize {
     (0..warp.tets.len()).into_par_iter().filter(inverted).count()
 }
 
-fn sub_grid(grid: &Grid, region: &[Range<usize>; 3]) -> Result<Grid, ResampleError> {
+/// The grid of a box of voxels.
+pub(crate) fn sub_grid(grid: &Grid, region: &[Range<usize>; 3]) -> Result<Grid, ResampleError> {
     let start = region.each_ref().map(|range| range.start);
     let end = region.each_ref().map(|range| range.end);
     let shape = grid.shape;

@@ -1,0 +1,89 @@
+//! How the work is split, and the memory that all of it shares.
+
+use std::ops::Range;
+
+use cutis_gpu::{Buffer, Gpu, GpuError, Texture3d};
+use cutis_volume::Volume;
+
+use super::setup::{ResamplerOptions, Setup};
+use super::state::mark_words;
+use super::uniform::Grid;
+use crate::Warp;
+
+/// The owners of a slab take no more than this, whatever the device offers: WebGPU's baseline for a binding.
+const OWNER_BYTES: u64 = 128 << 20;
+/// One of so many tets of a chunk, and at least one, can be on a list of large tets; what finds no room there is walked by a
+/// thread alone.
+const TETS_PER_PLACE: usize = 8;
+/// Counts of a slab: covered, moved, vacated and folded voxels.
+pub const COUNTS: usize = 4;
+
+/// How tets and slices are split.
+pub struct Plan {
+    /// Most tets in a buffer.
+    pub chunk_tets: usize,
+    /// Chunks of the tets that exist now; one without tets if there are none, so that voxels get their value all the same.
+    pub chunks: usize,
+    pub removed_chunks: usize,
+    /// Most tets on a list of large ones.
+    pub listed: usize,
+    /// Slices of each slab, relative to the region.
+    pub slabs: Vec<Range<usize>>,
+    /// Voxels of the largest slab.
+    pub slab_voxels: usize,
+}
+
+impl Plan {
+    pub fn new(gpu: &Gpu, setup: &Setup, warp: &Warp<'_>, options: &ResamplerOptions) -> Self {
+        let chunk_tets = gpu.chunk_len(size_of::<[u32; 4]>());
+        let limits = gpu.limits();
+        let room = limits.max_binding_bytes.min(limits.max_buffer_bytes).min(OWNER_BYTES) as usize;
+        let fitting = (room / size_of::<u32>() / setup.slice_voxels()).max(1);
+        let slices = setup.region[2].len();
+        let slab = options.slab_slices.unwrap_or(fitting).clamp(1, fitting).min(slices);
+        Self {
+            chunk_tets,
+            chunks: warp.tets.len().div_ceil(chunk_tets).max(1),
+            removed_chunks: warp.removed.len().div_ceil(chunk_tets),
+            listed: (chunk_tets.min(warp.tets.len().max(warp.removed.len())) / TETS_PER_PLACE).max(1),
+            slabs: (0..slices).step_by(slab).map(|start| start..slices.min(start + slab)).collect(),
+            slab_voxels: slab * setup.slice_voxels(),
+        }
+    }
+
+    /// Number of lists of large tets: those that claim and those that vacate in each chunk, and the removed ones.
+    pub fn lists(&self) -> usize {
+        2 * self.chunks + self.removed_chunks
+    }
+}
+
+/// What lies on the device once.
+pub struct Memory {
+    pub source: Texture3d,
+    pub grid: Buffer<Grid>,
+    pub rest: Buffer<[f32; 4]>,
+    pub rest_places: Buffer<[f32; 4]>,
+    pub places: Buffer<[f32; 4]>,
+    pub owners: Buffer<u32>,
+    pub marks: Buffer<u32>,
+    /// Lengths of the lists of large tets, then the list in use.
+    pub large: Buffer<u32>,
+    /// Inverted tets, then [`COUNTS`] for each slab.
+    pub counters: Buffer<u32>,
+}
+
+impl Memory {
+    pub fn new(gpu: &Gpu, volume: &Volume, setup: &Setup, plan: &Plan) -> Result<Self, GpuError> {
+        Ok(Self {
+            source: gpu.texture_3d("resample: volume", volume.grid().shape, volume.voxels())?,
+            grid: gpu.uniform("resample: grid", &setup.grid)?,
+            rest: gpu.buffer("resample: rest positions", &setup.rest)?,
+            rest_places: gpu.zeroed("resample: rest places", setup.rest.len())?,
+            places: gpu.zeroed("resample: places", setup.rest.len())?,
+            owners: gpu.zeroed("resample: owners", plan.slab_voxels)?,
+            marks: gpu.zeroed("resample: marks", mark_words(plan.slab_voxels))?,
+            large: gpu.zeroed("resample: large tets", plan.lists() + plan.listed)?,
+            counters: gpu.zeroed("resample: counters", 1 + COUNTS * plan.slabs.len())?,
+        })
+    }
+}

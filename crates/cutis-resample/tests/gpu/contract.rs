@@ -1,0 +1,1 @@
+//! What the CPU's tests hold, held by the GPU.

@@ -1,0 +1,27 @@
+//! Resampling by a GPU: against its scalar twin, bit for bit, and against closed forms and the CPU in `f64`.
+//!
+//! Without an adapter the tests say so and do nothing, unless `CI` is set: then that is a failure.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod contract;
+mod parity;
+mod scenes;
+
+use cutis_gpu::{Gpu, GpuError, GpuOptions};
+
+/// The first adapter, opened with these options.
+fn open(options: GpuOptions) -> Option<Gpu> {
+    match Gpu::open(&options) {
+        Ok(gpu) => Some(gpu),
+        Err(GpuError::NoAdapter) if std::env::var_os("CI").is_none() => {
+            eprintln!("skipped: {}", GpuError::NoAdapter);
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+fn gpu() -> Option<Gpu> {
+    open(GpuOptions::default())
+}

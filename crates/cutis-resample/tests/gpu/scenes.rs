@@ -1,0 +1,109 @@
+//! Small bodies in small volumes, each with something that can go wrong.
+
+use cutis_resample::Warp;
+use cutis_volume::{Affine, Grid, Volume};
+use nalgebra::{Point3, Vector3};
+
+use crate::common::{Mesh, lattice, noise, oblique};
+
+/// A volume, a mesh with a shell and removed tets, and where its vertices went.
+pub struct Scene {
+    pub name: &'static str,
+    pub volume: Volume,
+    pub mesh: Mesh,
+    pub deformed: Vec<Point3<f32>>,
+    pub body_tets: usize,
+    pub removed: Vec<[u32; 4]>,
+}
+
+impl Scene {
+    pub fn new(name: &'static str, volume: Volume, mesh: Mesh) -> Self {
+        let (deformed, body_tets) = (mesh.rest.clone(), mesh.tets.len());
+        Self { name, volume, mesh, deformed, body_tets, removed: Vec::new() }
+    }
+
+    /// Each vertex through a map of local metres.
+    pub fn moved(mut self, map: impl Fn(Point3<f64>) -> Point3<f64>) -> Self {
+        self.deformed = self.mesh.rest.iter().map(|p| map(p.map(f64::from)).map(|c| c as f32)).collect();
+        self
+    }
+
+    pub fn warp(&self) -> Warp<'_> {
+        Warp {
+            origin_mm: self.mesh.origin_mm,
+            rest: &self.mesh.rest,
+            deformed: &self.deformed,
+            tets: &self.mesh.tets,
+            body_tets: self.body_tets,
+            removed: &self.removed,
+        }
+    }
+}
+
+fn wave(p: Point3<f64>) -> Point3<f64> {
+    p + Vector3::new(0.002, 0.001, 0.003) * (200.0 * p.y).sin()
+}
+
+/// The mesh leaves the volume on two sides; part of it is a shell, part of it is removed.
+pub fn wave_with_shell_and_removed() -> Scene {
+    let grid = Grid { shape: [23, 19, 17], affine: oblique() };
+    let mesh = lattice(&grid, [6, 5, 4], [-2.0, 2.0, 3.0], [18.0, 21.0, 14.0]);
+    let mut scene = Scene::new("wave", noise(grid, 8), mesh).moved(wave);
+    scene.removed = scene.mesh.tets.drain(100..130).collect();
+    scene.body_tets = scene.mesh.tets.len() - 200;
+    scene
+}
+
+/// Tets much larger than a thread walks alone, one cell folded back over the other.
+pub fn large_folded() -> Scene {
+    let affine = Affine::from_spacing([1.0; 3], [0.0; 3]).expect("invertible");
+    let grid = Grid { shape: [41, 23, 21], affine };
+    let mesh = lattice(&grid, [2, 1, 1], [0.5; 3], [40.5, 22.5, 20.5]);
+    let fold =
+        |p: Point3<f64>| Point3::new(if p.x > 0.021 { -0.0002 } else { p.x }, p.y + 0.0013, p.z - 0.1 * p.y);
+    Scene::new("large and folded", noise(grid, 6), mesh).moved(fold)
+}
+
+/// Fine tets, of which half do not move.
+pub fn half_at_rest() -> Scene {
+    let affine = Affine::from_spacing([0.9765625, 0.1 + 0.2, 1.0 / 3.0], [-170.3, 55.1, 1e3 / 7.0])
+        .expect("invertible");
+    let grid = Grid { shape: [25, 22, 19], affine };
+    let mesh = lattice(&grid, [11, 9, 8], [0.0; 3], [24.0, 21.0, 18.0]);
+    Scene::new("half at rest", noise(grid, 3), mesh).moved(|p| {
+        let lift = (p.x - 0.012).max(0.0);
+        Point3::new(p.x + 0.3 * lift, p.y, p.z + 0.2 * lift)
+    })
+}
+
+/// Padding beside tissue, a negative slope, and a shift by no whole voxel.
+pub fn padded() -> Scene {
+    let grid = Grid { shape: [20, 18, 16], affine: oblique() };
+    let noise = noise(grid, 5);
+    let outside = |index: usize| grid.point(index)[0] < 5;
+    let voxels =
+        noise.voxels().iter().enumerate().map(|(n, &v)| if outside(n) { 3024 } else { -v }).collect();
+    let volume = Volume::new(grid, voxels, -1.0, 0.0).expect("valid");
+    let mesh = lattice(&grid, [4, 4, 4], [0.0; 3], [19.0, 17.0, 15.0]);
+    Scene::new("padded", volume, mesh).moved(|p| p + Vector3::new(0.00031, -0.00017, 0.00042))
+}
+
+/// Vertices thrown about: inverted, folded, flat and far away.
+pub fn thrown() -> Scene {
+    let grid = Grid { shape: [21, 22, 23], affine: oblique() };
+    let mesh = lattice(&grid, [5; 3], [1.0; 3], [19.0; 3]);
+    let jitter = noise(Grid { shape: [mesh.rest.len(), 3, 1], affine: oblique() }, 77);
+    let mut scene = Scene::new("thrown", noise(grid, 4), mesh);
+    for (v, p) in scene.deformed.iter_mut().enumerate() {
+        let random = |axis: usize| f32::from(jitter.voxels()[3 * v + axis]) / 1000.0 - 0.5;
+        *p += Vector3::new(random(0), random(1), random(2)) * 0.006;
+    }
+    scene.deformed[40] = Point3::new(1e9, -1e9, 3e8);
+    scene.deformed[80] = Point3::new(f32::MAX, f32::MIN, f32::MAX);
+    scene.deformed[120] = scene.deformed[121];
+    scene
+}
+
+pub fn all() -> Vec<Scene> {
+    vec![wave_with_shell_and_removed(), large_folded(), half_at_rest(), padded(), thrown()]
+}
