@@ -86,7 +86,7 @@ impl Gpu {
         let size = asked.and_then(|bytes| bytes.max(WORD).checked_next_multiple_of(WORD));
         let Some(size) = size.filter(|size| *size <= most) else {
             self.alive()?;
-            return Err(self.over_limit(what(), asked.unwrap_or(u64::MAX), most));
+            return Err(self.over_limit(format!("bytes of {}", what()), asked.unwrap_or(u64::MAX), most));
         };
         let descriptor =
             wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };

@@ -127,7 +127,7 @@ impl Gpu {
                 let size = bytes.end - bytes.start;
                 let most = self.limits().max_binding_bytes;
                 if size > most {
-                    return Err(self.over_limit(format!("{} (bytes bound)", what()), size, most));
+                    return Err(self.over_limit(format!("bytes bound to {}", what()), size, most));
                 }
                 Ok(wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                     buffer: raw,

@@ -7,7 +7,7 @@ use crate::{Adapter, GpuError};
 /// Which adapter to open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Select {
-    /// The first of [`adapters`]: the best hardware, a software adapter if there is nothing else.
+    /// The first of [`adapters`](fn@crate::adapters): the best hardware, a software adapter if there is nothing else.
     #[default]
     First,
     /// The adapter with this [`Adapter::index`].
@@ -17,7 +17,7 @@ pub enum Select {
 }
 
 impl Select {
-    /// The one of `adapters`, as [`adapters`](fn@adapters) lists them, that is meant.
+    /// The one of `adapters`, as [`adapters`](fn@crate::adapters) lists them, that is meant.
     ///
     /// # Errors
     ///

@@ -30,7 +30,7 @@ impl Gpu {
         self.alive()?;
         let most = self.limits().max_texture_3d;
         if let Some(&side) = shape.iter().find(|side| **side > most as usize) {
-            return Err(self.over_limit(what(), side as u64, u64::from(most)));
+            return Err(self.over_limit(format!("longest side of {}", what()), side as u64, u64::from(most)));
         }
         let voxel_count = shape.iter().try_fold(1_usize, |count, &side| count.checked_mul(side));
         if voxel_count != Some(voxels.len()) || voxels.is_empty() {
