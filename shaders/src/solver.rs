@@ -1,7 +1,8 @@
 //! The passes of the solver: joined for a constraint, a formulation and a way of storing.
 //!
 //! A constraint brings `struct Params` (scalars only) and `fn eval(x: array<vec3f, N>, p: Params) -> Eval`. What a joined
-//! source declares beside it, and a constraint therefore may not: `N`, `Eval`, `Settings`, `is_finite`,
+//! source declares beside it, and a constraint therefore may not: `N`, `Eval`, `hidden_zero`, `exact` and `exact3` (both of
+//! which it may call), `Settings`, `is_finite`,
 //! `quotient_or_zero`, `multiplier_change`, `multiplier_of`, `keep_multiplier`, `stiffness_of`, `vertices`, `settings`,
 //! `tuples`, `params`, `stiffness`, `multipliers`, `points`, `found`, `inverse_rest_size`, `partial`, `sums` and the
 //! entry points.

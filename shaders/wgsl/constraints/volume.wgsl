@@ -8,9 +8,9 @@ fn eval(x: array<vec3f, N>, p: Params) -> Eval {
     let b = x[2] - x[0];
     let c = x[3] - x[0];
     let sixth = 1.0 / 6.0;
-    let grad2 = cross(b, c) * sixth;
-    let grad3 = cross(c, a) * sixth;
-    let grad4 = cross(a, b) * sixth;
+    let grad2 = exact3(cross(b, c) * sixth);
+    let grad3 = exact3(cross(c, a) * sixth);
+    let grad4 = exact3(cross(a, b) * sixth);
     let grad1 = -((grad2 + grad3) + grad4);
     return Eval(dot(a, grad2) - p.rest_volume, array<vec3f, N>(grad1, grad2, grad3, grad4));
 }

@@ -3,3 +3,16 @@ struct Eval {
     c: f32,
     grad: array<vec3f, N>,
 }
+
+// Zero, and no compiler can know: entry points set it to whether there are no constraints at all.
+var<private> hidden_zero: u32;
+
+// The value itself, behind a wall that optimisers do not see through. Drivers turn `a * b + a * c` into `a * (b + c)`, which
+// rounds differently; `a` behind such a wall is not the same `a`.
+fn exact(value: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(value) | hidden_zero);
+}
+
+fn exact3(value: vec3f) -> vec3f {
+    return bitcast<vec3f>(bitcast<vec3u>(value) | vec3u(hidden_zero));
+}

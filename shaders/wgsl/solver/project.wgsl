@@ -18,7 +18,11 @@ fn project(@builtin(global_invocation_id) id: vec3u) {
         x[i] = vertex.xyz;
         w[i] = vertex.w;
     }
+    hidden_zero = select(0u, 1u, arrayLength(&tuples) == 0u);
     var found = eval(x, params[k]);
+    for (var i = 0u; i < N; i++) {
+        found.grad[i] = exact3(found.grad[i]);
+    }
     var weighted_square = 0.0;
     for (var i = 0u; i < N; i++) {
         weighted_square = weighted_square + w[i] * dot(found.grad[i], found.grad[i]);

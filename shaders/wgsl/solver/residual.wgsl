@@ -22,6 +22,7 @@ fn residual(
         for (var i = 0u; i < N; i++) {
             x[i] = vertices[tuple[i]].xyz;
         }
+        hidden_zero = select(0u, 1u, arrayLength(&tuples) == 0u);
         ratio = abs(eval(x, params[k]).c * inverse_rest_size[k]);
     }
     sums[local] = vec2f(ratio * ratio, ratio);

@@ -26,7 +26,7 @@ fn a_lost_device_leaves_the_last_state_that_was_read() {
         assert!(solver.positions().is_err());
         assert!(solver.positions_of(&[0]).is_err());
         assert!(solver.residuals().is_err());
-        assert_eq!(solver.simulation().system().positions(), kept);
+        assert!(solver.simulation().system().positions() == kept);
         assert_eq!(solver.simulation().time_s(), time_s);
     });
 }

@@ -57,8 +57,8 @@ fn chosen_positions_are_those_of_all() {
         let other = solver.positions_of(&chosen[1..]).unwrap();
         let all = solver.positions().unwrap();
         let expected: Vec<_> = chosen.iter().map(|&v| all[v as usize]).collect();
-        assert_eq!(found, expected);
-        assert_eq!(other, expected[1..]);
+        assert!(found == expected);
+        assert!(other == expected[1..]);
         assert!(solver.positions_of(&[all.len() as u32]).is_err());
     });
 }

@@ -24,7 +24,7 @@ fn one_step_of_many_frames_is_many_steps_of_one() {
             (solver.positions().unwrap(), solver.velocities().unwrap().to_vec(), solver.time_s())
         };
         // More frames than are submitted unseen.
-        assert_eq!(run(&[70]), run(&[1, 63, 2, 4]));
+        assert!(run(&[70]) == run(&[1, 63, 2, 4]));
     });
 }
 
@@ -39,15 +39,15 @@ fn a_saved_state_goes_on_on_either_backend() {
         first.step(1).unwrap();
         let mut second = SolverGpu::new(gpu, body(parts), settings).unwrap();
         second.restore(&positions, &velocities, 2).unwrap();
-        assert_eq!(second.positions().unwrap(), positions);
+        assert!(second.positions().unwrap() == positions);
         second.step(1).unwrap();
-        assert_eq!(second.positions().unwrap(), first.positions().unwrap());
+        assert!(second.positions().unwrap() == first.positions().unwrap());
         assert_eq!(second.time_s(), first.time_s());
         if is_exact(gpu) {
             let mut reference = SolverReference::<f32>::new(body(parts), settings).unwrap();
             reference.restore(&positions, &velocities, 2).unwrap();
             reference.step(1).unwrap();
-            assert_eq!(reference.positions().unwrap(), first.positions().unwrap());
+            assert!(reference.positions().unwrap() == first.positions().unwrap());
         }
         let error = second.restore(&positions[1..], &velocities, 2).unwrap_err();
         assert!(matches!(error, SolverError::VertexLength { what: "positions", .. }), "{error}");
