@@ -14,11 +14,16 @@ pub struct Blocks {
     full: Vec<bool>,
 }
 
+/// Blocks per axis of a grid of voxels.
+pub fn block_shape(voxels: [usize; 3]) -> [usize; 3] {
+    voxels.map(|n| n.saturating_sub(1).div_ceil(SIDE).max(1))
+}
+
 impl Blocks {
     /// Looks at all voxels once, in parallel.
     pub fn new(field: &Field<'_>, threshold_hu: f32) -> Self {
         let voxels = field.shape();
-        let shape = voxels.map(|n| n.saturating_sub(1).div_ceil(SIDE).max(1));
+        let shape = block_shape(voxels);
         let mut full = vec![false; shape.iter().product()];
         full.par_chunks_mut(shape[0] * shape[1]).enumerate().for_each(|(block_k, full)| {
             // A block needs the voxels at its far faces too, so those belong to two blocks.

@@ -56,4 +56,8 @@ pub enum RenderError {
     /// A file could not be created or replaced, or a derived volume is not valid.
     #[error(transparent)]
     Volume(#[from] VolumeError),
+    /// The GPU could not do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] cutis_gpu::GpuError),
 }

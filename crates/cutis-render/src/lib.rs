@@ -27,6 +27,8 @@ mod error;
 mod expose;
 mod field;
 mod font;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod image;
 pub mod plot;
 mod raymarch;
@@ -40,6 +42,8 @@ pub use compose::side_by_side;
 pub use contour::Contour;
 pub use depth::skin_depth;
 pub use error::RenderError;
+#[cfg(feature = "gpu")]
+pub use gpu::{GpuRaymarcher, raymarch_gpu};
 pub use image::{Image, Rgb};
 pub use raymarch::raymarch;
 pub use side::{Axes, Side};

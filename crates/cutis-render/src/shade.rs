@@ -8,9 +8,9 @@ use crate::{Axes, Rgb, View};
 
 /// Behind the body.
 pub const BACKGROUND: Rgb = [24, 26, 32];
-const SKIN: Rgb = [232, 186, 160];
+pub const SKIN: Rgb = [232, 186, 160];
 /// Tissue of a wound by HU: fat, connective tissue, muscle, bone.
-const TISSUE: [(f32, Rgb); 6] = [
+pub const TISSUE: [(f32, Rgb); 6] = [
     (-180.0, [250, 206, 124]),
     (-70.0, [242, 178, 100]),
     (-20.0, [214, 92, 74]),
@@ -19,7 +19,7 @@ const TISSUE: [(f32, Rgb); 6] = [
     (400.0, [238, 228, 206]),
 ];
 /// Directions in which ambient light is looked for, spread over a sphere.
-const DIRECTIONS: usize = 16;
+pub const DIRECTIONS: usize = 16;
 /// Parts of the occlusion's reach at which tissue is looked for.
 const REACHES: [f64; 3] = [0.2, 0.5, 1.0];
 
@@ -31,13 +31,13 @@ pub struct Shader<'a> {
     field: &'a Field<'a>,
     depth: Option<(Field<'a>, f64)>,
     threshold_hu: f32,
-    skin_mm: f64,
-    occlusion_mm: f64,
-    directions: [Vector3<f64>; DIRECTIONS],
-    index_per_mm: Matrix3<f64>,
-    finest_mm: f64,
-    toward: Vector3<f64>,
-    light: Vector3<f64>,
+    pub skin_mm: f64,
+    pub occlusion_mm: f64,
+    pub directions: [Vector3<f64>; DIRECTIONS],
+    pub index_per_mm: Matrix3<f64>,
+    pub finest_mm: f64,
+    pub toward: Vector3<f64>,
+    pub light: Vector3<f64>,
 }
 
 impl<'a> Shader<'a> {
