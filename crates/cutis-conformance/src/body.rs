@@ -1,0 +1,179 @@
+//! Bodies made of the samples, to run them through solvers.
+
+use cutis_coloring::{Groups, greedy};
+use cutis_constraints::{Constraint, Params, Scalar};
+use cutis_solver::{
+    Formulation, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder, Values,
+};
+use nalgebra::Point3;
+
+use crate::{Case, ConformanceError, Random};
+
+/// Time of a frame in s.
+const DT: f64 = 1.0 / 60.0;
+/// Damping times substep: an element that swings through itself would blow up the smallest difference.
+const DAMPING: f64 = 2.0;
+
+/// What a body is run with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plan {
+    pub(crate) name: &'static str,
+    formulation: Formulation,
+    substeps: u32,
+    iterations: u32,
+}
+
+impl Plan {
+    /// One projection, then several with what is kept between them.
+    const ALL: [Self; 4] = [
+        Self { name: "one PBD projection", formulation: Formulation::Pbd, substeps: 1, iterations: 1 },
+        Self { name: "PBD", formulation: Formulation::Pbd, substeps: 3, iterations: 2 },
+        Self { name: "one XPBD projection", formulation: Formulation::Xpbd, substeps: 1, iterations: 1 },
+        Self { name: "XPBD with multipliers", formulation: Formulation::Xpbd, substeps: 3, iterations: 2 },
+    ];
+
+    /// Those that a constraint can be run with.
+    pub(crate) fn of(pbd_only: bool) -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(move |plan| !pbd_only || plan.formulation == Formulation::Pbd)
+    }
+
+    pub(crate) fn settings(&self) -> Settings {
+        let Self { formulation, substeps, iterations, .. } = *self;
+        let damping_per_s = DAMPING * f64::from(substeps) / DT;
+        Settings { formulation, dt_s: DT, substeps, iterations, damping_per_s, ..Settings::default() }
+    }
+}
+
+/// Constraints over vertices, with all numbers such that `f32` holds them exactly.
+pub(crate) struct Body<const N: usize> {
+    pub(crate) name: String,
+    pub(crate) scale: f64,
+    positions: Vec<Point3<f64>>,
+    inverse_masses: Vec<f64>,
+    tuples: Vec<[u32; N]>,
+    params: Vec<Vec<f64>>,
+    groups: Groups,
+    /// A stiffness for each constraint, or one for all.
+    each: bool,
+}
+
+impl<const N: usize> Body<N> {
+    /// The samples of one scale, each with vertices of its own: one colour, which is more than one workgroup.
+    pub(crate) fn soup(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
+        let name = format!("elements on their own at {scale} m");
+        Self::new(name, cases, scale, |_, x| x, |k, i| k * N + i, true)
+    }
+
+    /// The samples of one scale, each hung onto the one before by a vertex: two colours.
+    pub(crate) fn chain(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
+        let mut end = Point3::origin();
+        let place = move |k: usize, x: [Point3<f64>; N]| {
+            let moved = if k == 0 { x } else { x.map(|p| p - x[0].coords + end.coords) };
+            let moved = moved.map(|p| p.map(|v| f64::from(v as f32)));
+            end = moved[N - 1];
+            moved
+        };
+        Self::new(format!("a chain at {scale} m"), cases, scale, place, |k, i| k * (N - 1) + i, false)
+    }
+
+    fn new(
+        name: String,
+        cases: &[Case<N>],
+        scale: f64,
+        mut place: impl FnMut(usize, [Point3<f64>; N]) -> [Point3<f64>; N],
+        vertex: impl Fn(usize, usize) -> usize,
+        each: bool,
+    ) -> Result<Self, ConformanceError> {
+        let (mut positions, mut tuples, mut params) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, case) in cases.iter().filter(|case| case.scale == scale).enumerate() {
+            let x = place(k, case.x);
+            for i in 0..N {
+                if vertex(k, i) == positions.len() {
+                    positions.push(x[i]);
+                }
+            }
+            tuples.push(std::array::from_fn(|i| vertex(k, i) as u32));
+            params.push(case.params.clone());
+        }
+        let mut random = Random::new(4);
+        let inverse_mass = |vertex: usize| {
+            let value = random.between(0.5, 2.0);
+            if vertex % 7 == 6 { 0.0 } else { f64::from(value as f32) }
+        };
+        let inverse_masses = (0..positions.len()).map(inverse_mass).collect();
+        let groups = greedy(&tuples, positions.len())?;
+        Ok(Self { name, scale, positions, inverse_masses, tuples, params, groups, each })
+    }
+
+    /// The body with constraints of the type `C`, each about as stiff as its vertices are heavy.
+    pub(crate) fn system<C: Constraint<N>, T: Scalar>(&self, plan: Plan) -> Result<System<T>, SolverError> {
+        let params: Vec<C::Params<T>> =
+            self.params.iter().map(|p| Params::from_fn(|k| T::constant(p[k]))).collect();
+        let single = |values: Vec<f64>| -> Values<T> {
+            let mut values = values.into_iter().map(|value| T::constant(f64::from(value as f32)));
+            if self.each {
+                Values::Each(values.collect())
+            } else {
+                Values::Uniform(values.next().unwrap_or(T::one()))
+            }
+        };
+        let mut random = Random::new(5);
+        let stiffness = match plan.formulation {
+            Formulation::Pbd => {
+                Stiffness::Pbd(single(self.tuples.iter().map(|_| random.between(0.2, 1.0)).collect()))
+            }
+            Formulation::Xpbd => {
+                let h = plan.settings().substep_s();
+                let compliance = |k: usize| random.between(0.1, 2.0) * h * h * self.weighted_square::<C>(k);
+                Stiffness::Compliance(single((0..self.tuples.len()).map(compliance).collect()))
+            }
+        };
+        let builder = SystemBuilder::<T>::new(&self.positions, &self.inverse_masses)?;
+        Ok(builder.add::<C, N>(&self.tuples, &params, stiffness, &self.groups)?.build())
+    }
+
+    /// `Σ w|∇C|²` of constraint `k`, with masses of 1 kg.
+    fn weighted_square<C: Constraint<N>>(&self, k: usize) -> f64 {
+        let x = self.tuples[k].map(|vertex| self.positions[vertex as usize]);
+        let case = Case { scale: self.scale, x, params: self.params[k].clone() };
+        case.eval::<C, f64>().grad.iter().map(|g| g.norm_squared()).sum()
+    }
+
+    /// Where the vertices are after one frame of the reference solver.
+    pub(crate) fn reference<C: Constraint<N>, T: Scalar>(
+        &self,
+        plan: Plan,
+    ) -> Result<Vec<Point3<f64>>, SolverError> {
+        let system = self.system::<C, T>(plan)?;
+        after_a_frame(&mut SolverReference::new(system, plan.settings())?)
+    }
+
+    /// Distances between the vertices of two runs, over the scale.
+    pub(crate) fn distances<'a>(
+        &self,
+        a: &'a [Point3<f64>],
+        b: &'a [Point3<f64>],
+    ) -> impl Iterator<Item = f64> + use<'a, N> {
+        let scale = self.scale;
+        a.iter().zip(b).map(move |(a, b)| (a - b).norm() / scale)
+    }
+
+    /// The largest coordinate over the scale.
+    pub(crate) fn extent(&self) -> f64 {
+        let coordinates = self.positions.iter().flat_map(|p| p.coords.iter().copied());
+        coordinates.fold(0.0, |most, x| f64::max(most, x.abs())) / self.scale
+    }
+}
+
+/// Where the vertices are after one frame.
+pub(crate) fn after_a_frame<T: Scalar>(solver: &mut dyn Solver<T>) -> Result<Vec<Point3<f64>>, SolverError> {
+    solver.step(1)?;
+    Ok(solver.positions()?.iter().map(|p| p.map(T::to_f64)).collect())
+}
+
+/// Coordinates that differ between two runs.
+pub(crate) fn differing(a: &[Point3<f64>], b: &[Point3<f64>]) -> usize {
+    let coordinates = |x: &[Point3<f64>]| x.iter().flat_map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>();
+    coordinates(a).iter().zip(coordinates(b)).filter(|&(a, b)| *a != b).count()
+        + 3 * a.len().abs_diff(b.len())
+}

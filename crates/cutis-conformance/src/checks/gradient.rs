@@ -1,0 +1,70 @@
+//! The gradient is that of the value.
+
+use cutis_constraints::{Constraint, Eval};
+use nalgebra::Vector3;
+
+use crate::alter::Alteration;
+use crate::measure::{largest, length};
+use crate::{Case, Report, Subject};
+
+/// Bound on the relative error against finite differences; the controls are off by 1e-3.
+const BOUND: f64 = 1e-6;
+/// Step of the differences over the length scale.
+const STEP: f64 = 1e-4;
+
+/// The gradient against central finite differences of fourth order, in `f64`, relative to its own length: at most 1e-6.
+///
+/// Of a constraint with [`direction_only`](Subject::direction_only) the directions are compared. Controls: each gradient off by
+/// 1e-3, and neighbours swapped, must be seen.
+pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
+    let mut report = Report::new(C::NAME, "gradient");
+    let cases = subject.cases();
+    let differences: Vec<_> = cases.iter().map(differences::<C, N>).collect();
+    let error = |alter: &dyn Fn(Eval<f64, N>) -> Eval<f64, N>| {
+        let of_case = |(case, expected): (&Case<N>, &[Vector3<f64>; N])| {
+            relative_error(alter(case.eval::<C, f64>()).grad, *expected, subject.direction_only)
+        };
+        cases.iter().zip(&differences).map(of_case).fold(0.0, largest)
+    };
+    report.at_most("error against finite differences", error(&|eval| eval), BOUND);
+    let alterations = Alteration::of::<C, N>(&cases).into_iter().filter(|&one| one != Alteration::Value);
+    // The length of the only gradient is not its direction.
+    for alteration in alterations.filter(|_| N > 1 || !subject.direction_only) {
+        report.control(alteration, error(&|eval| alteration.apply(eval)), 100.0 * BOUND);
+    }
+    report
+}
+
+/// Central differences of the value by every coordinate.
+fn differences<C: Constraint<N>, const N: usize>(case: &Case<N>) -> [Vector3<f64>; N] {
+    let step = STEP * case.scale;
+    let mut result = [Vector3::zeros(); N];
+    for i in 0..N {
+        for axis in 0..3 {
+            let c = |steps: f64| {
+                let mut moved = case.clone();
+                moved.x[i][axis] += steps * step;
+                moved.eval::<C, f64>().c
+            };
+            result[i][axis] = (8.0 * (c(1.0) - c(-1.0)) - (c(2.0) - c(-2.0))) / (12.0 * step);
+        }
+    }
+    result
+}
+
+fn relative_error<const N: usize>(
+    found: [Vector3<f64>; N],
+    expected: [Vector3<f64>; N],
+    direction_only: bool,
+) -> f64 {
+    let norm = |grad: &[Vector3<f64>; N]| grad.iter().map(Vector3::norm_squared).sum::<f64>().sqrt();
+    let (found, expected) = if direction_only {
+        let unit = |grad: [Vector3<f64>; N]| grad.map(|g| g / norm(&grad));
+        (unit(found), unit(expected))
+    } else {
+        (found, expected)
+    };
+    let difference = std::array::from_fn::<_, N, _>(|i| found[i] - expected[i]);
+    let size = largest(length(&found), length(&expected));
+    if size == 0.0 { 0.0 } else { length(&difference) / size }
+}

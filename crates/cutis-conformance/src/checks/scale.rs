@@ -1,0 +1,50 @@
+//! No length of its own: the same shape looks the same at every scale.
+
+use cutis_constraints::{Constraint, Eval};
+
+use crate::measure::{largest, numbers};
+use crate::{Case, Report, SCALES, Subject};
+
+/// Bound on what rounding in `f64` creates.
+const BOUND: f64 = 1e-9;
+/// The absolute length in m of the control.
+const LENGTH: f64 = 1e-6;
+
+/// The same shapes at 1 mm, 1 m and 1 km have the same value over rest size, and the same gradient times length over rest size:
+/// in `f64`, to 1e-9. An absolute length or an absolute epsilon in the formula shows here.
+///
+/// Left out for constraints [`with_own_length`](Subject::with_own_length). Control: a micrometre added to one coordinate must be
+/// seen.
+pub fn scale<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
+    let check = "scale";
+    if subject.has_length {
+        return Report::left_out(C::NAME, check, "the constraint has a length of its own");
+    }
+    let mut report = Report::new(C::NAME, check);
+    let cases = subject.similar_cases();
+    let per_scale = cases.len() / SCALES.len();
+    let metre = &cases[per_scale..2 * per_scale];
+    let error = |absolute: f64| {
+        let mut worst = 0.0;
+        for (case, of_metre) in cases.chunks(per_scale.max(1)).flat_map(|scale| scale.iter().zip(metre)) {
+            let (expected, found) =
+                (without_unit::<C, N>(of_metre, absolute), without_unit::<C, N>(case, absolute));
+            let size = numbers(&expected).map(f64::abs).fold(0.0, largest);
+            let difference = numbers(&expected).zip(numbers(&found)).map(|(a, b)| (a - b).abs());
+            worst = largest(difference.fold(0.0, largest) / size, worst);
+        }
+        worst
+    };
+    report.at_most("difference between scales", error(0.0), BOUND);
+    report.control("a length of 1e-6 m", error(LENGTH), 100.0 * BOUND);
+    report
+}
+
+/// Value over rest size, gradients times length over rest size, with a coordinate moved by an absolute length.
+fn without_unit<C: Constraint<N>, const N: usize>(case: &Case<N>, absolute: f64) -> Eval<f64, N> {
+    let mut moved = case.clone();
+    moved.x[0].x += absolute;
+    let eval = moved.eval::<C, f64>();
+    let rest_size = C::rest_size(&case.params::<C, f64>());
+    Eval { c: eval.c / rest_size, grad: eval.grad.map(|g| g * (case.scale / rest_size)) }
+}

@@ -1,0 +1,90 @@
+//! How far two evaluations of a constraint are apart.
+
+use cutis_constraints::{Constraint, Eval, Scalar};
+use nalgebra::Vector3;
+
+use crate::{Case, SCALES};
+
+/// The largest length of a vector of the gradient; NaN if any is.
+pub(crate) fn length<const N: usize>(grad: &[Vector3<f64>; N]) -> f64 {
+    grad.iter().map(Vector3::norm).fold(0.0, largest)
+}
+
+/// The larger number; NaN if one of them is.
+pub(crate) fn largest(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
+/// The numbers of an evaluation in `f64`.
+pub(crate) fn double<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> Eval<f64, N> {
+    Eval { c: eval.c.to_f64(), grad: eval.grad.map(|g| g.map(T::to_f64)) }
+}
+
+/// The numbers of an evaluation in a row: the value, then the gradients.
+pub(crate) fn numbers<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> impl Iterator<Item = T> {
+    std::iter::once(eval.c).chain(eval.grad.iter().flatten().copied())
+}
+
+/// Errors of many numbers: the worst, and the root mean square.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// The largest error; NaN if any is.
+    pub worst: f64,
+    /// Root mean square.
+    pub rms: f64,
+}
+
+impl Deviation {
+    /// Of these errors.
+    pub fn of(errors: impl IntoIterator<Item = f64>) -> Self {
+        let (mut worst, mut sum, mut count) = (0.0, 0.0, 0.0);
+        for error in errors {
+            worst = largest(error, worst);
+            sum += error * error;
+            count += 1.0;
+        }
+        Self { worst, rms: if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 } }
+    }
+}
+
+/// Errors of value and gradient at one length scale, relative to [`Case::size`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// Length scale in m.
+    pub scale: f64,
+    /// Of the value.
+    pub value: Deviation,
+    /// Of the gradient.
+    pub gradient: Deviation,
+}
+
+/// What `found` deviates from the evaluation in `f64`, per scale. `found` has one evaluation for each case.
+pub fn errors<C: Constraint<N>, T: Scalar, const N: usize>(
+    cases: &[Case<N>],
+    found: &[Eval<T, N>],
+) -> Vec<Errors> {
+    let of_scale = |scale: f64| {
+        let (mut value, mut gradient) = (Vec::new(), Vec::new());
+        for (case, found) in cases.iter().zip(found).filter(|(case, _)| case.scale == scale) {
+            let (exact, found, size) = (case.eval::<C, f64>(), double(found), case.size::<C>());
+            value.push((found.c - exact.c).abs() / size);
+            let difference = std::array::from_fn::<_, N, _>(|i| found.grad[i] - exact.grad[i]);
+            gradient.push(length(&difference) * scale / size);
+        }
+        Errors { scale, value: Deviation::of(value), gradient: Deviation::of(gradient) }
+    };
+    SCALES.map(of_scale).to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_nan_is_not_lost() {
+        assert!(largest(f64::NAN, 1.0).is_nan() && largest(1.0, f64::NAN).is_nan());
+        let deviation = Deviation::of([1.0, f64::NAN, 2.0]);
+        assert!(deviation.worst.is_nan() && deviation.rms.is_nan());
+        assert_eq!(Deviation::of([3.0, 4.0]), Deviation { worst: 4.0, rms: f64::sqrt(12.5) });
+    }
+}
