@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::spdx;
-use crate::workspace::Workspace;
+use crate::workspace::{Scope, Workspace};
 
 struct Rules {
     allowed_licences: Vec<String>,
@@ -79,7 +79,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     let mut complaints = BTreeSet::new();
     let mut count = 0;
     for manifest in workspace.manifests() {
-        let metadata = workspace.metadata(&manifest, true)?;
+        let metadata = workspace.metadata(&manifest, Scope::AllDependencies)?;
         let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
         count += packages.len();
         complaints.extend(packages.iter().flat_map(|package| rules.complaints(package)));

@@ -140,8 +140,10 @@ pub fn parity_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     command
 }
 
+/// Runs the program that the step `tests` has built. `cargo run` would build it once more, since the features of shared
+/// dependencies differ from those of the whole workspace.
 fn parity(workspace: &Workspace) -> Result<()> {
-    execute(&mut parity_command(workspace, &["--quick"]))
+    execute(vulkan::for_gpu_tests(workspace.command(workspace.parity()?).arg("--quick")))
 }
 
 /// Libraries only: the program `cutis` and the crate `cutis` would write the same page.

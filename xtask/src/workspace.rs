@@ -15,6 +15,16 @@ pub struct Workspace {
     pub ci: bool,
 }
 
+/// What `cargo metadata` is asked for.
+pub enum Scope {
+    /// The packages of a workspace.
+    Members,
+    /// Those and all that they resolve to with their default features.
+    Dependencies,
+    /// Those and all that they resolve to with any feature.
+    AllDependencies,
+}
+
 impl Workspace {
     /// The checkout this program was started from.
     pub fn find() -> Result<Self> {
@@ -66,11 +76,15 @@ impl Workspace {
         command
     }
 
-    /// `cargo metadata` of one of the workspaces; with `dependencies`, of every package they resolve to.
-    pub fn metadata(&self, manifest: &Path, dependencies: bool) -> Result<Value> {
+    /// `cargo metadata` of one of the workspaces.
+    pub fn metadata(&self, manifest: &Path, scope: Scope) -> Result<Value> {
         let mut command = self.cargo("metadata");
         command.args(["--format-version", "1", "--manifest-path"]).arg(manifest);
-        command.arg(if dependencies { "--all-features" } else { "--no-deps" });
+        command.args(match scope {
+            Scope::Members => Some("--no-deps"),
+            Scope::Dependencies => None,
+            Scope::AllDependencies => Some("--all-features"),
+        });
         let output = command.output().context("cannot start cargo")?;
         if !output.status.success() {
             bail!("cargo metadata failed: {}", String::from_utf8_lossy(&output.stderr).trim());
@@ -80,10 +94,19 @@ impl Workspace {
 
     /// The released `cutis` program.
     pub fn program(&self) -> Result<PathBuf> {
-        let program =
-            self.target_dir()?.join("release").join(format!("cutis{}", std::env::consts::EXE_SUFFIX));
+        self.built("release/cutis", "cargo build --release -p cutis-cli")
+    }
+
+    /// The program that compares the backends, as the tests of the workspace leave it behind.
+    pub fn parity(&self) -> Result<PathBuf> {
+        self.built("debug/parity", "cargo test --workspace --no-run")
+    }
+
+    /// A program in the folder of builds; if it is missing, the error names the command that builds it.
+    fn built(&self, path: &str, build: &str) -> Result<PathBuf> {
+        let program = self.target_dir()?.join(format!("{path}{}", std::env::consts::EXE_SUFFIX));
         if !program.is_file() {
-            bail!("{} is missing; build it with `cargo build --release -p cutis-cli`", program.display());
+            bail!("{} is missing; build it with `{build}`", program.display());
         }
         Ok(program)
     }
@@ -104,7 +127,7 @@ impl Workspace {
 
     /// Where builds go; follows `CARGO_TARGET_DIR`.
     pub fn target_dir(&self) -> Result<PathBuf> {
-        let metadata = self.metadata(&self.root.join("Cargo.toml"), false)?;
+        let metadata = self.metadata(&self.root.join("Cargo.toml"), Scope::Members)?;
         let folder =
             metadata["target_directory"].as_str().context("cargo metadata names no target_directory")?;
         Ok(PathBuf::from(folder))

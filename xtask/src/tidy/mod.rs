@@ -2,6 +2,7 @@
 //! findings, with a test that shows it what it must catch.
 
 mod docs;
+mod features;
 mod files;
 mod gpu_access;
 mod layers;
@@ -14,7 +15,7 @@ use std::fmt;
 
 use anyhow::{Result, bail};
 
-use crate::workspace::Workspace;
+use crate::workspace::{Scope, Workspace};
 use files::Files;
 use source::Source;
 
@@ -59,10 +60,12 @@ impl fmt::Display for Finding {
 /// Applies every rule to the checkout.
 pub fn run(workspace: &Workspace) -> Result<()> {
     let files = Files::list(&workspace.root)?;
-    let metadata = workspace.metadata(&workspace.root.join("Cargo.toml"), false)?;
+    let manifest = workspace.root.join("Cargo.toml");
+    let metadata = workspace.metadata(&manifest, Scope::Members)?;
 
     let packages = layers::packages(&metadata)?;
     let mut findings = layers::check(&packages);
+    findings.extend(features::switched_off(&workspace.metadata(&manifest, Scope::Dependencies)?)?);
     findings.extend(docs::required(&files));
     let mut sources = 0;
     for path in files.with_extension("rs") {

@@ -1,0 +1,71 @@
+//! No test is left out for want of a feature: `cargo test --workspace` has every feature of every member on.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result};
+use serde_json::Value;
+
+use super::Finding;
+
+/// Features for other systems than Linux, on which they change nothing.
+const OTHER_SYSTEMS: [&str; 2] = ["metal", "dx12"];
+
+/// Features of members that are off when the whole workspace is built with default features, from `cargo metadata` with
+/// its dependencies resolved. What such a feature guards is neither linted nor tested, and nobody says so.
+pub fn switched_off(metadata: &Value) -> Result<Vec<Finding>> {
+    let nodes = metadata["resolve"]["nodes"].as_array().context("cargo metadata resolves no dependencies")?;
+    let on: BTreeMap<&str, &Value> =
+        nodes.iter().filter_map(|node| Some((node["id"].as_str()?, &node["features"]))).collect();
+    let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
+    let mut findings = Vec::new();
+    for package in packages.iter().filter(|package| package["source"].is_null()) {
+        let id = package["id"].as_str().context("a package without an id")?;
+        let on = on.get(id).and_then(|features| features.as_array());
+        let is_on = |name: &str| on.is_some_and(|on| on.iter().any(|feature| feature == name));
+        let features = package["features"].as_object().context("a package without features")?;
+        for name in features.keys().filter(|name| !OTHER_SYSTEMS.contains(&name.as_str())) {
+            if !is_on(name) {
+                let place = package["name"].as_str().unwrap_or(id);
+                let message = format!(
+                    "feature `{name}` is off in `cargo test --workspace`, so what it guards is not tested: \
+                     let `tests/Cargo.toml` or a default feature switch it on"
+                );
+                findings.push(Finding::failure(place, 0, message));
+            }
+        }
+    }
+    Ok(findings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn count(source: Value, on: Value) -> usize {
+        let metadata = json!({
+            "packages": [{
+                "id": "a 1.0", "name": "a", "source": source, "features": { "default": ["gpu"], "gpu": [], "metal": [] }
+            }],
+            "resolve": { "nodes": [{ "id": "a 1.0", "features": on }] }
+        });
+        switched_off(&metadata).unwrap().len()
+    }
+
+    #[test]
+    fn a_feature_that_is_off_is_caught() {
+        assert_eq!(count(Value::Null, json!(["default", "gpu"])), 0);
+        assert_eq!(count(Value::Null, json!(["default"])), 1);
+        assert_eq!(count(Value::Null, json!([])), 2);
+    }
+
+    #[test]
+    fn features_of_foreign_crates_are_theirs() {
+        assert_eq!(count(json!("registry+https://example.org"), json!([])), 0);
+    }
+
+    #[test]
+    fn metadata_without_dependencies_is_an_error() {
+        assert!(switched_off(&json!({ "packages": [], "resolve": null })).is_err());
+    }
+}
