@@ -6,7 +6,7 @@ use cutis_solver::{Simulation, Step};
 use nalgebra::Vector3;
 
 /// A binding may begin at every sixteenth element of 16 bytes: 256 bytes.
-pub(crate) const ALIGNMENT: usize = 16;
+const ALIGNMENT: usize = 16;
 
 /// No vertex: all are finite.
 const NONE: u32 = u32::MAX;
@@ -17,7 +17,7 @@ pub(crate) struct Body {
     pub(crate) velocities: Buffer<[f32; 4]>,
     pub(crate) settings: Buffer<[f32; 8]>,
     /// First vertex that is not finite, substeps that ended finite, whether one began after one that did not.
-    status: Buffer<u32>,
+    pub(crate) status: Buffer<u32>,
     pub(crate) predict: VertexPass,
     pub(crate) finish_and_predict: VertexPass,
     pub(crate) finish: VertexPass,
@@ -40,6 +40,11 @@ pub(crate) struct VertexPass {
 }
 
 impl VertexPass {
+    /// Dispatches of one run.
+    pub(crate) fn dispatches(&self) -> usize {
+        self.parts.len()
+    }
+
     pub(crate) fn run(&self, pass: &mut Pass<'_>) {
         for (group, threads) in &self.parts {
             pass.dispatch(&self.kernel, &[group], *threads);

@@ -4,18 +4,16 @@ use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
 use cutis_solver::{Carried, Clock, Settings, System};
 
-use crate::body::{ALIGNMENT, Body};
+use crate::body::Body;
 
 /// The handles of a body.
 pub(crate) struct Handles {
     kernel: Kernel,
     shared: BindGroup,
     chunks: Vec<(BindGroup, usize)>,
-    /// One per substep of a frame.
-    substeps: Vec<BindGroup>,
+    /// The struct `Frame` of the shader.
+    frame: Buffer<[u32; 2]>,
     paths: Buffer<[f32; 4]>,
-    /// Distance between the paths of two substeps.
-    stride: usize,
 }
 
 impl Handles {
@@ -31,7 +29,12 @@ impl Handles {
             return Ok(None);
         }
         let kernel = gpu.kernel("handles", &solver::carry(), solver::CARRY)?;
-        let shared = gpu.bind(&kernel, 0, &[(0, body.vertices.whole())])?;
+        let frame = gpu.uniform("handles: frame", &[0; 2])?;
+        let paths = handles.len().saturating_mul(settings.substeps as usize);
+        let paths = gpu.zeroed::<[f32; 4]>("handles: paths", paths)?;
+        let bindings = [body.vertices.whole(), body.status.whole(), frame.whole(), paths.whole()];
+        let bindings: Vec<_> = (0..).zip(bindings).collect();
+        let shared = gpu.bind(&kernel, 0, &bindings)?;
         let mut carried: Vec<[u32; 4]> = Vec::new();
         let mut owners: Vec<u32> = Vec::new();
         for (owner, handle) in (0..).zip(handles) {
@@ -48,44 +51,37 @@ impl Handles {
             let group = gpu.bind(&kernel, 1, &[(0, places.whole()), (1, owners.whole())])?;
             chunks.push((group, carried.len()));
         }
-        let stride = handles.len().next_multiple_of(ALIGNMENT);
-        let count = settings.substeps as usize;
-        let paths = gpu.zeroed::<[f32; 4]>("handles: paths", stride.saturating_mul(count))?;
-        let substeps = (0..count)
-            .map(|substep| {
-                gpu.bind(&kernel, 2, &[(0, paths.range(substep * stride..(substep + 1) * stride))])
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Some(Self { kernel, shared, chunks, substeps, paths, stride }))
+        Ok(Some(Self { kernel, shared, chunks, frame, paths }))
     }
 
-    /// Writes where the handles are at the end of each substep from `clock` to the end of its frame.
+    /// Writes where the handles are at the end of each substep from `clock` to the end of its frame. `done` substeps were
+    /// done since the status was cleared.
     pub(crate) fn write_paths(
         &self,
         gpu: &Gpu,
         handles: &[Carried<f32>],
         mut clock: Clock,
         settings: &Settings,
+        done: u32,
     ) -> Result<(), GpuError> {
-        let mut paths = vec![[0.0; 4]; self.paths.len()];
+        let mut paths = Vec::with_capacity(self.paths.len());
         let frame = clock.frame;
         while clock.frame == frame {
             let end = clock.time_s(settings) + settings.substep_s();
-            let row = &mut paths[clock.substep as usize * self.stride..];
-            for (place, handle) in row.iter_mut().zip(handles) {
+            for handle in handles {
                 let path = handle.path(end);
-                *place = [path.x, path.y, path.z, 0.0];
+                paths.push([path.x, path.y, path.z, 0.0]);
             }
             clock.tick(settings);
         }
+        gpu.write(&self.frame, 0, &[[done, handles.len() as u32]])?;
         gpu.write(&self.paths, 0, &paths)
     }
 
-    /// Puts the vertices where they are at the end of a substep.
-    pub(crate) fn carry(&self, pass: &mut Pass<'_>, substep: u32) {
-        let path = &self.substeps[substep as usize];
+    /// Puts the vertices where they are at the end of the substep in work.
+    pub(crate) fn carry(&self, pass: &mut Pass<'_>) {
         for (chunk, threads) in &self.chunks {
-            pass.dispatch(&self.kernel, &[&self.shared, chunk, path], *threads);
+            pass.dispatch(&self.kernel, &[&self.shared, chunk], *threads);
         }
     }
 }

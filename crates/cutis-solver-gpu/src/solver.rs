@@ -15,6 +15,8 @@ use crate::{GpuSolverError, device_bytes};
 
 /// Frames that are submitted before the host looks whether the body is still finite.
 const FRAMES_PER_LOOK: u64 = 64;
+/// Dispatches after which a frame goes on in another submit, so that a command buffer stays within memory.
+const DISPATCHES_PER_SUBMIT: usize = 1 << 16;
 
 /// The solver on a GPU.
 ///
@@ -32,6 +34,8 @@ pub struct SolverGpu {
     handles: Option<Handles>,
     gather: Option<Gather>,
     reductions: Vec<Reduction>,
+    /// Dispatches of one substep.
+    dispatches: usize,
 }
 
 /// Why a step ended early.
@@ -57,8 +61,10 @@ impl SolverGpu {
         let simulation = Simulation::new(system, settings)?;
         let body = Body::new(gpu, &simulation)?;
         let kind = |set: &cutis_solver::Kind<f32>| Kind::new(gpu, &body, &**set, &settings);
-        let kinds = simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?;
+        let kinds: Vec<Kind> = simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?;
         let handles = Handles::new(gpu, &body, simulation.system(), &settings)?;
+        let chunks: usize = kinds.iter().flat_map(|kind| &kind.colors).map(Vec::len).sum();
+        let dispatches = 3 * body.check.dispatches() + chunks * settings.iterations as usize;
         Ok(Self {
             gpu: gpu.clone(),
             read_at: simulation.clock(),
@@ -69,6 +75,7 @@ impl SolverGpu {
             handles,
             gather: None,
             reductions: Vec::new(),
+            dispatches,
         })
     }
 
@@ -88,7 +95,7 @@ impl SolverGpu {
         device_bytes(self.simulation.system(), self.simulation.settings())
     }
 
-    /// Runs whole frames and the rest of one that was begun, one submit for each.
+    /// Runs whole frames and the rest of one that was begun.
     fn run(&mut self, frames: usize) -> Result<(), Stop> {
         let end = self.simulation.clock().frame.saturating_add(frames as u64);
         while self.simulation.clock().frame < end {
@@ -105,17 +112,25 @@ impl SolverGpu {
         self.body.clear_status(&self.gpu)?;
         self.fresh = false;
         let mut predict = &self.body.predict;
+        let mut done = 0;
         while clock.frame < end {
             let frame = clock.frame;
             if let Some(handles) = &self.handles {
-                handles.write_paths(&self.gpu, self.simulation.system().handles(), clock, &settings)?;
+                let paths = self.simulation.system().handles();
+                handles.write_paths(&self.gpu, paths, clock, &settings, done)?;
             }
             let mut pass = self.gpu.pass("frame");
+            let mut encoded = 0;
             while clock.frame == frame {
+                if encoded > DISPATCHES_PER_SUBMIT {
+                    pass.submit()?;
+                    (pass, encoded) = (self.gpu.pass("frame, further on"), 0);
+                }
+                encoded += self.dispatches;
                 predict.run(&mut pass);
                 predict = &self.body.finish_and_predict;
                 if let Some(handles) = &self.handles {
-                    handles.carry(&mut pass, clock.substep);
+                    handles.carry(&mut pass);
                 }
                 let Schedule { iterations, sweeps, .. } = self.simulation.schedule();
                 for iteration in 0..*iterations {
@@ -125,6 +140,7 @@ impl SolverGpu {
                 }
                 self.body.check.run(&mut pass);
                 clock.tick(&settings);
+                done += 1;
             }
             if clock.frame == end {
                 self.body.finish.run(&mut pass);
@@ -157,16 +173,11 @@ impl SolverGpu {
         }
     }
 
-    fn read_body(&mut self) -> Result<(), GpuError> {
-        let count = self.body.vertices.len();
-        let vertices = self.gpu.read(&self.body.vertices, 0..count)?;
-        let velocities = self.gpu.read(&self.body.velocities, 0..count)?;
-        let velocities = velocities.iter().map(|&[x, y, z, _]| Vector3::new(x, y, z));
-        // The lengths are those of the body that was uploaded.
-        let taken = self.simulation.set_state(bytemuck::cast_slice(&vertices), velocities);
-        debug_assert!(taken.is_ok());
-        (self.fresh, self.read_at) = (true, self.simulation.clock());
-        Ok(())
+    /// Vertices and velocities as they are on the device.
+    fn read_body(&self) -> Result<[Vec<[f32; 4]>; 2], GpuError> {
+        let all = 0..self.body.vertices.len();
+        let vertices = self.gpu.read(&self.body.vertices, all.clone())?;
+        Ok([vertices, self.gpu.read(&self.body.velocities, all)?])
     }
 
     fn reduce(&mut self) -> Result<Vec<Residual>, GpuError> {
@@ -212,7 +223,11 @@ impl Solver<f32> for SolverGpu {
         if self.fresh {
             return Ok(());
         }
-        self.read_body().map_err(|error| self.stopped(&error))
+        let [vertices, velocities] = self.read_body().map_err(|error| self.stopped(&error))?;
+        let velocities = velocities.iter().map(|&[x, y, z, _]| Vector3::new(x, y, z));
+        self.simulation.set_state(bytemuck::cast_slice(&vertices), velocities)?;
+        (self.fresh, self.read_at) = (true, self.simulation.clock());
+        Ok(())
     }
 
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, SolverError> {
