@@ -18,15 +18,17 @@ pub struct Kernels {
 }
 
 impl Kernels {
-    pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+    /// Every source passes through `change`.
+    pub fn new(gpu: &Gpu, change: &dyn Fn(String) -> String) -> Result<Self, GpuError> {
+        let kernel = |label, source, entry| gpu.kernel(label, &change(source), entry);
         Ok(Self {
-            place: gpu.kernel("resample: place", &shaders::place(), shaders::PLACE)?,
-            span: gpu.kernel("resample: span", &shaders::span(), shaders::SPAN)?,
-            span_removed: gpu.kernel("resample: span of removed", &shaders::span(), shaders::SPAN_REMOVED)?,
-            clear: gpu.kernel("resample: clear", &shaders::clear(), shaders::CLEAR)?,
-            claim: Walk::new(gpu, "resample: claim", &shaders::claim())?,
-            vacate: Walk::new(gpu, "resample: vacate", &shaders::vacate())?,
-            gather: gpu.kernel("resample: gather", &shaders::gather(), shaders::GATHER)?,
+            place: kernel("resample: place", shaders::place(), shaders::PLACE)?,
+            span: kernel("resample: span", shaders::span(), shaders::SPAN)?,
+            span_removed: kernel("resample: removed", shaders::span(), shaders::SPAN_REMOVED)?,
+            clear: kernel("resample: clear", shaders::clear(), shaders::CLEAR)?,
+            claim: Walk::new(gpu, "resample: claim", &change(shaders::claim()))?,
+            vacate: Walk::new(gpu, "resample: vacate", &change(shaders::vacate()))?,
+            gather: kernel("resample: gather", shaders::gather(), shaders::GATHER)?,
         })
     }
 }

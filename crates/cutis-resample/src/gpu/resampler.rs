@@ -47,9 +47,23 @@ impl ResamplerGpu {
         warp: &Warp<'_>,
         options: &ResamplerOptions,
     ) -> Result<Self, ResampleError> {
+        Self::with_sources(gpu, volume, warp, options, &|source| source)
+    }
+
+    /// The same with each kernel's source passed through `change`: for the controls of comparisons, which have to see a change.
+    ///
+    /// # Errors
+    /// As [`ResamplerGpu::new`].
+    pub fn with_sources(
+        gpu: &Gpu,
+        volume: &Volume,
+        warp: &Warp<'_>,
+        options: &ResamplerOptions,
+        change: &dyn Fn(String) -> String,
+    ) -> Result<Self, ResampleError> {
         let setup = Setup::new(volume, warp, options)?;
         let plan = Plan::new(gpu, &setup, warp, options);
-        let kernels = Kernels::new(gpu)?;
+        let kernels = Kernels::new(gpu, change)?;
         let memory = Memory::new(gpu, volume, &setup, &plan)?;
         let mut chunks = Vec::with_capacity(plan.chunks);
         for number in 0..plan.chunks {

@@ -5,6 +5,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod contract;
+mod device;
+mod oracle;
 mod parity;
 mod scenes;
 
