@@ -1,6 +1,7 @@
 //! Developer commands of the workspace, started by `cargo xtask`: the tests, the checks they consist of, and nothing else.
 
 mod deny;
+mod mutations;
 mod python;
 mod results;
 mod spdx;
@@ -24,6 +25,8 @@ usage: cargo xtask COMMAND
   python              outputs and awkward inputs compared with nibabel and SimpleITK
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
                       lists the options, and the exit code is that of the comparison
+  mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
+                      with a text only those whose description contains it, and nothing is written
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
   publish --dry-run   packages every crate as for crates.io and builds it from the package";
 
@@ -51,6 +54,8 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["parity", arguments @ ..] => {
             return workspace::exit_code(&mut steps::parity_command(&workspace, arguments));
         }
+        ["mutations"] => mutations::run(&workspace, ""),
+        ["mutations", filter] => mutations::run(&workspace, filter),
         ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
         ["publish", "--dry-run"] => steps::publish_dry_run(&workspace),
         ["publish"] => bail!(
