@@ -1,6 +1,7 @@
 //! Headless pictures of CT volumes: the skin from any side, slices with contours, charts.
 //!
-//! Everything runs on the CPU without a display, and gives the same bits for any number of threads. Positions and directions
+//! Everything runs on the CPU without a display, and gives the same bits for any number of threads; with the feature `gpu`,
+//! `raymarch_gpu` gives the same surface pictures by a GPU, but for rounding. Positions and directions
 //! are RAS+ millimetres: `[1, 0, 0]` points to the patient's right, `[0, 1, 0]` to anterior, `[0, 0, 1]` to superior.
 //!
 //! ```

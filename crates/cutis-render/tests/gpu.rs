@@ -5,7 +5,7 @@ use cutis_render::{
     ClipPlane, Focus, GpuRaymarcher, Image, RenderError, Side, View, raymarch, raymarch_gpu, skin_depth,
 };
 use cutis_volume::phantom::Phantom;
-use cutis_volume::{Affine, Grid, Volume};
+use cutis_volume::{Affine, Grid, Volume, nifti};
 use nalgebra::Point3;
 
 /// A device, or none with the reason; where `CI` is set there must be one.
@@ -110,7 +110,7 @@ const CLIP: [ClipPlane; 2] = [
 fn assert_same(gpu: &Gpu, cases: &[(&str, &Volume, View<'_>)]) {
     for (name, volume, view) in cases {
         let difference = Difference::of(gpu, (volume, view), (volume, view));
-        println!("{name}: {difference:?}");
+        eprintln!("{name}: {difference:?}");
         assert!(difference.is_allowed(), "{name}: {difference:?}");
     }
 }
@@ -177,6 +177,23 @@ fn awkward_volumes_look_the_same() {
     assert_same(&gpu, &cases);
 }
 
+#[test]
+fn a_real_scan_looks_the_same() {
+    let folder = std::env::var("CUTIS_TEST_DATA")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data").to_owned());
+    let path = std::path::Path::new(&folder).join("ct/leg_sts013_64x55x58.nii.gz");
+    if !path.exists() {
+        assert!(std::env::var_os("CI").is_none(), "{} is missing", path.display());
+        eprintln!("skipped: there is no {} (set CUTIS_TEST_DATA)", path.display());
+        return;
+    }
+    let Some(gpu) = open(&GpuOptions::default()) else { return };
+    let leg = nifti::read(&path).unwrap().volume;
+    let depth = skin_depth(&leg, -300.0, 4.0, 20.0).unwrap();
+    let bare = View { depth: Some(&depth), threshold_hu: 0.0, ..plain(Side::Posterior) };
+    assert_same(&gpu, &[("skin", &leg, plain(TURNED)), ("without its skin", &leg, bare)]);
+}
+
 /// Each control changes one thing that the GPU is told; what it then shows must not pass for the CPU's picture.
 #[test]
 fn other_views_are_told_apart() {
@@ -206,7 +223,7 @@ fn other_views_are_told_apart() {
     ];
     for (name, differs, volume, view, changed) in controls {
         let difference = Difference::of(&gpu, (volume, &changed), (volume, &view));
-        println!("{name}: {difference:?}");
+        eprintln!("{name}: {difference:?}");
         assert_eq!(!difference.is_allowed(), differs, "{name}: {difference:?}");
     }
 }
