@@ -37,7 +37,7 @@ fn what_the_body_cannot_do_is_said_with_file_and_section() {
         ("tissue.density", "[]", &["tissue.density", "0 points"]),
         ("constraints.stc.stiffness_table", "unheard-of", &["constraints.stc.stiffness_table", "uniform"]),
         ("constraints.stc.stiffness_table", "[[0, 0]]", &["constraints.stc.stiffness_table", "above 0"]),
-        ("solver.backend", "gpu", &["`solver.backend`", "gpu", "cpu"]),
+        ("solver.adapter", " ", &["`solver.adapter`", "cutis devices"]),
         ("lattice.spacing_mm", "1e-9", &["`lattice`", "at most"]),
         ("lattice.spacing_mm", "1e9", &["`lattice`", "at least 2"]),
         ("lattice", "{ vertices = [4000000000, 2, 2] }", &["`lattice`", "4000000000"]),

@@ -3,6 +3,7 @@
 mod bad_scenes;
 mod bad_values;
 mod determinism;
+mod gpu;
 mod identity;
 mod left_out;
 mod problems;

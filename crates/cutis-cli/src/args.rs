@@ -140,6 +140,12 @@ pub(crate) enum Command {
         #[arg(long, default_value_t = 800)]
         pixels: usize,
     },
+    /// List the GPUs of this machine, and tell which one `--backend auto` takes
+    Devices {
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Print a scene to start from, or the JSON schema of scenes and reports
     Scene {
         #[command(subcommand)]
@@ -165,6 +171,9 @@ pub(crate) struct Change {
     /// Where the solver runs: auto, cpu, reference, gpu
     #[arg(long)]
     pub(crate) backend: Option<String>,
+    /// Which GPU, where one is used: part of its name, or its index in `cutis devices`
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) adapter: Option<String>,
     /// Number of frames
     #[arg(long)]
     pub(crate) frames: Option<u32>,

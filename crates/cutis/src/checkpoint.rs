@@ -26,12 +26,17 @@ pub struct Checkpoint {
 }
 
 /// Identifies scene and volume, without what may change between two runs that continue each other (number of frames,
-/// outputs, threads).
+/// outputs, threads, backend).
 pub(crate) fn fingerprint(scene: &Scene, volume_sha256: &str) -> [u8; 32] {
     let mut scene = scene.clone();
     scene.run = crate::scene::RunSection::default();
     scene.output = crate::scene::OutputSection::default();
-    scene.solver.threads = 0;
+    scene.solver = crate::scene::SolverSection {
+        backend: crate::scene::BackendChoice::default(),
+        adapter: None,
+        threads: 0,
+        ..scene.solver
+    };
     scene.volume.path = None;
     let text = serde_json::to_string(&scene).unwrap_or_default();
     Sha256::new()

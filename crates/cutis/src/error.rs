@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use cutis_coloring::ColoringError;
 use cutis_constraints::MaterialError;
+#[cfg(feature = "gpu")]
+use cutis_gpu::GpuError;
 use cutis_mesh::MeshError;
 use cutis_render::RenderError;
 use cutis_resample::ResampleError;
@@ -61,7 +63,7 @@ pub enum Error {
         /// What would be right.
         why: String,
     },
-    /// The scene names a backend that this build does not have.
+    /// The scene names a backend that this build does not have, or an adapter that this machine does not have.
     #[error("backend `{backend}`: {why}")]
     Backend {
         /// The backend asked for.
@@ -87,6 +89,28 @@ pub enum Error {
     /// The CPU backend.
     #[error(transparent)]
     Cpu(#[from] CpuError),
+    /// A GPU that is there could not be opened, or did not take the body.
+    #[cfg(feature = "gpu")]
+    #[error("{0}; the backend \"cpu\" does without")]
+    Gpu(#[from] GpuError),
+    /// The device of the backend failed during a run.
+    #[error(
+        "frame {frame}: {source}; {}",
+        match saved {
+            Some((frame, path)) => format!(
+                "{} holds frame {frame}: go on with --resume, without a GPU with --backend cpu", path.display()
+            ),
+            None => "there is no checkpoint to go on from (run.checkpoint_every)".into(),
+        }
+    )]
+    Stopped {
+        /// The frame that it happened in, counted from 1.
+        frame: u32,
+        /// The last checkpoint of this run, and the frame that it holds.
+        saved: Option<(u32, PathBuf)>,
+        /// What happened, with the time of the last state that was read.
+        source: SolverError,
+    },
     /// Resampling.
     #[error(transparent)]
     Resample(#[from] ResampleError),
@@ -130,10 +154,20 @@ impl Error {
                 !matches!(e, VolumeError::Io { action: "write" | "create", .. })
             }
             Self::Mesh(e) => !matches!(e, MeshError::Write { .. }),
-            Self::Solver(e) => !matches!(e, SolverError::NotFinite { .. }),
+            Self::Solver(e) => !matches!(e, SolverError::NotFinite { .. } | SolverError::Device { .. }),
             Self::Cpu(e) => !matches!(e, CpuError::ThreadPool { .. }),
             Self::File { action, .. } => *action == "read",
-            Self::Resample(_) | Self::Render(_) => false,
+            // What was asked of the device does not fit it; all else is the device's or the program's fault.
+            #[cfg(feature = "gpu")]
+            Self::Gpu(e) => matches!(
+                e,
+                GpuError::NoAdapter
+                    | GpuError::NoSuchAdapter { .. }
+                    | GpuError::Device { .. }
+                    | GpuError::Limit { .. }
+                    | GpuError::OutOfMemory { .. }
+            ),
+            Self::Resample(_) | Self::Render(_) | Self::Stopped { .. } => false,
         }
     }
 }

@@ -54,16 +54,21 @@ pub(crate) fn page(report: &Report, figures: &[Figure], plots: &[String], scene_
 
 fn summary(report: &Report) -> String {
     let s = &report.sizes;
+    let backend = &report.backend;
+    let machine = match (&backend.adapter, &backend.adapter_kind, &backend.driver) {
+        (Some(adapter), Some(kind), Some(driver)) => format!("{adapter}, {kind}; {driver}"),
+        _ => format!("{}, {} threads", report.machine.cpu, backend.threads),
+    };
     let mut text = format!(
-        "<p>{} vertices, {} edges, {} tetrahedra and {} skin triangles; {} frames on <b>{}</b> ({}, {} threads), {:.1} ms per frame.</p>",
+        "<p>{} vertices, {} edges, {} tetrahedra and {} skin triangles; {} frames on <b>{}</b> ({}; {}), {:.1} ms per frame.</p>",
         s.vertices,
         s.edges,
         s.tets,
         s.skin_triangles,
         report.frames.count,
-        escape(&report.backend.name),
-        escape(&report.machine.cpu),
-        report.backend.threads,
+        escape(&backend.name),
+        escape(&backend.reason),
+        escape(&machine),
         report.frames.ms_mean
     );
     for Wound { initial_mm, final_mm, mid_mm, .. } in &report.wounds {
@@ -78,8 +83,13 @@ fn summary(report: &Report) -> String {
 fn tables(report: &Report) -> String {
     let mut out = String::from("<h2>Time per stage</h2><table>");
     for stage in &report.stages {
-        let _ =
-            write!(out, "<tr><td>{}</td><td class=\"n\">{:.1} ms</td></tr>", escape(&stage.name), stage.ms);
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td class=\"n\">{:.1} ms</td><td>{}</td></tr>",
+            escape(&stage.name),
+            stage.ms,
+            escape(&stage.on)
+        );
     }
     out.push_str("</table><h2>Constraints</h2><table><tr><th>kind</th><th>colours</th><th>RMS error / rest size</th><th>largest</th></tr>");
     for r in &report.residuals {
@@ -93,10 +103,11 @@ fn tables(report: &Report) -> String {
         );
     }
     out.push_str("</table><h2>Memory of the solver</h2><table>");
-    for part in &report.memory {
+    let parts = report.memory.iter().map(|part| (part, ""));
+    for (part, place) in parts.chain(report.device_memory.iter().map(|part| (part, "on the GPU"))) {
         let _ = write!(
             out,
-            "<tr><td>{}</td><td class=\"n\">{:.1} MB</td></tr>",
+            "<tr><td>{}</td><td class=\"n\">{:.1} MB</td><td>{place}</td></tr>",
             escape(&part.part),
             part.bytes as f64 / 1e6
         );

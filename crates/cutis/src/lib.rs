@@ -16,13 +16,16 @@
 //! ([`scene`]), the order of the stages, and what is written: a run folder with [`report::Report`].
 #![forbid(unsafe_code)]
 
+mod backend;
 mod body;
 mod checkpoint;
 mod demo;
+mod devices;
 mod dynamics;
 mod error;
 mod files;
 mod find_skin;
+mod frames;
 mod html;
 mod inspect;
 mod output;
@@ -36,14 +39,19 @@ mod source;
 
 pub use cutis_coloring as coloring;
 pub use cutis_constraints as constraints;
+#[cfg(feature = "gpu")]
+pub use cutis_gpu as gpu;
 pub use cutis_mesh as mesh;
 pub use cutis_render as render;
 pub use cutis_resample as resample;
 pub use cutis_solver as solver;
 pub use cutis_solver_cpu as solver_cpu;
+#[cfg(feature = "gpu")]
+pub use cutis_solver_gpu as solver_gpu;
 pub use cutis_volume as volume;
 
 pub use demo::demo;
+pub use devices::{Device, DeviceLimits, Devices, devices};
 pub use error::Error;
 pub use files::RunFolder;
 pub use find_skin::{SkinRequest, find_skin};
@@ -51,6 +59,8 @@ pub use inspect::{Inspection, inspect};
 pub use output::{ResampleRequest, resample_run};
 pub use plan::{Plan, check};
 pub use progress::{Progress, Silent};
+#[cfg(feature = "gpu")]
+pub use run::run_on;
 pub use run::{RunOptions, run};
 pub use scene::{LoadedScene, Override, Scene};
 

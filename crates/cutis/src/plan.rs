@@ -4,10 +4,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+use crate::backend::{self, Chosen, Request, Work};
 use crate::body::{Body, needs_skin};
 use crate::dynamics::{self, Dynamics};
 use crate::report::{Backend, Clock, MemoryPart, Sizes, Stage};
-use crate::scene::{BackendChoice, LoadedScene};
+use crate::scene::LoadedScene;
 use crate::source::{self, Source};
 use crate::{Error, Progress};
 
@@ -20,8 +21,11 @@ pub struct Plan {
     pub sizes: Sizes,
     /// Colours per constraint kind.
     pub colors: BTreeMap<String, usize>,
-    /// Memory of the solver by part, bytes.
+    /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
+    /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend. Each part has kernels of its own, and what has
+    /// no part here has none.
+    pub device_memory: Vec<MemoryPart>,
     /// Bytes of the volume's voxels.
     pub volume_bytes: usize,
     /// Constraints × iterations × substeps × frames; the largest 64-bit number where it is more.
@@ -39,23 +43,27 @@ pub(crate) struct Prepared {
     pub(crate) source: Source,
     pub(crate) body: Body,
     pub(crate) dynamics: Dynamics,
+    pub(crate) backend: Chosen,
     pub(crate) plan: Plan,
 }
 
-/// Plans a scene: reads the CT, builds the body and the system, steps nothing and writes nothing.
+/// Plans a scene: reads the CT, builds the body and the system, opens no device, steps nothing and writes nothing.
 ///
 /// # Errors
 /// [`Error`] as a run of the scene would give it before its first frame.
 pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Error> {
     let mut clock = Clock::new(progress);
-    let mut plan = prepare(loaded, &mut clock)?.plan;
+    let mut plan = prepare(loaded, Request::of(loaded)?, &mut clock)?.plan;
     plan.stages = clock.stages;
     Ok(plan)
 }
 
 /// Reads the CT, builds body and system.
-pub(crate) fn prepare(loaded: &LoadedScene, clock: &mut Clock<'_>) -> Result<Prepared, Error> {
-    let backend = choose_backend(loaded).map_err(loaded.blame("solver.backend"))?;
+pub(crate) fn prepare(
+    loaded: &LoadedScene,
+    request: Request,
+    clock: &mut Clock<'_>,
+) -> Result<Prepared, Error> {
     let from_file = loaded.scene.volume.path.is_some();
     let name = if from_file { "read the CT" } else { "make the phantom" };
     let source = clock.stage(name, 0, |_| source::load(loaded))?;
@@ -76,27 +84,36 @@ pub(crate) fn prepare(loaded: &LoadedScene, clock: &mut Clock<'_>) -> Result<Pre
     warnings.extend(scene_warnings(loaded, &body));
     warnings.extend(dynamics.skin_rate.and_then(|rate| unresolved_skin(loaded, rate)));
     let sizes = sizes(&body, &dynamics);
-    let memory: Vec<MemoryPart> = dynamics
-        .system
-        .bytes()
-        .into_iter()
-        .map(|part| MemoryPart { part: part.name.into(), bytes: part.bytes })
-        .collect();
-    let solver = &loaded.scene.solver;
-    let constraints: usize = dynamics.system.kinds().iter().map(|kind| kind.len()).sum();
-    let passes = [solver.iterations, solver.substeps, loaded.scene.run.frames];
+    let work = work(loaded, &dynamics);
+    let backend = request.settle(loaded, &work)?;
+    warnings.extend(backend.note.clone());
     let plan = Plan {
-        backend,
+        backend: backend.report.clone(),
         sizes,
         colors: dynamics.colors.clone(),
-        memory,
+        memory: dynamics.system.bytes().iter().map(MemoryPart::from).collect(),
+        device_memory: backend.device_memory(&dynamics.system, &dynamics.settings),
         volume_bytes: 2 * source.volume.voxels().len(),
-        projections: passes.iter().fold(constraints as u64, |product, &n| product.saturating_mul(n.into())),
-        left_out: left_out(loaded),
+        projections: work.projections,
+        left_out: left_out(loaded, &backend),
         warnings,
         stages: Vec::new(),
     };
-    Ok(Prepared { source, body, dynamics, plan })
+    Ok(Prepared { source, body, dynamics, backend, plan })
+}
+
+/// How much the solver will have to do.
+fn work(loaded: &LoadedScene, dynamics: &Dynamics) -> Work {
+    let kinds = dynamics.system.kinds();
+    let constraints: u64 = kinds.iter().map(|kind| kind.len() as u64).sum();
+    let solver = &loaded.scene.solver;
+    let passes = [solver.iterations, solver.substeps, loaded.scene.run.frames];
+    Work {
+        vertices: dynamics.system.vertices().len() as u64,
+        constraints,
+        sweeps: kinds.iter().map(|kind| kind.colors() as u64).sum(),
+        projections: passes.iter().fold(constraints, |product, &n| product.saturating_mul(n.into())),
+    }
 }
 
 fn sizes(body: &Body, dynamics: &Dynamics) -> Sizes {
@@ -113,27 +130,8 @@ fn sizes(body: &Body, dynamics: &Dynamics) -> Sizes {
     }
 }
 
-/// The backend that will run, and why. Nothing falls back silently: a backend that this build lacks is refused.
-fn choose_backend(loaded: &LoadedScene) -> Result<Backend, Error> {
-    let solver = &loaded.scene.solver;
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let threads = if solver.threads == 0 { cores } else { solver.threads };
-    let backend = |name: &str, threads, reason: &str| {
-        Ok(Backend { name: name.into(), adapter: None, threads, reason: reason.into() })
-    };
-    match solver.backend {
-        BackendChoice::Auto => backend("cpu", threads, "auto: this build has no GPU backend"),
-        BackendChoice::Cpu => backend("cpu", threads, "the scene asks for it"),
-        BackendChoice::Reference => backend("reference", 1, "the scene asks for it"),
-        BackendChoice::Gpu => Err(Error::Backend {
-            backend: "gpu".into(),
-            why: "this build has no GPU backend; use \"cpu\" or \"auto\"".into(),
-        }),
-    }
-}
-
 /// What the scene does not name. Each line says what is not built for that reason.
-fn left_out(loaded: &LoadedScene) -> Vec<String> {
+fn left_out(loaded: &LoadedScene, backend: &Chosen) -> Vec<String> {
     let scene = &loaded.scene;
     let (constraints, output) = (&scene.constraints, &scene.output);
     let mut lines = Vec::new();
@@ -159,7 +157,8 @@ fn left_out(loaded: &LoadedScene) -> Vec<String> {
     say(!output.tissue, "tissue: tissue.vtu is not written");
     say(!output.pictures, "pictures: nothing is rendered");
     say(!output.report, "report: report.json, report.html and frames.csv are not written");
-    say(true, "gpu: not part of this build");
+    let gpu = backend::ABSENT.unwrap_or("no device is opened");
+    say(!backend.on_gpu(), &format!("gpu: {gpu}"));
     lines
 }
 

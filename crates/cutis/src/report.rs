@@ -33,8 +33,13 @@ pub struct Report {
     pub skin: Option<SkinQuality>,
     /// Colours (groups without shared vertices) per constraint kind; absent kinds were left out.
     pub colors: std::collections::BTreeMap<String, usize>,
-    /// Memory of the solver by part, bytes.
+    /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
+    /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend.
+    pub device_memory: Vec<MemoryPart>,
+    /// What the GPU did; none on a CPU backend.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device: Option<DeviceWork>,
     /// Time per stage.
     pub stages: Vec<Stage>,
     /// Time per frame.
@@ -80,11 +85,15 @@ pub struct Input {
 /// What the solver ran on.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Backend {
-    /// `cpu` or `reference`.
+    /// `cpu`, `reference` or `gpu`.
     pub name: String,
-    /// GPU adapter; none on a CPU backend.
+    /// Name of the GPU adapter; none on a CPU backend.
     pub adapter: Option<String>,
-    /// Worker threads.
+    /// `discrete`, `integrated`, `virtual`, `unknown` or `software`; none on a CPU backend.
+    pub adapter_kind: Option<String>,
+    /// Interface, name and version of the adapter's driver; none on a CPU backend.
+    pub driver: Option<String>,
+    /// Threads of the solver on the host.
     pub threads: usize,
     /// Why this backend.
     pub reason: String,
@@ -148,6 +157,27 @@ pub struct MemoryPart {
     pub bytes: usize,
 }
 
+impl From<&cutis_solver::MemoryPart> for MemoryPart {
+    fn from(part: &cutis_solver::MemoryPart) -> Self {
+        Self { part: part.name.into(), bytes: part.bytes }
+    }
+}
+
+/// What a device did for a run, from its first frame to the last output.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct DeviceWork {
+    /// Kernels compiled.
+    pub kernels: u64,
+    /// Passes submitted.
+    pub submits: u64,
+    /// Dispatches in them.
+    pub dispatches: u64,
+    /// Reads from the device.
+    pub readbacks: u64,
+    /// Bytes that they returned.
+    pub readback_bytes: u64,
+}
+
 /// Time of one stage.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Stage {
@@ -155,6 +185,8 @@ pub struct Stage {
     pub name: String,
     /// Wall time, ms.
     pub ms: f64,
+    /// What did its heavy part: `cpu` or `gpu`.
+    pub on: String,
 }
 
 /// Time per frame.
@@ -249,9 +281,20 @@ impl<'a> Clock<'a> {
         Self { progress, stages: Vec::new() }
     }
 
-    /// Runs one stage of `total` units (0: unknown).
+    /// Runs one stage of `total` units (0: unknown) on the CPU.
     pub(crate) fn stage<T>(
         &mut self,
+        name: &str,
+        total: u64,
+        work: impl FnOnce(&dyn Progress) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        self.stage_on("cpu", name, total, work)
+    }
+
+    /// Runs one stage of `total` units (0: unknown), on what it is said to run on.
+    pub(crate) fn stage_on<T>(
+        &mut self,
+        on: &str,
         name: &str,
         total: u64,
         work: impl FnOnce(&dyn Progress) -> Result<T, Error>,
@@ -259,7 +302,8 @@ impl<'a> Clock<'a> {
         self.progress.begin(name, total);
         let start = Instant::now();
         let result = work(self.progress);
-        self.stages.push(Stage { name: name.into(), ms: start.elapsed().as_secs_f64() * 1e3 });
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        self.stages.push(Stage { name: name.into(), ms, on: on.into() });
         self.progress.end();
         result
     }

@@ -1,5 +1,6 @@
 //! One function per subcommand: arguments in, library call, what is printed.
 
+mod devices;
 mod look;
 mod simulate;
 
@@ -26,6 +27,11 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
         Command::Phantom { size, seed, out } => look::phantom(size, seed, &out),
         Command::Render { volume, out, side, slice, window, focus, zoom, pixels } => {
             look::render(&volume, &out, &look::Look { side, slice, window, focus, zoom, pixels })
+        }
+        Command::Devices { json } => {
+            let found = cutis::devices();
+            print(&if json { pretty(&found) } else { devices::table(&found) });
+            Ok(())
         }
         Command::Scene { what } => {
             match what {

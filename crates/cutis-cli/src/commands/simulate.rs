@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cutis::report::Report;
+use cutis::report::{Backend, Report};
 use cutis::volume::sample::LatticeSize;
 use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOptions, Scene};
 
@@ -46,7 +46,10 @@ fn summary(report: &Report, out: &Path) -> String {
         ),
         format!(
             "{} frames on {} ({}): {:.1} ms each",
-            report.frames.count, report.backend.name, report.backend.reason, report.frames.ms_mean
+            report.frames.count,
+            place(&report.backend),
+            report.backend.reason,
+            report.frames.ms_mean
         ),
     ];
     lines.extend(report.wounds.iter().map(|w| {
@@ -57,6 +60,14 @@ fn summary(report: &Report, out: &Path) -> String {
         lines.push(format!("look at:    {}", out.join("report.html").display()));
     }
     lines.join("\n")
+}
+
+/// `cpu`, or `gpu: llvmpipe (…)`.
+fn place(backend: &Backend) -> String {
+    match &backend.adapter {
+        Some(adapter) => format!("{}: {adapter}", backend.name),
+        None => backend.name.clone(),
+    }
 }
 
 pub(crate) fn check(
@@ -77,7 +88,9 @@ fn table(plan: &Plan) -> String {
     let mut lines = vec![
         format!(
             "backend          {} ({}), {} threads",
-            plan.backend.name, plan.backend.reason, plan.backend.threads
+            place(&plan.backend),
+            plan.backend.reason,
+            plan.backend.threads
         ),
         format!("lattice          {nx} x {ny} x {nz}"),
         format!(
@@ -94,6 +107,11 @@ fn table(plan: &Plan) -> String {
         let colors = plan.colors.get(&part.part).map(|n| format!(", {n} colours")).unwrap_or_default();
         lines.push(format!("memory, {:8} {:.1} MB{colors}", part.part, part.bytes as f64 / 1e6));
     }
+    lines.extend(
+        plan.device_memory
+            .iter()
+            .map(|part| format!("on the GPU, {:5} {:.1} MB", part.part, part.bytes as f64 / 1e6)),
+    );
     lines.push("left out:".into());
     lines.extend(plan.left_out.iter().map(|line| format!("  {line}")));
     lines.extend(plan.warnings.iter().map(|line| format!("note: {line}")));
@@ -119,6 +137,9 @@ impl Change {
         let mut set = |key: &str, value: String| list.push(Override { key: key.into(), value });
         if let Some(backend) = &self.backend {
             set("solver.backend", format!("{backend:?}"));
+        }
+        if let Some(adapter) = &self.adapter {
+            set("solver.adapter", format!("{adapter:?}"));
         }
         if let Some(frames) = self.frames {
             set("run.frames", frames.to_string());

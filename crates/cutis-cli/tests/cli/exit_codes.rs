@@ -10,6 +10,7 @@ fn what_works_ends_with_zero() {
         "--version",
         "scene new",
         "check scene.toml",
+        "devices",
         "run scene.toml --out run",
         "run scene.toml --frames 0",
     ] {
@@ -66,7 +67,7 @@ fn bad_input_ends_with_two_and_is_named() {
         ("run syntax.toml", &["syntax.toml", "line 1"]),
         ("run scene.toml --set solver.dt_s=-1", &["scene.toml", "solver.dt_s", "-1", "above 0"]),
         ("run scene.toml --set run.frame=1", &["scene.toml", "run.frame", "frames"]),
-        ("run scene.toml --backend gpu", &["scene.toml", "solver.backend", "gpu", "cpu"]),
+        ("run scene.toml --adapter=", &["scene.toml", "solver.adapter", "cutis devices"]),
         ("run scene.toml --backend tpu", &["scene.toml", "solver.backend", "tpu", "reference"]),
         ("run scene.toml --set tissue.air_below_hu=5000", &["scene.toml", "tissue", "no tissue"]),
         (

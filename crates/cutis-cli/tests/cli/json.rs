@@ -107,13 +107,14 @@ fn check() {
     assert_eq!(desk.names("."), ["scene.toml"]);
 }
 
-const REPORT_KEYS: [&str; 24] = [
+const REPORT_KEYS: [&str; 27] = [
     "schema",
     "cutis_version",
     "inputs[].path",
     "inputs[].sha256",
     "backend.name",
     "backend.adapter",
+    "backend.reason",
     "sizes.vertices",
     "sizes.edges",
     "sizes.tets",
@@ -123,6 +124,8 @@ const REPORT_KEYS: [&str; 24] = [
     "colors.stc",
     "stages[].name",
     "stages[].ms",
+    "stages[].on",
+    "device_memory",
     "frames.count",
     "frames.ms_mean",
     "frames.ms_min",

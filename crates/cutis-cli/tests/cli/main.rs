@@ -2,6 +2,8 @@
 
 mod disk;
 mod exit_codes;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod json;
 mod printed;
 
@@ -80,12 +82,20 @@ impl Desk {
         self.finish(args, Command::new(PROGRAM).args(args))
     }
 
+    /// Runs the program in the folder, with more variables in its environment.
+    #[cfg(feature = "gpu")]
+    fn cutis_with(&self, variables: &[(&str, &str)], args: &[&str]) -> Done {
+        self.finish(args, Command::new(PROGRAM).args(args).envs(variables.iter().copied()))
+    }
+
     /// Runs a bash script in the folder, with the program as `$cutis`.
     fn script(&self, script: &str) -> Done {
         self.finish(&[script], Command::new("bash").args(["-c", script]).env("cutis", PROGRAM))
     }
 
     fn finish(&self, what: &[&str], command: &mut Command) -> Done {
+        // On software Vulkan: a layer that complains without a display stays out, and the calling thread does the work.
+        let command = command.env("NODEVICE_SELECT", "1").env("LP_NUM_THREADS", "0");
         let Output { status, stdout, stderr } =
             command.current_dir(self.folder.path()).env("RUST_BACKTRACE", "1").output().unwrap();
         let done = Done {

@@ -93,6 +93,13 @@ impl Scene {
             check.positive(&format!("handle[{n}].over_s"), h.over_s)?;
         }
         let s = &self.solver;
+        let named = s.adapter.as_ref().is_none_or(|adapter| !adapter.trim().is_empty());
+        check.require(
+            named,
+            "solver.adapter",
+            "\"\"",
+            "must be a part of an adapter's name, or its index; `cutis devices` lists them",
+        )?;
         check.positive("solver.dt_s", s.dt_s)?;
         check.require(s.substeps > 0, "solver.substeps", s.substeps, "must be 1 or more")?;
         check.require(s.iterations > 0, "solver.iterations", s.iterations, "must be 1 or more")?;

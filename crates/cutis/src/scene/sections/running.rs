@@ -7,8 +7,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSection {
-    /// Where it runs: all CPU cores, the scalar reference solver, or what suits best; this build has no GPU backend.
+    /// Where it runs: all CPU cores, the scalar reference solver, a GPU, or what suits the size of the scene. A build
+    /// without the feature `gpu` refuses `"gpu"`.
     pub backend: BackendChoice,
+    /// Which GPU, where one is used: a part of its name, or its index in `cutis devices`. Left out: the best one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adapter: Option<String>,
     /// Position-based dynamics as in the paper, or its compliant form.
     pub formulation: FormulationChoice,
     /// Duration of a frame, s.
@@ -29,6 +33,7 @@ impl Default for SolverSection {
     fn default() -> Self {
         Self {
             backend: BackendChoice::default(),
+            adapter: None,
             formulation: FormulationChoice::default(),
             dt_s: 1.0 / 60.0,
             substeps: 10,
@@ -51,7 +56,7 @@ pub enum BackendChoice {
     Cpu,
     /// The scalar reference solver, one thread.
     Reference,
-    /// A GPU. Not part of this build: refused.
+    /// A GPU.
     Gpu,
 }
 

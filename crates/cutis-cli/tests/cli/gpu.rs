@@ -1,0 +1,185 @@
+//! GPUs from the command line: which there are, what is said where there is none, and that nobody looks for one unasked.
+
+use serde_json::Value;
+
+use crate::{Desk, Done};
+
+/// A Vulkan loader that finds no driver.
+const NO_DRIVER: [(&str, &str); 2] =
+    [("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")];
+
+/// A Vulkan loader that tells of everything it does.
+const TALKATIVE: [(&str, &str); 1] = [("VK_LOADER_DEBUG", "all")];
+
+fn words(call: &str) -> Vec<&str> {
+    call.split(' ').collect()
+}
+
+fn parsed(done: Done) -> Value {
+    let done = done.expect_success();
+    serde_json::from_str(&done.stdout).unwrap_or_else(|e| panic!("{}: {e}: {}", done.call, done.stdout))
+}
+
+/// The adapters of this machine. None: a failure where tests may not be skipped, else a printed reason.
+fn adapters(desk: &Desk) -> Option<Vec<Value>> {
+    let found = parsed(desk.cutis(&["devices", "--json"]));
+    let adapters = found["devices"].as_array().unwrap().clone();
+    if adapters.is_empty() {
+        let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
+        assert!(!required, "{}", found["note"]);
+        eprintln!("skipped: {}", found["note"]);
+        return None;
+    }
+    Some(adapters)
+}
+
+#[test]
+fn a_gpu_that_is_not_there_is_refused_with_what_to_install() {
+    let desk = Desk::new();
+    for call in [
+        "run scene.toml --backend gpu",
+        "run scene.toml --backend gpu --adapter 0 --out elsewhere",
+        "check scene.toml --backend gpu",
+        "run scene.toml --set solver.backend=gpu --resume",
+        "demo --backend gpu --out elsewhere",
+    ] {
+        let scene = if call.starts_with("demo") { "demo.toml" } else { "scene.toml" };
+        desk.cutis_with(&NO_DRIVER, &words(call))
+            .expect_error(2, &[scene, "solver.backend", "no GPU adapter", "mesa-vulkan-drivers", "\"cpu\""]);
+    }
+    assert_eq!(desk.names("."), ["scene.toml"], "no run folder");
+}
+
+#[test]
+fn nothing_else_needs_a_gpu() {
+    let desk = Desk::new();
+    for call in ["run scene.toml --out auto", "run scene.toml --backend cpu --adapter nvidia --out cpu"] {
+        desk.cutis_with(&NO_DRIVER, &words(call)).expect_success();
+    }
+    let found = parsed(desk.cutis_with(&NO_DRIVER, &["devices", "--json"]));
+    assert_eq!((&found["devices"], &found["auto"]), (&serde_json::json!([]), &Value::Null));
+    assert!(found["note"].as_str().unwrap().contains("mesa-vulkan-drivers"), "{found}");
+    let table = desk.cutis_with(&NO_DRIVER, &["devices"]).expect_success().stdout;
+    assert_eq!(table.trim_end(), found["note"].as_str().unwrap());
+}
+
+#[test]
+fn devices() {
+    let desk = Desk::new();
+    let Some(adapters) = adapters(&desk) else { return };
+    let table = desk.cutis(&["devices"]).expect_success().stdout;
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines.len(), adapters.len() + 2, "a head, the adapters, what auto does: {table}");
+    for (n, adapter) in adapters.iter().enumerate() {
+        for key in ["name", "kind", "api", "driver"] {
+            let text = adapter[key].as_str().unwrap();
+            assert!(!text.is_empty() && lines[n + 1].contains(text), "{key}: {table}");
+        }
+        assert_eq!(adapter["index"], n);
+        assert!(adapter["usable"] == true || adapter["why"].is_string(), "{adapter}");
+        let binding = adapter["limits"]["max_binding_bytes"].as_u64().unwrap();
+        assert!(binding >= 128 << 20 && lines[n + 1].contains(&format!("{} MiB", binding >> 20)), "{table}");
+    }
+    let found = parsed(desk.cutis(&["devices", "--json"]));
+    if let Some(taken) = found["auto"].as_u64() {
+        assert_ne!(adapters[taken as usize]["kind"], "software");
+    } else {
+        assert!(found["note"].as_str().unwrap().contains("CPU backend"), "{found}");
+    }
+}
+
+#[test]
+fn an_adapter_that_is_not_there_is_refused_with_those_that_are() {
+    let desk = Desk::new();
+    let Some(adapters) = adapters(&desk) else { return };
+    let first = adapters[0]["name"].as_str().unwrap();
+    for adapter in ["unheard-of", "99"] {
+        for call in ["run scene.toml --backend gpu --out elsewhere", "check scene.toml --backend gpu"] {
+            let done = desk.cutis(&[&words(call)[..], &["--adapter", adapter]].concat());
+            done.expect_error(2, &["scene.toml", "solver.adapter", adapter, first, "cutis devices"]);
+        }
+    }
+    assert_eq!(desk.names("."), ["scene.toml"]);
+}
+
+#[test]
+fn a_run_on_a_gpu_says_where_it_ran() {
+    let desk = Desk::new();
+    let Some(adapters) = adapters(&desk) else { return };
+    let name = adapters[0]["name"].as_str().unwrap();
+    let part = name.split(' ').next().unwrap().to_uppercase();
+
+    let check = desk.cutis(&["check", "scene.toml", "--backend", "gpu", "--adapter", "0"]).expect_success();
+    assert!(check.stdout.contains(&format!("gpu: {name}")), "{}", check.stdout);
+    assert!(check.stdout.contains("on the GPU, stc"), "{}", check.stdout);
+    assert!(!check.stdout.contains("gpu: no device"), "{}", check.stdout);
+
+    let call = ["run", "scene.toml", "--backend", "gpu", "--adapter", &part, "--out", "run", "--json"];
+    let report = parsed(desk.cutis(&call));
+    assert_eq!((&report["backend"]["name"], &report["backend"]["adapter"]), (&"gpu".into(), &name.into()));
+    for key in ["adapter_kind", "driver", "reason"] {
+        assert!(report["backend"][key].as_str().is_some_and(|text| !text.is_empty()), "{key}: {report}");
+    }
+    for key in ["kernels", "submits", "dispatches", "readbacks", "readback_bytes"] {
+        assert!(report["device"][key].as_u64() > Some(0), "{key}: {report}");
+    }
+    let stages = report["stages"].as_array().unwrap();
+    let on = |name: &str| &stages.iter().find(|stage| stage["name"] == name).unwrap()["on"];
+    assert_eq!((on("simulate"), on("lattice, skin, incision")), (&"gpu".into(), &"cpu".into()));
+    let page = std::fs::read_to_string(desk.path("run/report.html")).unwrap();
+    assert!(page.contains(name) && page.contains("on the GPU"));
+    let warned = report["warnings"].to_string().contains("software device");
+    assert_eq!(warned, adapters[0]["kind"] == "software");
+}
+
+/// The whole program on both backends: the state of every vertex and every opening have the same bits.
+#[test]
+fn the_demo_on_software_is_that_of_the_cpu() {
+    let desk = Desk::new();
+    let Some(adapters) = adapters(&desk) else { return };
+    if adapters[0]["kind"] != "software" {
+        eprintln!("skipped: {} may fuse operations; parity has the tolerance for it", adapters[0]["name"]);
+        return;
+    }
+    let demo = |folder: &str, more: &[&str]| {
+        let call = "demo --frames 3 --set volume.phantom.size=[64,64,48] --set lattice.spacing_mm=12 \
+                    --set run.checkpoint_every=3 --set output={report=true} --out";
+        desk.cutis(&[&words(call)[..], &[folder], more].concat()).expect_success();
+        let state = std::fs::read(desk.path(folder).join("checkpoint.bin")).unwrap();
+        let table = std::fs::read_to_string(desk.path(folder).join("frames.csv")).unwrap();
+        let openings: Vec<String> = table
+            .lines()
+            .map(|line| line.split(',').enumerate().filter(|(n, _)| *n != 2).map(|(_, cell)| cell).collect())
+            .collect();
+        (state, openings)
+    };
+    let cpu = demo("cpu", &["--backend", "cpu"]);
+    let gpu = demo("gpu", &["--backend", "gpu"]);
+    assert!(cpu.0 == gpu.0, "the states differ");
+    assert_eq!(cpu.1, gpu.1);
+    let control = demo("control", &["--backend", "gpu", "--set", "constraints.stc.rest_area_scale=0.8001"]);
+    assert!(control.0[60..] != gpu.0[60..] && control.1 != gpu.1, "the comparison sees a small change");
+}
+
+/// A scene that does not name a GPU, and one that is too small for `auto`, do not even load Vulkan.
+#[test]
+fn nobody_looks_for_a_gpu_unasked() {
+    let desk = Desk::new();
+    if adapters(&desk).is_none() {
+        return;
+    }
+    let speaks = |call: &str| {
+        let done = desk.cutis_with(&TALKATIVE, &words(call)).expect_success();
+        done.stderr.contains("vulkan") || done.stderr.contains("VK_")
+    };
+    for call in ["run scene.toml --backend cpu --out cpu", "run scene.toml --out auto", "check scene.toml"] {
+        assert!(!speaks(call), "{call}");
+    }
+    if cfg!(target_os = "linux") {
+        assert!(speaks("devices") && speaks("run scene.toml --backend gpu --out gpu"), "the control");
+    }
+    let printed = parsed(desk.cutis(&["check", "scene.toml", "--json"]));
+    assert_eq!(printed["backend"]["name"], "cpu");
+    assert!(printed["backend"]["reason"].as_str().unwrap().contains("too few"), "{}", printed["backend"]);
+    assert!(printed["left_out"].to_string().contains("gpu: no device is opened"), "{}", printed["left_out"]);
+}

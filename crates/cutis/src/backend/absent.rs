@@ -1,0 +1,47 @@
+//! A build without the feature `gpu`: a GPU is refused by name, and `auto` takes the CPU and says why.
+
+use cutis_solver::{Settings, System};
+
+use super::{Chosen, Running, Work};
+use crate::report::{DeviceWork, MemoryPart};
+use crate::scene::LoadedScene;
+use crate::{Devices, Error};
+
+/// Why there is no GPU.
+pub(crate) const ABSENT: Option<&str> = Some("this build has no GPU backend");
+
+/// No device: there is none to be had.
+pub(crate) enum Gpu {}
+
+/// No adapter: there is none to be had.
+pub(super) enum Device {}
+
+pub(super) fn asked_for(loaded: &LoadedScene, _: &str) -> Result<Chosen, Error> {
+    let why = "this build has no GPU backend; use \"cpu\" or \"auto\"".into();
+    Err(loaded.blame("solver.backend")(Error::Backend { backend: "gpu".into(), why }))
+}
+
+pub(super) fn auto(loaded: &LoadedScene, _: &Work) -> Result<Chosen, Error> {
+    Ok(Chosen::cpu(loaded, "auto: this build has no GPU backend"))
+}
+
+pub(crate) fn devices() -> Devices {
+    Devices {
+        gpu_backend: false,
+        devices: Vec::new(),
+        auto: None,
+        note: "this build has no GPU backend (feature `gpu`): \"auto\" takes the CPU backend".into(),
+    }
+}
+
+pub(super) fn memory(device: &Device, _: &System<f32>, _: &Settings) -> Vec<MemoryPart> {
+    match *device {}
+}
+
+pub(super) fn start(device: &Device, _: System<f32>, _: Settings) -> Result<Running, Error> {
+    match *device {}
+}
+
+pub(super) fn work(gpu: &Gpu) -> DeviceWork {
+    match *gpu {}
+}

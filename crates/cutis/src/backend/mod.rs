@@ -1,0 +1,159 @@
+//! Where a scene runs, and why: the one place that chooses between the backends.
+//!
+//! What a scene asks for by name is settled before any work is done ([`Request::of`]): a backend or an adapter that is not
+//! there is refused, never replaced. `auto` waits until the size of the work is known ([`Request::settle`]), so that nobody
+//! looks for a GPU for a scene that is too small for one. No device is opened before [`Chosen::start`].
+
+#[cfg_attr(not(feature = "gpu"), path = "absent.rs")]
+mod gpu;
+
+use cutis_solver::{Settings, Solver, SolverReference, System};
+use cutis_solver_cpu::SolverCpu;
+
+use crate::Error;
+use crate::report::{Backend, DeviceWork, MemoryPart};
+use crate::scene::{BackendChoice, LoadedScene};
+
+pub(crate) use gpu::{ABSENT, Gpu, devices};
+
+/// What a scene asks for, as far as it can be settled without a body.
+pub(crate) enum Request {
+    Settled(Chosen),
+    /// The best one for the size of the work.
+    Auto,
+}
+
+/// How much there is to do, as far as it matters to the choice.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only a build with GPUs has a choice"))]
+pub(crate) struct Work {
+    pub(crate) vertices: u64,
+    /// Constraints of all kinds.
+    pub(crate) constraints: u64,
+    /// Colours of all kinds: what an iteration executes one after the other.
+    pub(crate) sweeps: u64,
+    /// Of the whole run.
+    pub(crate) projections: u64,
+}
+
+/// The backend that will run.
+pub(crate) struct Chosen {
+    pub(crate) report: Backend,
+    place: Place,
+    /// What the user should know about it.
+    pub(crate) note: Option<String>,
+}
+
+enum Place {
+    Cpu,
+    Reference,
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "there is none to be had"))]
+    Gpu(gpu::Device),
+}
+
+/// A backend with a body in it.
+pub(crate) struct Running {
+    pub(crate) solver: Box<dyn Solver<f32>>,
+    /// The device that it runs on; the stages after the simulation use it too.
+    pub(crate) gpu: Option<Gpu>,
+}
+
+impl Request {
+    /// Settles what the scene names.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] if this build or this machine does not have it.
+    pub(crate) fn of(loaded: &LoadedScene) -> Result<Self, Error> {
+        let reason = "the scene asks for it";
+        Ok(match loaded.scene.solver.backend {
+            BackendChoice::Auto => Self::Auto,
+            BackendChoice::Cpu => Self::Settled(Chosen::cpu(loaded, reason)),
+            BackendChoice::Reference => {
+                let report = Backend::on_host("reference", 1, reason);
+                Self::Settled(Chosen { report, place: Place::Reference, note: None })
+            }
+            BackendChoice::Gpu => Self::Settled(gpu::asked_for(loaded, reason)?),
+        })
+    }
+
+    /// A device that the caller opened.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn opened(gpu: &Gpu) -> Self {
+        Self::Settled(gpu::opened(gpu))
+    }
+
+    /// Settles `auto`.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] if the scene names an adapter that is not there.
+    pub(crate) fn settle(self, loaded: &LoadedScene, work: &Work) -> Result<Chosen, Error> {
+        match self {
+            Self::Settled(chosen) => Ok(chosen),
+            Self::Auto => gpu::auto(loaded, work),
+        }
+    }
+}
+
+impl Chosen {
+    /// The CPU backend.
+    fn cpu(loaded: &LoadedScene, reason: &str) -> Self {
+        let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+        let threads = Some(loaded.scene.solver.threads).filter(|&n| n > 0).unwrap_or(cores);
+        Self { report: Backend::on_host("cpu", threads, reason), place: Place::Cpu, note: None }
+    }
+
+    /// True if it will open a device.
+    pub(crate) fn on_gpu(&self) -> bool {
+        matches!(self.place, Place::Gpu(_))
+    }
+
+    /// Memory that it takes on a device, by part; nothing on the host's backends.
+    pub(crate) fn device_memory(&self, system: &System<f32>, settings: &Settings) -> Vec<MemoryPart> {
+        match &self.place {
+            Place::Gpu(device) => gpu::memory(device, system, settings),
+            Place::Cpu | Place::Reference => Vec::new(),
+        }
+    }
+
+    /// Opens the device, if there is one to open, and puts the body into the backend.
+    ///
+    /// # Errors
+    /// As the backend gives them.
+    pub(crate) fn start(&self, system: System<f32>, settings: Settings) -> Result<Running, Error> {
+        Ok(match &self.place {
+            Place::Reference => {
+                Running { solver: Box::new(SolverReference::new(system, settings)?), gpu: None }
+            }
+            Place::Cpu => {
+                let solver = SolverCpu::new(system, settings, Some(self.report.threads))?;
+                Running { solver: Box::new(solver), gpu: None }
+            }
+            Place::Gpu(device) => gpu::start(device, system, settings)?,
+        })
+    }
+}
+
+impl Running {
+    /// Where it runs, for the stages of the report.
+    pub(crate) fn place(&self) -> &'static str {
+        if self.gpu.is_some() { "gpu" } else { "cpu" }
+    }
+
+    /// What the device did so far.
+    pub(crate) fn device_work(&self) -> Option<DeviceWork> {
+        self.gpu.as_ref().map(gpu::work)
+    }
+}
+
+impl Backend {
+    fn on_host(name: &str, threads: usize, reason: &str) -> Self {
+        Self {
+            name: name.into(),
+            adapter: None,
+            adapter_kind: None,
+            driver: None,
+            threads,
+            reason: reason.into(),
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! A scene on a GPU: the run of the CPU, what is built and read for it, and what is left of it if the device goes away.
+
+use std::path::Path;
+
+use cutis::gpu::{AdapterKind, Gpu, GpuError, GpuOptions};
+use cutis::report::Report;
+use cutis::solver::SolverError;
+use cutis::{Error, LoadedScene, Progress, RunOptions, Silent};
+
+use crate::scenes::{Run, SMALL, names, run_in, scene};
+
+const BARE: (&str, &str) = ("output", "{}");
+
+/// The first adapter, opened. None: a failure where tests may not be skipped, else a printed reason.
+fn gpu() -> Option<Gpu> {
+    match Gpu::open(&GpuOptions::default()) {
+        Ok(gpu) => Some(gpu),
+        Err(error @ GpuError::NoAdapter) => {
+            let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
+            assert!(!required, "{error}");
+            eprintln!("skipped: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Runs a scene on an opened device.
+fn run_on(gpu: &Gpu, folder: &Path, loaded: &LoadedScene, resume: bool) -> Result<Report, Error> {
+    cutis::run_on(gpu, loaded, &RunOptions { out: folder.into(), resume }, &Silent)
+}
+
+/// Positions and velocities in the checkpoint of a folder.
+fn state(folder: &Path) -> Vec<f32> {
+    let bytes = std::fs::read(folder.join("checkpoint.bin")).unwrap();
+    let values = bytes[52..bytes.len() - 32].chunks_exact(4);
+    values.map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+}
+
+/// Whether two runs agree: to the bit on software, where the operations are those of the CPU; within 1e-5 of the body's
+/// size on hardware, which may fuse a multiplication with an addition.
+fn agree(gpu: &Gpu, first: &Path, second: &Path) -> bool {
+    let (first, second) = (state(first), state(second));
+    if gpu.adapter().kind == AdapterKind::Software {
+        return first == second;
+    }
+    let positions = first.len() / 2;
+    let extent = first[..positions].iter().fold(0.0_f32, |extent, x| extent.max(x.abs()));
+    first[..positions].iter().zip(&second).all(|(a, b)| (a - b).abs() <= 1e-5 * extent)
+}
+
+#[test]
+fn a_run_on_a_gpu_is_that_on_the_cpu() {
+    let Some(gpu) = gpu() else { return };
+    let handle = "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5], over_s = 0.1 }]";
+    let cases: [&[(&str, &str)]; 3] = [
+        &[("solver.formulation", "xpbd")],
+        &[("solver.formulation", "pbd")],
+        &[("solver.iterations", "3"), ("solver.substeps", "4"), ("handle", handle)],
+    ];
+    for case in cases {
+        let small = |more: &[(&str, &str)]| {
+            scene(SMALL, &[&[BARE, ("run.frames", "4"), ("run.checkpoint_every", "4")], case, more].concat())
+        };
+        let [cpu, on_gpu, control] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+        run_in(cpu.path(), &small(&[]), false).unwrap();
+        let report = run_on(&gpu, on_gpu.path(), &small(&[]), false).unwrap();
+        assert_eq!((report.backend.name.as_str(), report.frames.count), ("gpu", 4));
+        assert!(agree(&gpu, cpu.path(), on_gpu.path()), "{case:?}");
+        run_on(&gpu, control.path(), &small(&[("constraints.stc.rest_area_scale", "0.79")]), false).unwrap();
+        assert!(!agree(&gpu, cpu.path(), control.path()), "{case:?}: the comparison sees a change of 1 %");
+    }
+}
+
+/// A run may go on from a checkpoint of the other backend.
+#[test]
+fn a_run_goes_on_on_the_other_backend() {
+    let Some(gpu) = gpu() else { return };
+    let frames = |n| {
+        scene(SMALL, &[("output", "{ report = true }"), ("run.frames", n), ("run.checkpoint_every", "3")])
+    };
+    let [whole, first, second] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    run_in(whole.path(), &frames("6"), false).unwrap();
+    run_in(first.path(), &frames("3"), false).unwrap();
+    assert_eq!(run_on(&gpu, first.path(), &frames("6"), true).unwrap().frames.count, 3);
+    run_on(&gpu, second.path(), &frames("3"), false).unwrap();
+    assert_eq!(run_in(second.path(), &frames("6"), true).unwrap().backend.name, "cpu");
+    for halves in [&first, &second] {
+        assert!(agree(&gpu, whole.path(), halves.path()));
+        let table = std::fs::read_to_string(halves.path().join("frames.csv")).unwrap();
+        assert_eq!(table.lines().count(), 8, "{table}");
+    }
+}
+
+/// What a scene leaves out has no kernel; what it names has some.
+#[test]
+fn kernels_are_built_for_what_is_named() {
+    if gpu().is_none() {
+        return;
+    }
+    let kernels = |set: &[(&str, &str)]| {
+        let common = [BARE, ("run.frames", "1"), ("solver.backend", "gpu"), ("lattice.spacing_mm", "16")];
+        let report = Run::of(&scene(SMALL, &[&common, set].concat())).report;
+        let parts: Vec<String> = report.device_memory.iter().map(|part| part.part.clone()).collect();
+        (report.device.unwrap().kernels, parts)
+    };
+    let (all, parts) = kernels(&[]);
+    assert_eq!(parts, ["vertices", "distance", "volume", "stc"]);
+    let one = "{ distance = { youngs_modulus_pa = 5e3 } }";
+    let two = "{ distance = { youngs_modulus_pa = 5e3 }, volume = { bulk_modulus_pa = 5e4 } }";
+    let counts = [
+        kernels(&[("constraints", "{}")]),
+        kernels(&[("constraints", one)]),
+        kernels(&[("constraints", two)]),
+    ];
+    let [none, one, two] = counts.each_ref().map(|(count, _)| *count);
+    assert!(none < one && one < two && two < all, "{none} {one} {two} {all}");
+    // Each kind brings the same number: its projection and its residual.
+    assert_eq!((two - one, all - two), (one - none, one - none));
+    assert_eq!(counts[0].1, ["vertices"]);
+    let handle = "[{ at_mm = [-40, 100, 0], radius_mm = 25, move_mm = [0, 20, 5] }]";
+    let (with_handle, parts) = kernels(&[("handle", handle)]);
+    assert!(with_handle > all && parts.iter().any(|part| part == "handles"));
+    // Without a wound no opening is measured, and nothing gathers its lips.
+    let (closed, _) = kernels(&[("incision", "[]")]);
+    assert!(closed < all, "{closed} {all}");
+}
+
+/// A frame reads whether the body is finite, and the lips: not the body.
+#[test]
+fn a_frame_reads_the_lips_only() {
+    let Some(gpu) = gpu() else { return };
+    let read = |frames: &str, every: &str| {
+        let before = gpu.counters();
+        let set = [BARE, ("run.frames", frames), ("run.checkpoint_every", every)];
+        let folder = tempfile::tempdir().unwrap();
+        let report = run_on(&gpu, folder.path(), &scene(SMALL, &set), false).unwrap();
+        let after = gpu.counters();
+        let vertices = report.sizes.vertices as u64;
+        (after.submits - before.submits, after.readback_bytes - before.readback_bytes, vertices)
+    };
+    let (few, many) = (read("2", "0"), read("12", "0"));
+    assert!((many.0 - few.0) <= 2 * 10, "a step, and a gathering of the lips: {few:?} {many:?}");
+    let body = 16 * many.2;
+    let per_frame = (many.1 - few.1) / 10;
+    assert!(per_frame > 12 && per_frame < body / 20, "{per_frame} of {body} bytes");
+    let saved = read("12", "1");
+    assert!((saved.1 - many.1) / 12 >= body, "a checkpoint reads all of it: {saved:?} {many:?}");
+}
+
+/// Takes the device away after some frames.
+struct Loses<'a>(&'a Gpu, u64);
+
+impl Progress for Loses<'_> {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, done: u64) {
+        if done == self.1 {
+            self.0.lose();
+        }
+    }
+    fn end(&self) {}
+    fn note(&self, _message: &str) {}
+}
+
+#[test]
+fn a_device_that_is_lost_leaves_the_last_checkpoint() {
+    let Some(gpu) = gpu() else { return };
+    let loaded = |every| scene(SMALL, &[BARE, ("run.frames", "6"), ("run.checkpoint_every", every)]);
+    let [folder, whole, without] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let lose = |gpu: &Gpu, folder: &Path, every| {
+        let options = RunOptions { out: folder.into(), resume: false };
+        cutis::run_on(gpu, &loaded(every), &options, &Loses(gpu, 3)).unwrap_err()
+    };
+    let error = lose(&gpu, folder.path(), "2");
+    let Error::Stopped { frame: 4, saved: Some((2, _)), source: SolverError::Device { time_s, .. } } = &error
+    else {
+        panic!("{error:?}")
+    };
+    assert!((time_s - 2.0 / 60.0).abs() < 1e-9, "the state that the checkpoint read: {time_s}");
+    let text = error.to_string();
+    for word in
+        ["frame 4", "lost", gpu.adapter().name.as_str(), "checkpoint.bin", "--resume", "--backend cpu"]
+    {
+        assert!(text.contains(word), "no {word:?} in: {text}");
+    }
+    assert!(!error.is_bad_input());
+
+    let resumed = run_in(folder.path(), &loaded("2"), true).unwrap();
+    assert_eq!((resumed.frames.count, resumed.backend.name.as_str()), (4, "cpu"));
+    run_in(whole.path(), &loaded("2"), false).unwrap();
+    assert!(agree(&gpu, whole.path(), folder.path()));
+
+    // A device that is lost already starts nothing; without a checkpoint there is none to go on from.
+    let error = run_on(&gpu, without.path(), &loaded("2"), false).unwrap_err();
+    assert!(!error.is_bad_input() && error.to_string().contains("lost"), "{error}");
+    assert!(names(without.path()).is_empty());
+    let again = Gpu::open(&GpuOptions::default()).unwrap();
+    let error = lose(&again, without.path(), "0");
+    assert!(
+        matches!(error, Error::Stopped { saved: None, .. }) && error.to_string().contains("no checkpoint")
+    );
+    assert!(names(without.path()).is_empty());
+}
+
+/// Splitting every colour, and the limits that any device has, do not change a bit.
+#[test]
+fn a_run_in_small_chunks_is_the_same() {
+    let Some(whole) = gpu() else { return };
+    let loaded = scene(SMALL, &[BARE, ("run.frames", "2"), ("run.checkpoint_every", "2")]);
+    let expected = tempfile::tempdir().unwrap();
+    run_on(&whole, expected.path(), &loaded, false).unwrap();
+    let options = GpuOptions { baseline_limits: true, chunk_cap: Some(500), ..GpuOptions::default() };
+    let capped = Gpu::open(&options).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    run_on(&capped, folder.path(), &loaded, false).unwrap();
+    assert!(capped.counters().dispatches > 2 * whole.counters().dispatches, "it was split");
+    assert!(agree(&whole, expected.path(), folder.path()));
+}
+
+#[test]
+fn without_a_gpu_there_is_nothing_of_one() {
+    for backend in ["cpu", "reference", "auto"] {
+        let set = [BARE, ("run.frames", "1"), ("lattice.spacing_mm", "16"), ("solver.backend", backend)];
+        let report = Run::of(&scene(SMALL, &set)).report;
+        assert!(
+            report.device.is_none() && report.device_memory.is_empty() && report.backend.adapter.is_none()
+        );
+        assert!(report.stages.iter().all(|stage| stage.on == "cpu"), "{:?}", report.stages);
+        assert!(report.left_out.contains(&"gpu: no device is opened".to_owned()), "{:?}", report.left_out);
+    }
+}
