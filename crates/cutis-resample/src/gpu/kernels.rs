@@ -82,10 +82,8 @@ impl Walk {
         listed: usize,
     ) {
         pass.dispatch(&self.all, &[&slab.all, &tets.all], threads);
-        pass.dispatch(
-            &self.large,
-            &[&slab.large, &tets.large],
-            WORKGROUP * listed.min(threads).min(GROUPS_FOR_LARGE),
-        );
+        // A full list is rare: two tets for each workgroup then.
+        let groups = listed.min(threads).div_ceil(2).min(GROUPS_FOR_LARGE);
+        pass.dispatch(&self.large, &[&slab.large, &tets.large], WORKGROUP * groups);
     }
 }

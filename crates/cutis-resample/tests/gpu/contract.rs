@@ -101,12 +101,12 @@ fn folds_are_the_bodys_only_and_flat_tets_hold_nothing() {
     let Some(gpu) = gpu() else { return };
     let mut scene = scenes::large_folded();
     let (_, report) = run(&gpu, &scene);
-    assert!(report.folds > 1000 && report.inverted_tets == 6, "{report:?}");
+    assert!(report.folds > 1000 && report.inverted_tets == 12, "{report:?}");
     scene.body_tets = 6;
     assert_eq!(run(&gpu, &scene).1.folds, 0, "a shell may fold");
     let flat = scene.moved(|p| Point3::new(p.x, p.y, 0.003));
     let (_, report) = run(&gpu, &flat);
-    assert_eq!((report.inverted_tets, report.covered_voxels), (12, 0));
+    assert_eq!((report.inverted_tets, report.covered_voxels), (24, 0));
 }
 
 #[test]
