@@ -1,9 +1,6 @@
 //! Reading memory of the device, through one staging buffer that stays.
 
-use std::{
-    ops::Range,
-    sync::{Arc, OnceLock},
-};
+use std::{ops::Range, sync::mpsc};
 
 use bytemuck::Pod;
 
@@ -77,8 +74,7 @@ impl Gpu {
         let size = words.end - words.start;
         let failed = |reason: String| GpuError::Readback { what: format!("buffer '{label}'"), reason };
         let target = self.staging(staging, size)?;
-        let answer = Arc::new(OnceLock::new());
-        let tell = Arc::clone(&answer);
+        let (tell, answer) = mpsc::channel();
         let sent = self.checked(
             |fault| fault.of(format!("reading buffer '{label}'"), size),
             || {
@@ -86,16 +82,17 @@ impl Gpu {
                 encoder.copy_buffer_to_buffer(from, words.start, target, 0, size);
                 let sent = self.shared.queue.submit([encoder.finish()]);
                 target.map_async(wgpu::MapMode::Read, 0..size, move |mapped| {
-                    let _ = tell.set(mapped);
+                    let _ = tell.send(mapped);
                 });
                 sent
             },
         )?;
         self.poll(wgpu::PollType::Wait { submission_index: Some(sent), timeout: None })?;
-        match answer.get() {
-            Some(Ok(())) => {}
-            Some(Err(error)) => return Err(failed(error.to_string())),
-            None => return Err(failed("the device did not answer".to_owned())),
+        // The thread that brings the answer may be another one that polled at the same time, a moment later.
+        match answer.recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(failed(error.to_string())),
+            Err(_) => return Err(failed("the device did not answer".to_owned())),
         }
         let view = target.get_mapped_range(0..size).map_err(|error| failed(error.to_string()))?;
         into.copy_from_slice(&view[skip..skip + into.len()]);

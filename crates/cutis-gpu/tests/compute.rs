@@ -120,6 +120,33 @@ fn two_devices_and_two_threads_work_at_once() {
     });
 }
 
+/// Any thread that waits for the device may be the one that is told that another one's read is ready.
+#[test]
+fn reads_are_answered_while_other_threads_wait_for_the_device() {
+    on_every_adapter(|gpu| {
+        let buffers = [1_u32, 2].map(|value| gpu.buffer("values", &[value; 16]).unwrap());
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let (gpu, done) = (&gpu, &done);
+        std::thread::scope(|scope| {
+            for (value, buffer) in (1..).zip(&buffers) {
+                scope.spawn(move || {
+                    let read = (0..500).try_for_each(|_| match gpu.read(buffer, 0..16) {
+                        Ok(read) if read == [value; 16] => Ok(()),
+                        other => Err(format!("{other:?}")),
+                    });
+                    done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                    read.unwrap();
+                });
+                scope.spawn(move || {
+                    while done.load(std::sync::atomic::Ordering::Relaxed) < 2 {
+                        gpu.wait().unwrap();
+                    }
+                });
+            }
+        });
+    });
+}
+
 #[test]
 fn passes_are_timed_where_the_adapter_can() {
     with_options(&GpuOptions { timestamps: true, ..GpuOptions::default() }, |gpu| {
