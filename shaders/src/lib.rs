@@ -18,3 +18,7 @@ pub fn link(parts: &[&str]) -> String {
     }
     source
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
