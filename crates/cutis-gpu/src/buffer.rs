@@ -6,7 +6,7 @@ use bytemuck::Pod;
 
 use crate::{
     Binding, Gpu, GpuError,
-    counters::{Tally, add, take},
+    counters::{Memory, add},
 };
 
 /// Copies to and from buffers move whole words of 4 bytes.
@@ -15,13 +15,13 @@ pub(crate) const WORD: u64 = 4;
 /// Large contents go up in parts of this many bytes, so that no second copy of them has to fit in memory.
 pub(crate) const PART: usize = 16 << 20;
 
-/// `len` elements of `T` on the device. The memory goes when the buffer is dropped and the device has done what was
-/// submitted with it.
+/// `len` elements of `T` on the device. The memory goes when the buffer and the bind groups made with it are dropped, and the
+/// device has done what was submitted with them.
 pub struct Buffer<T> {
     pub(crate) raw: wgpu::Buffer,
     pub(crate) label: String,
     len: usize,
-    tally: Arc<Tally>,
+    memory: Arc<Memory>,
     element: PhantomData<fn(T) -> T>,
 }
 
@@ -92,10 +92,9 @@ impl Gpu {
             wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
         let raw =
             self.checked(|fault| fault.of(what(), size), || self.shared.device.create_buffer(&descriptor))?;
-        let tally = Arc::clone(&self.shared.tally);
-        add(&tally.buffers, 1);
-        add(&tally.buffer_bytes, size);
-        Ok(Buffer { raw, label: label.to_owned(), len, tally, element: PhantomData })
+        add(&self.shared.tally.buffers, 1);
+        let memory = Memory::new(&self.shared.tally, size, |tally| &tally.buffer_bytes);
+        Ok(Buffer { raw, label: label.to_owned(), len, memory, element: PhantomData })
     }
 
     fn upload<T: Pod>(&self, buffer: &Buffer<T>, offset: usize, data: &[T]) -> Result<(), GpuError> {
@@ -135,7 +134,7 @@ impl Gpu {
 impl<T> Buffer<T> {
     /// All of it, to bind to a kernel.
     pub fn whole(&self) -> Binding<'_> {
-        Binding::buffer(&self.raw, &self.label, 0..self.bytes())
+        Binding::buffer(&self.raw, &self.memory, &self.label, 0..self.bytes())
     }
 
     /// These elements, to bind to a kernel. The first must lie on a multiple of 256 bytes; whether it does, and whether
@@ -144,7 +143,7 @@ impl<T> Buffer<T> {
         match self.bytes_of(|| format!("binding buffer '{}'", self.label), range.clone()) {
             Ok(bytes) if bytes.end > bytes.start => {
                 let end = if range.end == self.len { self.bytes() } else { bytes.end };
-                Binding::buffer(&self.raw, &self.label, bytes.start..end)
+                Binding::buffer(&self.raw, &self.memory, &self.label, bytes.start..end)
             }
             _ => Binding::outside(&self.label, range, self.len),
         }
@@ -192,12 +191,6 @@ impl<T> Buffer<T> {
             Some((_, offset)) => Err(GpuError::Alignment { what: what(), offset, multiple: WORD }),
             None => Ok(bytes.start..bytes.end.next_multiple_of(WORD)),
         }
-    }
-}
-
-impl<T> Drop for Buffer<T> {
-    fn drop(&mut self) {
-        take(&self.tally.buffer_bytes, self.raw.size());
     }
 }
 

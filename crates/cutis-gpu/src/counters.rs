@@ -1,5 +1,6 @@
 //! Counts of what a device did: tests hold a frame to one submission and no readback with them.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What a [`Gpu`](crate::Gpu) did since it was opened, over all its handles and threads.
@@ -65,7 +66,24 @@ pub(crate) fn add(counter: &AtomicU64, amount: u64) {
     counter.fetch_add(amount, Relaxed);
 }
 
-/// Takes from a counter of live bytes.
-pub(crate) fn take(counter: &AtomicU64, amount: u64) {
-    counter.fetch_sub(amount, Relaxed);
+/// Memory of the device, counted as live until the last holder goes: a buffer or texture, and the groups that bind it.
+#[derive(Debug)]
+pub(crate) struct Memory {
+    tally: Arc<Tally>,
+    bytes: u64,
+    live: fn(&Tally) -> &AtomicU64,
+}
+
+impl Memory {
+    /// Counts `bytes` in the counter that `live` names.
+    pub(crate) fn new(tally: &Arc<Tally>, bytes: u64, live: fn(&Tally) -> &AtomicU64) -> Arc<Self> {
+        add(live(tally), bytes);
+        Arc::new(Self { tally: Arc::clone(tally), bytes, live })
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        (self.live)(&self.tally).fetch_sub(self.bytes, Relaxed);
+    }
 }

@@ -1,8 +1,12 @@
 //! Kernels, and the buffers that they work on.
 
-use std::{borrow::Cow, fmt, ops::Range};
+use std::{borrow::Cow, fmt, ops::Range, sync::Arc};
 
-use crate::{Gpu, GpuError, WORKGROUP, counters::add, device::Fault};
+use crate::{
+    Gpu, GpuError, WORKGROUP,
+    counters::{Memory, add},
+    device::Fault,
+};
 
 /// A range of a buffer that is bound must start on a multiple of this many bytes (WebGPU's baseline).
 const BINDING_ALIGNMENT: u64 = 256;
@@ -17,6 +21,8 @@ pub struct Kernel {
 pub struct BindGroup {
     pub(crate) raw: wgpu::BindGroup,
     pub(crate) group: u32,
+    /// Counts as in use as long as the group is.
+    _memory: Vec<Arc<Memory>>,
 }
 
 /// A resource to bind: made by [`Buffer::whole`](crate::Buffer::whole), [`Buffer::range`](crate::Buffer::range) and
@@ -26,9 +32,9 @@ pub struct Binding<'a>(Resource<'a>);
 
 #[derive(Clone, Debug)]
 enum Resource<'a> {
-    Buffer { raw: &'a wgpu::Buffer, label: &'a str, bytes: Range<u64> },
+    Buffer { raw: &'a wgpu::Buffer, memory: &'a Arc<Memory>, label: &'a str, bytes: Range<u64> },
     Outside { label: &'a str, range: Range<usize>, len: usize },
-    Texture { view: &'a wgpu::TextureView },
+    Texture { view: &'a wgpu::TextureView, memory: &'a Arc<Memory> },
 }
 
 impl Gpu {
@@ -99,7 +105,8 @@ impl Gpu {
                 })
             },
         )?;
-        Ok(BindGroup { raw, group })
+        let held = bindings.iter().filter_map(|(_, Binding(resource))| resource.memory());
+        Ok(BindGroup { raw, group, _memory: held.cloned().collect() })
     }
 
     fn resource<'a>(
@@ -108,14 +115,14 @@ impl Gpu {
         what: &impl Fn() -> String,
     ) -> Result<wgpu::BindingResource<'a>, GpuError> {
         match resource {
-            Resource::Texture { view } => Ok(wgpu::BindingResource::TextureView(view)),
+            Resource::Texture { view, .. } => Ok(wgpu::BindingResource::TextureView(view)),
             Resource::Outside { label, range, len } => Err(GpuError::Range {
                 what: format!("{}, buffer '{label}'", what()),
                 start: range.start,
                 end: range.end,
                 len: *len,
             }),
-            Resource::Buffer { raw, label, bytes } => {
+            Resource::Buffer { raw, label, bytes, .. } => {
                 let what = || format!("{}, buffer '{label}'", what());
                 if !bytes.start.is_multiple_of(BINDING_ALIGNMENT) {
                     return Err(GpuError::Alignment {
@@ -139,17 +146,31 @@ impl Gpu {
     }
 }
 
+impl Resource<'_> {
+    fn memory(&self) -> Option<&Arc<Memory>> {
+        match self {
+            Resource::Buffer { memory, .. } | Resource::Texture { memory, .. } => Some(memory),
+            Resource::Outside { .. } => None,
+        }
+    }
+}
+
 impl<'a> Binding<'a> {
-    pub(crate) fn buffer(raw: &'a wgpu::Buffer, label: &'a str, bytes: Range<u64>) -> Binding<'a> {
-        Binding(Resource::Buffer { raw, label, bytes })
+    pub(crate) fn buffer(
+        raw: &'a wgpu::Buffer,
+        memory: &'a Arc<Memory>,
+        label: &'a str,
+        bytes: Range<u64>,
+    ) -> Binding<'a> {
+        Binding(Resource::Buffer { raw, memory, label, bytes })
     }
 
     pub(crate) fn outside(label: &'a str, range: Range<usize>, len: usize) -> Binding<'a> {
         Binding(Resource::Outside { label, range, len })
     }
 
-    pub(crate) fn texture(view: &'a wgpu::TextureView) -> Binding<'a> {
-        Binding(Resource::Texture { view })
+    pub(crate) fn texture(view: &'a wgpu::TextureView, memory: &'a Arc<Memory>) -> Binding<'a> {
+        Binding(Resource::Texture { view, memory })
     }
 }
 

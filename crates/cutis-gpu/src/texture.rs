@@ -5,7 +5,7 @@ use std::{fmt, sync::Arc};
 use crate::{
     Binding, Gpu, GpuError,
     buffer::PART,
-    counters::{Tally, add, take},
+    counters::{Memory, add},
 };
 
 /// A volume on the device: signed 16-bit integers, x fastest. A kernel sees it as `texture_3d<i32>` and reads it with
@@ -14,8 +14,7 @@ pub struct Texture3d {
     view: wgpu::TextureView,
     label: String,
     shape: [usize; 3],
-    bytes: u64,
-    tally: Arc<Tally>,
+    memory: Arc<Memory>,
 }
 
 impl Gpu {
@@ -78,28 +77,21 @@ impl Gpu {
             }
         }
         let view = self.checked(|fault| fault.of(what(), 0), || raw.create_view(&Default::default()))?;
-        let tally = Arc::clone(&self.shared.tally);
-        add(&tally.textures, 1);
-        add(&tally.texture_bytes, bytes);
-        Ok(Texture3d { view, label: label.to_owned(), shape, bytes, tally })
+        add(&self.shared.tally.textures, 1);
+        let memory = Memory::new(&self.shared.tally, bytes, |tally| &tally.texture_bytes);
+        Ok(Texture3d { view, label: label.to_owned(), shape, memory })
     }
 }
 
 impl Texture3d {
     /// The volume, to bind to a kernel.
     pub fn whole(&self) -> Binding<'_> {
-        Binding::texture(&self.view)
+        Binding::texture(&self.view, &self.memory)
     }
 
     /// Voxels along x, y and z.
     pub fn shape(&self) -> [usize; 3] {
         self.shape
-    }
-}
-
-impl Drop for Texture3d {
-    fn drop(&mut self) {
-        take(&self.tally.texture_bytes, self.bytes);
     }
 }
 

@@ -210,6 +210,8 @@ fn the_counters_count() {
         };
         assert_eq!(gpu.counters(), expected);
         drop(values);
+        assert_eq!(gpu.counters().buffer_bytes, 400, "the group still holds it");
+        drop(group);
         assert_eq!(gpu.counters().buffer_bytes, 0);
     });
 }

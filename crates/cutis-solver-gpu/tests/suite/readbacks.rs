@@ -94,7 +94,6 @@ fn a_body_pays_only_for_what_it_has() {
             let after = gpu.counters();
             let parts: u64 = solver.device_bytes().iter().map(|part| part.bytes as u64).sum();
             // Beside the body there are uniforms and the status, 16 to 32 bytes each.
-            eprintln!("{} {} {parts} {:?}", after.buffer_bytes, before.buffer_bytes, solver.device_bytes());
             let extra = after.buffer_bytes - before.buffer_bytes - parts;
             assert!(extra < 4096, "{extra} bytes more than was said");
             after.kernels - before.kernels
