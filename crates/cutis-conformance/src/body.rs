@@ -7,7 +7,9 @@ use cutis_solver::{
 };
 use nalgebra::Point3;
 
-use crate::{Case, ConformanceError, Random};
+use crate::alter::{Altered, WrongGradient, WrongValue};
+use crate::measure::{Deviation, excess, tolerance};
+use crate::{Case, ConformanceError, Random, Report};
 
 /// Time of a frame in s.
 const DT: f64 = 1.0 / 60.0;
@@ -149,19 +151,33 @@ impl<const N: usize> Body<N> {
     }
 
     /// Distances between the vertices of two runs, over the scale.
-    pub(crate) fn distances<'a>(
-        &self,
-        a: &'a [Point3<f64>],
-        b: &'a [Point3<f64>],
-    ) -> impl Iterator<Item = f64> + use<'a, N> {
-        let scale = self.scale;
-        a.iter().zip(b).map(move |(a, b)| (a - b).norm() / scale)
+    pub(crate) fn deviation(&self, a: &[Point3<f64>], b: &[Point3<f64>]) -> Deviation {
+        Deviation::of(a.iter().zip(b).map(|(a, b)| (a - b).norm() / self.scale))
     }
 
-    /// The largest coordinate over the scale.
-    pub(crate) fn extent(&self) -> f64 {
-        let coordinates = self.positions.iter().flat_map(|p| p.coords.iter().copied());
-        coordinates.fold(0.0, |most, x| f64::max(most, x.abs())) / self.scale
+    /// How far from `exact` vertices may be where the CPU ends at `single`; the least is an ulp of the largest coordinate.
+    pub(crate) fn tolerance(&self, single: &[Point3<f64>], exact: &[Point3<f64>]) -> Deviation {
+        let coordinates = self.positions.iter().flat_map(|p| p.coords.iter());
+        let extent = coordinates.fold(0.0, |most, x| f64::max(most, x.abs())) / self.scale;
+        tolerance(self.deviation(single, exact), f64::from(f32::EPSILON) * extent)
+    }
+
+    /// Controls: that `found` is seen not to be the result of a constraint whose value or gradient is off by 1e-3.
+    pub(crate) fn controls<C: Constraint<N>>(
+        &self,
+        report: &mut Report,
+        plan: Plan,
+        found: &[Point3<f64>],
+        tolerance: Deviation,
+    ) -> Result<(), SolverError> {
+        for (wrong, result) in [
+            ("value", self.reference::<Altered<C, WrongValue>, f64>(plan)?),
+            ("gradient", self.reference::<Altered<C, WrongGradient>, f64>(plan)?),
+        ] {
+            let seen = excess(self.deviation(found, &result), tolerance);
+            report.control(format!("{}, {}: {wrong} off by 1e-3", plan.name, self.name), seen, 1.0);
+        }
+        Ok(())
     }
 }
 

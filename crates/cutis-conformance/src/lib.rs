@@ -18,7 +18,7 @@
 //! | [`lanes`](checks::lanes) | a SIMD lane has the bits of the scalar | the lane beside |
 //! | [`degenerate`](checks::degenerate) | collapsed shapes stay finite | a division by zero |
 //! | [`wgsl`](checks::wgsl) | the shader is valid, `Params` is laid out as on the host | an unknown name, one parameter more, `normalize` |
-//! | [`projection`](checks::projection) | threads give the reference's bits; `f32` lands near `f64` | value or gradient off by 1e-3 |
+//! | [`projection`](checks::projection) | threads give the bits of the reference | value or gradient off by 1e-3 |
 //! | [`device::evaluation`] | the shader computes what Rust does | the shader off by 1e-3; gradients swapped |
 //! | [`device::projection`] | the GPU backend lands where the reference does | value or gradient off by 1e-3 |
 //! | [`device::degenerate`] | collapsed shapes stay finite on the device | a division by zero |

@@ -47,6 +47,19 @@ impl Deviation {
     }
 }
 
+/// How many times as much as the CPU in `f32` a device may deviate from `f64`.
+pub const ALLOWANCE: f64 = 4.0;
+
+/// What a device may deviate where the CPU deviates by `cpu`; an ulp is `ulp`.
+pub(crate) fn tolerance(cpu: Deviation, ulp: f64) -> Deviation {
+    Deviation { worst: ALLOWANCE * cpu.worst.max(ulp), rms: ALLOWANCE * cpu.rms.max(ulp) }
+}
+
+/// How many times the tolerance a deviation is.
+pub(crate) fn excess(found: Deviation, tolerance: Deviation) -> f64 {
+    largest(found.worst / tolerance.worst, found.rms / tolerance.rms)
+}
+
 /// Errors of value and gradient at one length scale, relative to [`Case::size`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {

@@ -5,9 +5,9 @@ use cutis_gpu::{Gpu, GpuError};
 use cutis_shaders::solver;
 use nalgebra::Vector3;
 
-use super::{excess, is_exact, report, tolerance};
+use super::{is_exact, report};
 use crate::alter::Alteration;
-use crate::measure::{Deviation, Errors, errors, largest, numbers};
+use crate::measure::{Deviation, Errors, errors, excess, largest, numbers, tolerance};
 use crate::{Case, ConformanceError, Report, Subject};
 
 /// Value and gradient on the device and on the CPU, in `f32`, against `f64` on the same numbers, per scale and relative to

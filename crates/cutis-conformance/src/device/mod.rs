@@ -1,6 +1,6 @@
 //! The checks on a GPU, and which GPU.
 //!
-//! A device may deviate from `f64` at most [`FACTOR`] times as much as the CPU does in `f32`, in the worst case and in the root mean
+//! A device may deviate from `f64` at most [`ALLOWANCE`] times as much as the CPU does in `f32`, in the worst case and in the root mean
 //! square, with an ulp as the least that the CPU is taken to deviate. So the tolerance is not chosen, but follows from the formula.
 //! On a software adapter, which rounds as the CPU does, every number must be equal.
 
@@ -12,25 +12,13 @@ mod projection;
 use cutis_gpu::{AdapterKind, Gpu};
 
 use crate::Report;
-use crate::measure::Deviation;
 
 pub use degenerate::degenerate;
 pub use evaluation::{evaluate, evaluation};
 pub use policy::{REQUIRE, open};
 pub use projection::projection;
 
-/// How many times as much as the CPU a device may deviate from `f64`.
-pub const FACTOR: f64 = 4.0;
-
-/// What a device may deviate when the CPU deviates by `cpu`; an ulp is `ulp`.
-pub(crate) fn tolerance(cpu: Deviation, ulp: f64) -> Deviation {
-    Deviation { worst: FACTOR * cpu.worst.max(ulp), rms: FACTOR * cpu.rms.max(ulp) }
-}
-
-/// How many times the tolerance a deviation is.
-pub(crate) fn excess(found: Deviation, tolerance: Deviation) -> f64 {
-    crate::measure::largest(found.worst / tolerance.worst, found.rms / tolerance.rms)
-}
+pub use crate::measure::ALLOWANCE;
 
 /// Whether the adapter rounds as the CPU does, so that every number has to be equal.
 pub(crate) fn is_exact(gpu: &Gpu) -> bool {

@@ -3,13 +3,10 @@
 use cutis_constraints::Constraint;
 use cutis_gpu::Gpu;
 use cutis_solver_gpu::SolverGpu;
-use nalgebra::Point3;
 
-use super::{excess, is_exact, report, tolerance};
-use crate::alter::{Altered, WrongGradient, WrongValue};
+use super::{is_exact, report};
 use crate::body::{Plan, after_a_frame, differing};
 use crate::checks::bodies;
-use crate::measure::Deviation;
 use crate::{ConformanceError, Report, Subject};
 
 /// The bodies of [`projection`](fn@crate::checks::projection) on the GPU backend. Its vertices may end at most 4 times as far
@@ -29,28 +26,17 @@ pub fn projection<C: Constraint<N>, const N: usize>(
         for plan in Plan::of(subject.direction_only) {
             let what = format!("{}, {}", plan.name, body.name);
             let single = body.reference::<C, f32>(plan)?;
+            let exact = body.reference::<C, f64>(plan)?;
             let mut solver = SolverGpu::new(gpu, body.system::<C, f32>(plan)?, plan.settings())?;
             let on_device = after_a_frame(&mut solver)?;
-            let from = |positions: &[Point3<f64>], exact: &[Point3<f64>]| {
-                Deviation::of(body.distances(positions, exact))
-            };
-            let exact = body.reference::<C, f64>(plan)?;
-            let ulp = f64::from(f32::EPSILON) * body.extent();
-            let tolerance = tolerance(from(&single, &exact), ulp);
-            let found = from(&on_device, &exact);
+            let (found, tolerance) = (body.deviation(&on_device, &exact), body.tolerance(&single, &exact));
             report.at_most(format!("{what}: worst"), found.worst, tolerance.worst);
             report.at_most(format!("{what}: root mean square"), found.rms, tolerance.rms);
             if is_exact(gpu) {
                 let different = differing(&on_device, &single) as f64;
                 report.at_most(format!("{what}: coordinates that are not the CPU's"), different, 0.0);
             }
-            for (wrong, result) in [
-                ("value", body.reference::<Altered<C, WrongValue>, f64>(plan)?),
-                ("gradient", body.reference::<Altered<C, WrongGradient>, f64>(plan)?),
-            ] {
-                let seen = excess(from(&on_device, &result), tolerance);
-                report.control(format!("{what}: {wrong} off by 1e-3"), seen, 1.0);
-            }
+            body.controls::<C>(&mut report, plan, &on_device, tolerance)?;
         }
     }
     Ok(report)
