@@ -17,9 +17,9 @@ pub enum ResampleError {
     /// A position is NaN or infinite.
     #[error("{which} position of vertex {vertex} is {position:?}: every coordinate must be finite")]
     NotFinite {
-        /// `"rest"`, `"deformed"` or `"origin"`.
+        /// `"rest"`, `"deformed"`, `"origin"` or `"offset"`.
         which: &'static str,
-        /// Index of the vertex (0 for the origin).
+        /// Index of the vertex (0 for the origin and the offset).
         vertex: usize,
         /// Its coordinates, local metres (mm for the origin).
         position: [f64; 3],

@@ -14,7 +14,8 @@
 //! 5. `gather`: a thread per two voxels gives them their value through their owner.
 //!
 //! What may differ from the CPU's result, which is computed in `f64`: the owner of a centre within a few roundings of `f32` of a
-//! face, and values by the rounding of the place at rest. Tets beyond about 10¹² voxels take no part.
+//! face, and values by the rounding of the place at rest. A tet so flat, or with a corner so far away, that `f32` cannot tell its
+//! volume from zero takes no part.
 
 mod bound;
 mod kernels;
@@ -29,7 +30,7 @@ use cutis_volume::Volume;
 
 pub use resampler::ResamplerGpu;
 pub use setup::{ResamplerOptions, Setup, relative};
-pub use state::{NEAR, NONE, SlabState};
+pub use state::{NEAR, NONE, SlabDifference, SlabState};
 pub use uniform::Grid;
 
 use crate::report::ResampleReport;

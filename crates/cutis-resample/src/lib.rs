@@ -11,6 +11,9 @@
 //! * no value outside the input's range appears;
 //! * the result is the same, bit for bit, for any number of threads.
 //!
+//! With the feature `gpu` the same contract is held by a GPU: `resample_gpu` for one state of a mesh, `ResamplerGpu` for many,
+//! and the module `twin` with the arithmetic of its kernels in plain Rust, to compare them with.
+//!
 //! ```
 //! use cutis_resample::{Warp, resample};
 //! use cutis_volume::{Affine, Grid, Volume};
@@ -51,7 +54,7 @@ mod warp;
 
 pub use error::ResampleError;
 #[cfg(feature = "gpu")]
-pub use gpu::{ResamplerGpu, ResamplerOptions, SlabState, resample_gpu};
+pub use gpu::{ResamplerGpu, ResamplerOptions, SlabDifference, SlabState, resample_gpu};
 pub use report::ResampleReport;
 pub use warp::{Warp, resample, resample_region};
 

@@ -15,9 +15,8 @@ use crate::gpu::{Setup, SlabState, relative};
 use crate::report::ResampleReport;
 use crate::{ResampleError, ResamplerOptions, Warp};
 
-pub use gather::gather;
-pub use passes::{Mesh, claim, place, span, span_removed, vacate};
-pub use tet::{ROUNDING, Tet, Vec3, Vec4, VoxelBox, box_of, has_volume, heights, row_of, tet_of, volume_of};
+use gather::gather;
+use passes::{Mesh, claim, place, span, span_removed, vacate};
 
 /// What [`resample_gpu`](crate::resample_gpu) does, by the twin; options as for
 /// [`ResamplerGpu::new`](crate::ResamplerGpu::new).

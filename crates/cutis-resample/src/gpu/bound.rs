@@ -10,7 +10,8 @@ use super::uniform::{Chunk, Slab};
 
 /// Tets that exist now.
 pub struct TetChunk {
-    pub count: usize,
+    pub tets: Buffer<[u32; 4]>,
+    spans: Buffer<[u32; 2]>,
     pub span: BindGroup,
     pub claim: WalkGroups,
     pub vacate: WalkGroups,
@@ -40,18 +41,24 @@ impl TetChunk {
         let now = [(0, claim), (1, tets_bound.clone()), (3, places.whole())];
         let at_rest = [(0, vacate), (1, tets_bound), (3, rest_places.whole())];
         Ok(Self {
-            count: tets.len(),
             span: gpu.bind(&kernels.span, 1, &span)?,
             claim: kernels.claim.tets(gpu, &now, &spans)?,
             vacate: kernels.vacate.tets(gpu, &at_rest, &spans)?,
             gather: gpu.bind(&kernels.gather, 1, &gather)?,
+            tets: buffer,
+            spans,
         })
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.tets.bytes() + self.spans.bytes()
     }
 }
 
 /// Tets that were removed.
 pub struct RemovedChunk {
-    pub count: usize,
+    pub tets: Buffer<[u32; 4]>,
+    spans: Buffer<[u32; 2]>,
     pub span: BindGroup,
     pub vacate: WalkGroups,
 }
@@ -70,10 +77,15 @@ impl RemovedChunk {
         let span = [(0, chunk.whole()), (1, buffer.whole()), (2, spans.whole())];
         let at_rest = [(0, chunk.whole()), (1, buffer.whole()), (3, memory.rest_places.whole())];
         Ok(Self {
-            count: tets.len(),
             span: gpu.bind(&kernels.span_removed, 1, &span)?,
             vacate: kernels.vacate.tets(gpu, &at_rest, &spans)?,
+            tets: buffer,
+            spans,
         })
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.tets.bytes() + self.spans.bytes()
     }
 }
 

@@ -86,4 +86,13 @@ impl Memory {
             counters: gpu.zeroed("resample: counters", 1 + COUNTS * plan.slabs.len())?,
         })
     }
+
+    /// Bytes of all of it.
+    pub fn bytes(&self) -> u64 {
+        let Self { source, grid, rest, rest_places, places, owners, marks, large, counters } = self;
+        let volume = source.shape().iter().product::<usize>() as u64 * size_of::<i16>() as u64;
+        let vertices = rest.bytes() + rest_places.bytes() + places.bytes();
+        let slab = owners.bytes() + marks.bytes() + large.bytes();
+        volume + vertices + slab + grid.bytes() + counters.bytes()
+    }
 }

@@ -168,6 +168,15 @@ impl ResamplerGpu {
         Ok(Volume::new(self.grid, voxels, self.slope, self.intercept)?)
     }
 
+    /// Bytes on the device, but for some hundreds for each slab and each chunk of tets.
+    pub fn bytes(&self) -> u64 {
+        let tets =
+            self.chunks.iter().map(TetChunk::bytes).chain(self.removed.iter().map(RemovedChunk::bytes));
+        let values = self.slabs.iter().map(|slab| slab.values.bytes());
+        let uploaded = self.uploaded.as_ref().map_or(0, Buffer::bytes);
+        self.memory.bytes() + tets.chain(values).sum::<u64>() + uploaded
+    }
+
     /// How many slabs the region is filled in.
     pub fn slabs(&self) -> usize {
         self.slabs.len()
@@ -214,7 +223,7 @@ impl ResamplerGpu {
         let mut pass = self.gpu.pass("resample: at rest");
         pass.dispatch(place, &[&positions], self.threads(rest.len()));
         for chunk in &self.removed {
-            pass.dispatch(span_removed, &[&mesh, &chunk.span], self.threads(chunk.count));
+            pass.dispatch(span_removed, &[&mesh, &chunk.span], self.threads(chunk.tets.len()));
         }
         pass.submit()
     }
@@ -227,7 +236,7 @@ impl ResamplerGpu {
         let bound = self.gpu.bind(place, 0, &bound)?;
         pass.dispatch(place, &[&bound], self.threads(rest.len()));
         for chunk in &self.chunks {
-            pass.dispatch(span, &[&self.span_mesh, &chunk.span], self.threads(chunk.count));
+            pass.dispatch(span, &[&self.span_mesh, &chunk.span], self.threads(chunk.tets.len()));
         }
         Ok(())
     }
@@ -238,12 +247,12 @@ impl ResamplerGpu {
         let Kernels { clear, claim, vacate, gather, .. } = &self.kernels;
         pass.dispatch(clear, &[&slab.clear], self.threads(slab.voxels));
         for chunk in &self.chunks {
-            let threads = self.threads(chunk.count);
+            let threads = self.threads(chunk.tets.len());
             claim.dispatch(pass, &slab.claim, &chunk.claim, threads, self.listed);
             vacate.dispatch(pass, &slab.vacate, &chunk.vacate, threads, self.listed);
         }
         for chunk in &self.removed {
-            let threads = self.threads(chunk.count);
+            let threads = self.threads(chunk.tets.len());
             vacate.dispatch(pass, &slab.vacate, &chunk.vacate, threads, self.listed);
         }
         for chunk in &self.chunks {

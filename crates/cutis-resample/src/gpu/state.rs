@@ -22,6 +22,19 @@ pub struct SlabState {
     pub counts: [u32; 4],
 }
 
+/// How far two states of a slab are apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SlabDifference {
+    /// Voxels with different owners.
+    pub owners: usize,
+    /// Voxels with the same owner and different values.
+    pub values: usize,
+    /// Largest difference of a value where the owner is the same.
+    pub largest: u16,
+    /// Largest difference of a value where it is not.
+    pub largest_elsewhere: u16,
+}
+
 /// Words of `marks` for so many voxels.
 pub fn mark_words(voxels: usize) -> usize {
     3 * voxels.div_ceil(32)
@@ -52,6 +65,25 @@ impl SlabState {
 
     pub(crate) fn is_marked(&self, plane: usize, voxel: usize) -> bool {
         self.marks[self.word(plane, voxel)] >> (voxel % 32) & 1 == 1
+    }
+
+    /// How far two states of a slab are apart; they have the same number of voxels.
+    ///
+    /// On hardware that contracts `a * b + c` a centre within the rounding of a face can have another owner, and a value another
+    /// rounding. [`SlabDifference`] tells such from errors.
+    pub fn difference(&self, other: &Self) -> SlabDifference {
+        let mut found = SlabDifference::default();
+        for (voxel, (a, b)) in self.owners.iter().zip(&other.owners).enumerate() {
+            let apart = self.values[voxel].abs_diff(other.values[voxel]);
+            if a & !NEAR == b & !NEAR {
+                found.values += usize::from(apart > 0);
+                found.largest = found.largest.max(apart);
+            } else {
+                found.owners += 1;
+                found.largest_elsewhere = found.largest_elsewhere.max(apart);
+            }
+        }
+        found
     }
 
     /// The counts of this slab; inverted tets are of no slab.

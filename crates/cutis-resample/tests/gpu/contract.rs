@@ -47,6 +47,16 @@ fn identity_returns_the_input_bit_for_bit() {
 }
 
 #[test]
+fn without_a_mesh_nothing_changes() {
+    let Some(gpu) = gpu() else { return };
+    let grid = Grid { shape: [3, 5, 7], affine: oblique() };
+    let volume = noise(grid, 3);
+    let origin_mm = Point3::origin();
+    let warp = Warp { origin_mm, rest: &[], deformed: &[], tets: &[], body_tets: 0, removed: &[] };
+    assert_eq!(run_warp(&gpu, &volume, &warp), (volume, ResampleReport::default()));
+}
+
+#[test]
 fn translation_by_whole_voxels_shifts_the_input() {
     let Some(gpu) = gpu() else { return };
     let steps = [3, 2, 1];

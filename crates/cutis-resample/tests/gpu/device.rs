@@ -123,6 +123,7 @@ fn a_lost_device_is_told() {
     let scene = scenes::padded();
     let mut resampler = resampler(&gpu, &scene);
     resampler.resample(&scene.deformed).unwrap();
+    assert!(resampler.bytes() > (2 + 2 + 4) * scene.volume.voxels().len() as u64);
     gpu.lose();
     let lost = |found: ResampleError| matches!(found, ResampleError::Gpu(GpuError::Lost { .. }));
     assert!(lost(resampler.resample(&scene.deformed).unwrap_err()));

@@ -8,6 +8,7 @@ mod contract;
 mod device;
 mod oracle;
 mod parity;
+mod real;
 mod scenes;
 
 use cutis_gpu::{Gpu, GpuError, GpuOptions};
