@@ -5,11 +5,17 @@ use std::path::Path;
 use cutis::gpu::{AdapterKind, Gpu, GpuError, GpuOptions};
 use cutis::report::Report;
 use cutis::solver::SolverError;
+use cutis::volume::nifti;
 use cutis::{Error, LoadedScene, Progress, RunOptions, Silent};
 
-use crate::scenes::{Run, SMALL, names, run_in, scene};
+use crate::scenes::{self, Run, SMALL, names, run_in};
 
 const BARE: (&str, &str) = ("output", "{}");
+
+/// The small phantom on a coarser lattice: a software device takes its time.
+fn scene(set: &[(&str, &str)]) -> LoadedScene {
+    scenes::scene(SMALL, &[&[("lattice.spacing_mm", "12")], set].concat())
+}
 
 /// The first adapter, opened. None: a failure where tests may not be skipped, else a printed reason.
 fn gpu() -> Option<Gpu> {
@@ -60,7 +66,7 @@ fn a_run_on_a_gpu_is_that_on_the_cpu() {
     ];
     for case in cases {
         let small = |more: &[(&str, &str)]| {
-            scene(SMALL, &[&[BARE, ("run.frames", "4"), ("run.checkpoint_every", "4")], case, more].concat())
+            scene(&[&[BARE, ("run.frames", "4"), ("run.checkpoint_every", "4")], case, more].concat())
         };
         let [cpu, on_gpu, control] = [(); 3].map(|()| tempfile::tempdir().unwrap());
         run_in(cpu.path(), &small(&[]), false).unwrap();
@@ -76,9 +82,8 @@ fn a_run_on_a_gpu_is_that_on_the_cpu() {
 #[test]
 fn a_run_goes_on_on_the_other_backend() {
     let Some(gpu) = gpu() else { return };
-    let frames = |n| {
-        scene(SMALL, &[("output", "{ report = true }"), ("run.frames", n), ("run.checkpoint_every", "3")])
-    };
+    let frames =
+        |n| scene(&[("output", "{ report = true }"), ("run.frames", n), ("run.checkpoint_every", "3")]);
     let [whole, first, second] = [(); 3].map(|()| tempfile::tempdir().unwrap());
     run_in(whole.path(), &frames("6"), false).unwrap();
     run_in(first.path(), &frames("3"), false).unwrap();
@@ -99,8 +104,8 @@ fn kernels_are_built_for_what_is_named() {
         return;
     }
     let kernels = |set: &[(&str, &str)]| {
-        let common = [BARE, ("run.frames", "1"), ("solver.backend", "gpu"), ("lattice.spacing_mm", "16")];
-        let report = Run::of(&scene(SMALL, &[&common, set].concat())).report;
+        let common = [BARE, ("run.frames", "1"), ("solver.backend", "gpu")];
+        let report = Run::of(&scene(&[&common, set].concat())).report;
         let parts: Vec<String> = report.device_memory.iter().map(|part| part.part.clone()).collect();
         (report.device.unwrap().kernels, parts)
     };
@@ -134,7 +139,7 @@ fn a_frame_reads_the_lips_only() {
         let before = gpu.counters();
         let set = [BARE, ("run.frames", frames), ("run.checkpoint_every", every)];
         let folder = tempfile::tempdir().unwrap();
-        let report = run_on(&gpu, folder.path(), &scene(SMALL, &set), false).unwrap();
+        let report = run_on(&gpu, folder.path(), &scene(&set), false).unwrap();
         let after = gpu.counters();
         let vertices = report.sizes.vertices as u64;
         (after.submits - before.submits, after.readback_bytes - before.readback_bytes, vertices)
@@ -165,7 +170,7 @@ impl Progress for Loses<'_> {
 #[test]
 fn a_device_that_is_lost_leaves_the_last_checkpoint() {
     let Some(gpu) = gpu() else { return };
-    let loaded = |every| scene(SMALL, &[BARE, ("run.frames", "6"), ("run.checkpoint_every", every)]);
+    let loaded = |every| scene(&[BARE, ("run.frames", "6"), ("run.checkpoint_every", every)]);
     let [folder, whole, without] = [(); 3].map(|()| tempfile::tempdir().unwrap());
     let lose = |gpu: &Gpu, folder: &Path, every| {
         let options = RunOptions { out: folder.into(), resume: false };
@@ -202,14 +207,91 @@ fn a_device_that_is_lost_leaves_the_last_checkpoint() {
     assert!(names(without.path()).is_empty());
 }
 
+/// Voxels of the deformed CT of a folder.
+fn deformed(folder: &Path) -> Vec<i16> {
+    nifti::read(folder.join("deformed.nii.gz")).unwrap().volume.voxels().to_vec()
+}
+
+/// Share of the voxels that differ by more than rounding does.
+fn share_differing(first: &[i16], second: &[i16]) -> f64 {
+    let differing = first.iter().zip(second).filter(|(a, b)| a.abs_diff(**b) > 1).count();
+    differing as f64 / first.len() as f64
+}
+
+fn places(report: &Report, names: &[&str]) -> Vec<String> {
+    let named = report.stages.iter().filter(|stage| names.contains(&stage.name.as_str()));
+    named.map(|stage| stage.on.clone()).collect()
+}
+
+const STAGES: [&str; 3] = ["simulate", "resample the CT", "pictures"];
+
+#[test]
+fn the_ct_and_the_pictures_come_from_the_gpu_too() {
+    let Some(gpu) = gpu() else { return };
+    let loaded = |output, scale| {
+        scene(&[("output", output), ("run.frames", "3"), ("constraints.stc.rest_area_scale", scale)])
+    };
+    let (both, one) = ("{ volume = true, pictures = true }", "{ volume = true }");
+    let [cpu, on_gpu, control] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let expected = run_in(cpu.path(), &loaded(both, "0.8"), false).unwrap();
+    let report = run_on(&gpu, on_gpu.path(), &loaded(both, "0.8"), false).unwrap();
+    run_on(&gpu, control.path(), &loaded(one, "0.9"), false).unwrap();
+    assert_eq!(
+        (places(&report, &STAGES), places(&expected, &STAGES)),
+        (vec!["gpu".into(); 3], vec!["cpu".into(); 3])
+    );
+    assert_eq!(names(on_gpu.path()), names(cpu.path()));
+    let [cpu, on_gpu, control] = [&cpu, &on_gpu, &control].map(|folder| deformed(folder.path()));
+    // The GPU looks a voxel's place up in single precision: the owner of a voxel on a face may be its neighbour.
+    let (found, noticed) = (share_differing(&cpu, &on_gpu), share_differing(&cpu, &control));
+    assert!(
+        found < 1e-4 && noticed > 20.0 * 1e-4,
+        "{found} of the voxels differ, {noticed} of the control's"
+    );
+    let (a, b) = (expected.resample.unwrap(), report.resample.unwrap());
+    let near = |a: u64, b: u64| a.abs_diff(b) as f64 <= 1e-4 * cpu.len() as f64;
+    assert!(near(a.covered_voxels, b.covered_voxels) && near(a.folds, b.folds), "{a:?} {b:?}");
+}
+
+/// Takes the device away when a stage begins.
+struct LosesAt<'a>(&'a Gpu, &'a str);
+
+impl Progress for LosesAt<'_> {
+    fn begin(&self, stage: &str, _total: u64) {
+        if stage == self.1 {
+            self.0.lose();
+        }
+    }
+    fn advance(&self, _done: u64) {}
+    fn end(&self) {}
+    fn note(&self, _message: &str) {}
+}
+
+/// A simulation that is done is not thrown away: the CPU makes the rest, and the report says so.
+#[test]
+fn a_device_that_is_lost_after_the_simulation_costs_nothing() {
+    let Some(gpu) = gpu() else { return };
+    let loaded = scene(&[("output", "{ volume = true, pictures = true }"), ("run.frames", "1")]);
+    let [whole, folder] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    run_in(whole.path(), &loaded, false).unwrap();
+    let options = RunOptions { out: folder.path().into(), resume: false };
+    let report = cutis::run_on(&gpu, &loaded, &options, &LosesAt(&gpu, "resample the CT")).unwrap();
+    assert_eq!(places(&report, &STAGES), ["gpu", "cpu", "cpu"]);
+    let said = report.warnings.iter().filter(|line| line.contains("ran on the CPU") && line.contains("lost"));
+    assert_eq!(said.count(), 1, "{:?}", report.warnings);
+    if gpu.adapter().kind == AdapterKind::Software {
+        assert!(deformed(whole.path()) == deformed(folder.path()));
+    }
+}
+
 /// Splitting every colour, and the limits that any device has, do not change a bit.
 #[test]
 fn a_run_in_small_chunks_is_the_same() {
     let Some(whole) = gpu() else { return };
-    let loaded = scene(SMALL, &[BARE, ("run.frames", "2"), ("run.checkpoint_every", "2")]);
+    let loaded = scene(&[BARE, ("run.frames", "2"), ("run.checkpoint_every", "2")]);
     let expected = tempfile::tempdir().unwrap();
     run_on(&whole, expected.path(), &loaded, false).unwrap();
-    let options = GpuOptions { baseline_limits: true, chunk_cap: Some(500), ..GpuOptions::default() };
+    let options = GpuOptions { baseline_limits: true, chunk_cap: Some(200), ..GpuOptions::default() };
     let capped = Gpu::open(&options).unwrap();
     let folder = tempfile::tempdir().unwrap();
     run_on(&capped, folder.path(), &loaded, false).unwrap();
@@ -220,8 +302,8 @@ fn a_run_in_small_chunks_is_the_same() {
 #[test]
 fn without_a_gpu_there_is_nothing_of_one() {
     for backend in ["cpu", "reference", "auto"] {
-        let set = [BARE, ("run.frames", "1"), ("lattice.spacing_mm", "16"), ("solver.backend", backend)];
-        let report = Run::of(&scene(SMALL, &set)).report;
+        let set = [BARE, ("run.frames", "1"), ("solver.backend", backend)];
+        let report = Run::of(&scene(&set)).report;
         assert!(
             report.device.is_none() && report.device_memory.is_empty() && report.backend.adapter.is_none()
         );

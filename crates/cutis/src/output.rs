@@ -9,6 +9,7 @@ use cutis_resample::Warp;
 use cutis_volume::{Volume, nifti};
 use nalgebra::Point3;
 
+use crate::backend::Stages;
 use crate::body::Body;
 use crate::checkpoint::{self, Checkpoint};
 use crate::files::RunFolder;
@@ -39,7 +40,11 @@ pub(crate) struct Products {
 }
 
 /// Writes the outputs that the scene names.
-pub(crate) fn write(outcome: &Outcome<'_>, clock: &mut Clock<'_>) -> Result<Products, Error> {
+pub(crate) fn write(
+    outcome: &Outcome<'_>,
+    stages: &mut Stages,
+    clock: &mut Clock<'_>,
+) -> Result<Products, Error> {
     let Outcome { loaded, source, body, deformed, folder } = outcome;
     let output = &loaded.scene.output;
     let mut products = Products::default();
@@ -57,8 +62,9 @@ pub(crate) fn write(outcome: &Outcome<'_>, clock: &mut Clock<'_>) -> Result<Prod
         return Ok(products);
     }
     let warp = BodyWarp::new(body, deformed)?;
-    let (volume, found) =
-        clock.stage("resample the CT", 0, |progress| warp.apply(&source.volume, progress))?;
+    let (volume, found) = clock.stage_placed("resample the CT", 0, |progress| {
+        Ok((warp.apply(&source.volume, stages, progress)?, stages.place()))
+    })?;
     if found.folds > 0 {
         products
             .warnings
@@ -69,19 +75,20 @@ pub(crate) fn write(outcome: &Outcome<'_>, clock: &mut Clock<'_>) -> Result<Prod
         clock.stage("write deformed.nii.gz", 0, |_| Ok(nifti::write(folder.volume(), &volume)?))?;
     }
     if output.pictures {
-        let figures = clock.stage("pictures", 0, |progress| {
+        let figures = clock.stage_placed("pictures", 0, |progress| {
             let rest = BodyWarp::new(body, &body.mesh.positions)?;
-            let (at_rest, _) = rest.apply(&source.volume, progress)?;
+            let (at_rest, _) = rest.apply(&source.volume, stages, progress)?;
             let depth = pictures::depth(&source.volume, &loaded.scene)?;
-            let depth_after = warp.apply(&depth, progress)?.0;
+            let depth_after = warp.apply(&depth, stages, progress)?.0;
             let [before, after] = [(&at_rest, &depth), (&volume, &depth_after)];
-            pictures::draw(outcome, before, after)
+            Ok((pictures::draw(outcome, stages, before, after)?, stages.place()))
         })?;
         for (path, png) in [folder.before(), folder.after(), folder.slice()].iter().zip(&figures) {
             files::write(path, &png.png)?;
         }
         products.figures = figures;
     }
+    products.warnings.append(&mut stages.notes);
     Ok(products)
 }
 
@@ -110,7 +117,12 @@ impl<'a> BodyWarp<'a> {
         })
     }
 
-    fn apply(&self, volume: &Volume, progress: &dyn Progress) -> Result<(Volume, Resample), Error> {
+    fn apply(
+        &self,
+        volume: &Volume,
+        stages: &mut Stages,
+        progress: &dyn Progress,
+    ) -> Result<(Volume, Resample), Error> {
         let warp = Warp {
             origin_mm: self.body.mesh.frame.origin_mm,
             rest: &self.rest,
@@ -120,7 +132,7 @@ impl<'a> BodyWarp<'a> {
             removed: &self.removed,
         };
         let (volume, report) =
-            cutis_resample::resample(volume, &warp, &|done, _total| progress.advance(done as u64))?;
+            stages.resample(volume, &warp, &|done, _total| progress.advance(done as u64))?;
         let report = Resample {
             covered_voxels: report.covered_voxels as u64,
             folds: report.folds as u64,
@@ -205,7 +217,8 @@ pub fn resample_run(
         None => source.volume,
     };
     let warp = BodyWarp::new(&body, &saved.positions)?;
-    let (deformed, report) = clock.stage("resample", 0, |progress| warp.apply(&volume, progress))?;
+    let (deformed, report) =
+        clock.stage("resample", 0, |progress| warp.apply(&volume, &mut Stages::on(None), progress))?;
     clock.stage("write", 0, |_| Ok(nifti::write(&request.out, &deformed)?))?;
     Ok(report)
 }

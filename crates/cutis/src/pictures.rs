@@ -1,11 +1,12 @@
 //! The pictures of a run: the skin before and after, and a slice across the wound.
 
 use cutis_mesh::Slit;
-use cutis_render::{Contour, Focus, Plane, Side, SliceView, View, raymarch, side_by_side, skin_depth, slice};
+use cutis_render::{Contour, Focus, Plane, Side, SliceView, View, side_by_side, skin_depth, slice};
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
 
 use crate::Error;
+use crate::backend::Stages;
 use crate::html::Figure;
 use crate::output::Outcome;
 use crate::scene::Scene;
@@ -29,12 +30,13 @@ pub(crate) fn depth(volume: &Volume, scene: &Scene) -> Result<Volume, Error> {
 /// Draws a run: its CT (with the depth volume) cut but not yet deformed, and deformed.
 pub(crate) fn draw(
     outcome: &Outcome<'_>,
+    stages: &mut Stages,
     before: (&Volume, &Volume),
     after: (&Volume, &Volume),
 ) -> Result<Vec<Figure>, Error> {
     let body = outcome.body;
     let wound = body.cut.slits.first().map(|slit| Wound::of(slit, &body.mesh.frame));
-    let skin = |(volume, depth): (&Volume, &Volume)| {
+    let mut skin = |(volume, depth): (&Volume, &Volume)| {
         let view = View {
             width: PIXELS,
             height: PIXELS,
@@ -43,7 +45,7 @@ pub(crate) fn draw(
             threshold_hu: outcome.loaded.scene.tissue.air_below_hu,
             ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))
         };
-        Ok::<_, Error>(raymarch(volume, &view)?)
+        stages.raymarch(volume, &view)
     };
     let rest = Contour {
         origin_mm: body.mesh.frame.origin_mm,

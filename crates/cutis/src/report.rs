@@ -294,17 +294,28 @@ impl<'a> Clock<'a> {
     /// Runs one stage of `total` units (0: unknown), on what it is said to run on.
     pub(crate) fn stage_on<T>(
         &mut self,
-        on: &str,
+        on: &'static str,
         name: &str,
         total: u64,
         work: impl FnOnce(&dyn Progress) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        self.stage_placed(name, total, |progress| Ok((work(progress)?, on)))
+    }
+
+    /// Runs one stage of `total` units (0: unknown), which tells what it ran on.
+    pub(crate) fn stage_placed<T>(
+        &mut self,
+        name: &str,
+        total: u64,
+        work: impl FnOnce(&dyn Progress) -> Result<(T, &'static str), Error>,
     ) -> Result<T, Error> {
         self.progress.begin(name, total);
         let start = Instant::now();
         let result = work(self.progress);
         let ms = start.elapsed().as_secs_f64() * 1e3;
+        let on = result.as_ref().map_or("", |(_, on)| on);
         self.stages.push(Stage { name: name.into(), ms, on: on.into() });
         self.progress.end();
-        result
+        result.map(|(value, _)| value)
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use cutis_mesh::WoundGape;
 
-use crate::backend::Request;
+use crate::backend::{Metered, Request, Stages};
 use crate::checkpoint::{self, Checkpoint};
 use crate::files::RunFolder;
 use crate::frames::{Course, Finish, earlier_frames, frame_times, frames_csv};
@@ -97,7 +97,10 @@ fn run_with(
         })?;
 
     let outcome = Outcome { loaded, source: &source, body: &body, deformed: &deformed, folder: &folder };
-    let products = output::write(&outcome, &mut clock)?;
+    // The body's memory on the device is free for the stages that follow.
+    let device = running.into_device();
+    let mut stages = Stages::on(device.as_ref().map(Metered::gpu));
+    let products = output::write(&outcome, &mut stages, &mut clock)?;
     let at_rest: Vec<WoundGape> = body.cut.gapes.iter().map(|gape| gape.measure(rest)).collect();
     let wounds: Vec<Wound> = at_rest
         .iter()
@@ -122,7 +125,7 @@ fn run_with(
         colors: plan.colors,
         memory: plan.memory,
         device_memory: plan.device_memory,
-        device: running.device_work(),
+        device: device.as_ref().map(Metered::work),
         stages: clock.stages.clone(),
         frames: frame_times(&rows),
         wound: wounds.first().cloned(),

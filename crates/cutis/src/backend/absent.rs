@@ -1,6 +1,9 @@
 //! A build without the feature `gpu`: a GPU is refused by name, and `auto` takes the CPU and says why.
 
+use cutis_render::{Image, RenderError, View};
+use cutis_resample::{ResampleError, ResampleReport, Warp};
 use cutis_solver::{Settings, System};
+use cutis_volume::Volume;
 
 use super::{Chosen, Running, Work};
 use crate::report::{DeviceWork, MemoryPart};
@@ -11,6 +14,7 @@ use crate::{Devices, Error};
 pub(crate) const ABSENT: Option<&str> = Some("this build has no GPU backend");
 
 /// No device: there is none to be had.
+#[derive(Clone)]
 pub(crate) enum Gpu {}
 
 /// No adapter: there is none to be had.
@@ -40,6 +44,23 @@ pub(super) fn memory(device: &Device, _: &System<f32>, _: &Settings) -> Vec<Memo
 
 pub(super) fn start(device: &Device, _: System<f32>, _: Settings) -> Result<Running, Error> {
     match *device {}
+}
+
+pub(super) fn resample(
+    gpu: &Gpu,
+    _: &Volume,
+    _: &Warp<'_>,
+    _: &(dyn Fn(usize, usize) + Sync),
+) -> Result<(Volume, ResampleReport), ResampleError> {
+    match *gpu {}
+}
+
+pub(super) fn raymarch(gpu: &Gpu, _: &Volume, _: &View<'_>) -> Result<Image, RenderError> {
+    match *gpu {}
+}
+
+pub(super) fn lacks_device(_: &Error) -> bool {
+    false
 }
 
 pub(super) fn work(gpu: &Gpu) -> DeviceWork {

@@ -1,16 +1,20 @@
 //! GPUs: which adapter a scene means, when `auto` takes one, and opening it.
 
 use cutis_gpu::{Adapter, AdapterKind, GpuError, GpuOptions, Select, adapters};
+use cutis_render::RenderError;
+use cutis_resample::ResampleError;
 use cutis_solver::{Settings, System, Vertex};
 use cutis_solver_gpu::{GpuSolverError, SolverGpu};
 
-use super::{Chosen, Place, Running, Work};
+use super::{Chosen, Metered, Place, Running, Work};
 use crate::devices::{Device as Listed, DeviceLimits};
 use crate::report::{Backend, DeviceWork, MemoryPart};
 use crate::scene::LoadedScene;
 use crate::{Devices, Error};
 
 pub(crate) use cutis_gpu::Gpu;
+pub(super) use cutis_render::raymarch_gpu as raymarch;
+pub(super) use cutis_resample::resample_gpu as resample;
 
 /// Why there is no GPU: this build has the backend.
 pub(crate) const ABSENT: Option<&str> = None;
@@ -228,12 +232,24 @@ pub(super) fn start(device: &Device, system: System<f32>, settings: Settings) ->
             Gpu::open(&GpuOptions { select: Select::Index(*index), ..GpuOptions::default() })?
         }
     };
+    let before = work(&gpu);
     let solver = SolverGpu::new(&gpu, system, settings).map_err(|e| match e {
         GpuSolverError::Solver(e) => Error::Solver(e),
         GpuSolverError::Gpu(e) => Error::Gpu(e),
         other => Error::Backend { backend: "gpu".into(), why: other.to_string() },
     })?;
-    Ok(Running { solver: Box::new(solver), gpu: Some(gpu) })
+    Ok(Running { solver: Box::new(solver), device: Some(Metered { gpu, before }) })
+}
+
+/// Whether a stage failed for want of room or of the device, as against a fault of a kernel.
+pub(super) fn lacks_device(error: &Error) -> bool {
+    match error {
+        Error::Resample(ResampleError::TooLarge { .. }) => true,
+        Error::Resample(ResampleError::Gpu(e)) | Error::Render(RenderError::Gpu(e)) => {
+            matches!(e, GpuError::Limit { .. } | GpuError::OutOfMemory { .. } | GpuError::Lost { .. })
+        }
+        _ => false,
+    }
 }
 
 pub(super) fn work(gpu: &Gpu) -> DeviceWork {

@@ -6,6 +6,7 @@
 
 #[cfg_attr(not(feature = "gpu"), path = "absent.rs")]
 mod gpu;
+mod stages;
 
 use cutis_solver::{Settings, Solver, SolverReference, System};
 use cutis_solver_cpu::SolverCpu;
@@ -13,8 +14,10 @@ use cutis_solver_cpu::SolverCpu;
 use crate::Error;
 use crate::report::{Backend, DeviceWork, MemoryPart};
 use crate::scene::{BackendChoice, LoadedScene};
+use gpu::Gpu;
 
-pub(crate) use gpu::{ABSENT, Gpu, devices};
+pub(crate) use gpu::{ABSENT, devices};
+pub(crate) use stages::Stages;
 
 /// What a scene asks for, as far as it can be settled without a body.
 pub(crate) enum Request {
@@ -55,7 +58,13 @@ enum Place {
 pub(crate) struct Running {
     pub(crate) solver: Box<dyn Solver<f32>>,
     /// The device that it runs on; the stages after the simulation use it too.
-    pub(crate) gpu: Option<Gpu>,
+    device: Option<Metered>,
+}
+
+/// A device, and what it had done before this run.
+pub(crate) struct Metered {
+    gpu: Gpu,
+    before: DeviceWork,
 }
 
 impl Request {
@@ -122,11 +131,11 @@ impl Chosen {
     pub(crate) fn start(&self, system: System<f32>, settings: Settings) -> Result<Running, Error> {
         Ok(match &self.place {
             Place::Reference => {
-                Running { solver: Box::new(SolverReference::new(system, settings)?), gpu: None }
+                Running { solver: Box::new(SolverReference::new(system, settings)?), device: None }
             }
             Place::Cpu => {
                 let solver = SolverCpu::new(system, settings, Some(self.report.threads))?;
-                Running { solver: Box::new(solver), gpu: None }
+                Running { solver: Box::new(solver), device: None }
             }
             Place::Gpu(device) => gpu::start(device, system, settings)?,
         })
@@ -136,12 +145,30 @@ impl Chosen {
 impl Running {
     /// Where it runs, for the stages of the report.
     pub(crate) fn place(&self) -> &'static str {
-        if self.gpu.is_some() { "gpu" } else { "cpu" }
+        if self.device.is_some() { "gpu" } else { "cpu" }
     }
 
-    /// What the device did so far.
-    pub(crate) fn device_work(&self) -> Option<DeviceWork> {
-        self.gpu.as_ref().map(gpu::work)
+    /// The device without the body.
+    pub(crate) fn into_device(self) -> Option<Metered> {
+        self.device
+    }
+}
+
+impl Metered {
+    pub(crate) fn gpu(&self) -> Gpu {
+        self.gpu.clone()
+    }
+
+    /// What the device did for this run so far.
+    pub(crate) fn work(&self) -> DeviceWork {
+        let now = gpu::work(&self.gpu);
+        DeviceWork {
+            kernels: now.kernels - self.before.kernels,
+            submits: now.submits - self.before.submits,
+            dispatches: now.dispatches - self.before.dispatches,
+            readbacks: now.readbacks - self.before.readbacks,
+            readback_bytes: now.readback_bytes - self.before.readback_bytes,
+        }
     }
 }
 
