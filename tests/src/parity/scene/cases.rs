@@ -1,0 +1,126 @@
+//! The scenes of the outer ring.
+
+use std::path::{Path, PathBuf};
+
+use cutis::scene::{FormulationChoice, HandleSection, OutputSection, StcForm};
+use cutis::{LoadedScene, Override, Scene};
+
+use crate::parity::bench::{Effort, Failure};
+
+/// A scene with a name.
+pub struct Case {
+    pub name: String,
+    pub loaded: LoadedScene,
+}
+
+impl Case {
+    /// A scene of so many frames; of its outputs the deformed volume at most.
+    fn new(name: &str, mut loaded: LoadedScene, frames: u32, volume: bool) -> Self {
+        loaded.scene.run.frames = frames;
+        loaded.scene.run.checkpoint_every = frames;
+        loaded.scene.output =
+            OutputSection { volume, surface: false, tissue: false, pictures: false, report: false };
+        Self { name: name.into(), loaded }
+    }
+}
+
+/// The demo, an abdomen, a handle, and every kind alone and all together.
+pub fn all(effort: Effort) -> Result<Vec<Case>, Failure> {
+    let quick = effort == Effort::Quick;
+    let frames = if quick { 2 } else { 5 };
+    let (size, spacing) = if quick { ("[64, 64, 48]", "12.0") } else { ("[96, 96, 64]", "8.0") };
+    let phantom = format!("{{ size = {size}, seed = 1 }}");
+    let coarse =
+        [("volume.phantom", phantom.as_str()), ("lattice.spacing_mm", spacing), ("solver.substeps", "5")];
+    let mut cases = vec![
+        Case::new("demo, coarse", cutis::demo(&set(&coarse))?, frames, true),
+        Case::new("demo, coarse, PBD", pbd(cutis::demo(&set(&coarse))?), frames, false),
+        Case::new("demo, coarse, 3 iterations", iterated(cutis::demo(&set(&coarse))?), frames, false),
+        abdomen(quick, frames)?,
+        handle(frames)?,
+    ];
+    if effort == Effort::Full {
+        cases.push(Case::new("demo as it is", cutis::demo(&[])?, 40, true));
+    }
+    cases.extend(kinds(frames)?);
+    Ok(cases)
+}
+
+/// The cut abdomen of the CT, or of the phantom where there is no CT.
+fn abdomen(quick: bool, frames: u32) -> Result<Case, Failure> {
+    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
+    let data = PathBuf::from(std::env::var_os("CUTIS_TEST_DATA").unwrap_or_else(|| beside.into()));
+    let ct = data.join("ct/abdomen_ts_122x101x112.nii.gz");
+    if !ct.is_file() {
+        let loaded = fixture("phantom-small.toml", &[])?;
+        return Ok(Case::new("abdomen (phantom: no CT at hand)", loaded, frames, true));
+    }
+    let path = ct.to_string_lossy();
+    let spacing = if quick { "15.0" } else { "9.0" };
+    let overrides =
+        [("volume.path", path.as_ref()), ("lattice.spacing_mm", spacing), ("solver.substeps", "5")];
+    Ok(Case::new("abdomen of a CT, cut", fixture("abdomen-incision.toml", &overrides)?, frames, true))
+}
+
+/// Skin beside the incision is dragged up and sideways.
+fn handle(frames: u32) -> Result<Case, Failure> {
+    let mut loaded = fixture("phantom-small.toml", SMALL)?;
+    let (at_mm, move_mm) = ([-30.0, 105.0, 0.0], [0.0, 15.0, 5.0]);
+    loaded.scene.handle.push(HandleSection { at_mm, radius_mm: 30.0, move_mm, over_s: 0.05 });
+    Ok(Case::new("dragged handle", loaded, frames, false))
+}
+
+/// A body of some hundred vertices.
+const SMALL: &[(&str, &str)] = &[
+    ("volume.phantom", "{ size = [48, 48, 32], seed = 1 }"),
+    ("lattice.spacing_mm", "16.0"),
+    ("solver.substeps", "4"),
+    ("solver.gravity_m_s2", "[0.7, -9.81, 1.3]"),
+];
+
+/// Each kind alone and all together, in both formulations, under gravity so that each has something to do.
+fn kinds(frames: u32) -> Result<Vec<Case>, Failure> {
+    let mut cases = Vec::new();
+    for (formula, formulation) in [("XPBD", FormulationChoice::Xpbd), ("PBD", FormulationChoice::Pbd)] {
+        for (kind, kept) in [
+            ("distance", [true, false, false]),
+            ("volume", [false, true, false]),
+            ("skin tension", [false, false, true]),
+            ("all kinds", [true; 3]),
+        ] {
+            let mut loaded = fixture("phantom-small.toml", SMALL)?;
+            loaded.scene.solver.formulation = formulation;
+            let constraints = &mut loaded.scene.constraints;
+            constraints.distance = constraints.distance.take().filter(|_| kept[0]);
+            constraints.volume = constraints.volume.take().filter(|_| kept[1]);
+            constraints.stc = constraints.stc.take().filter(|_| kept[2]);
+            cases.push(Case::new(&format!("{kind}, {formula}"), loaded, frames, false));
+        }
+    }
+    let mut loaded = pbd(fixture("phantom-small.toml", SMALL)?);
+    if let Some(stc) = &mut loaded.scene.constraints.stc {
+        (stc.form, stc.stiffness) = (StcForm::Paper, 0.5);
+    }
+    (loaded.scene.constraints.distance, loaded.scene.constraints.volume) = (None, None);
+    cases.push(Case::new("skin tension of the paper, PBD", loaded, frames, false));
+    Ok(cases)
+}
+
+fn pbd(mut loaded: LoadedScene) -> LoadedScene {
+    loaded.scene.solver.formulation = FormulationChoice::Pbd;
+    loaded
+}
+
+fn iterated(mut loaded: LoadedScene) -> LoadedScene {
+    (loaded.scene.solver.substeps, loaded.scene.solver.iterations) = (2, 3);
+    loaded
+}
+
+fn fixture(name: &str, overrides: &[(&str, &str)]) -> Result<LoadedScene, Failure> {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/scenes"));
+    Ok(Scene::load(&folder.join(name), &set(overrides))?)
+}
+
+fn set(overrides: &[(&str, &str)]) -> Vec<Override> {
+    overrides.iter().map(|&(key, value)| Override { key: key.into(), value: value.into() }).collect()
+}

@@ -1,0 +1,16 @@
+//! The outer ring: whole runs of the pipeline on both backends, and long runs by what they must preserve.
+
+mod cases;
+mod checkpoint;
+mod long;
+mod pipeline;
+
+use super::bench::{Bench, Failure};
+
+/// Runs the ring.
+pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
+    for case in cases::all(bench.effort)? {
+        pipeline::compare(bench, &case)?;
+    }
+    long::run(bench)
+}
