@@ -32,8 +32,9 @@ struct Difference {
 }
 
 impl Difference {
-    /// What single precision may change: about ten times what it changes on Mesa's software driver.
-    const ALLOWED: Self = Self { mean: 0.002, far: 0.0005 };
+    /// What single precision may change: more than twice what it changes on Mesa's software driver, where two pixels of
+    /// a picture are at a tie.
+    const ALLOWED: Self = Self { mean: 0.005, far: 0.0005 };
 
     fn between(a: &Image, b: &Image) -> Self {
         assert_eq!((a.width, a.height), (b.width, b.height));
@@ -59,7 +60,7 @@ fn volume(grid: Grid, hu: impl Fn(Point3<f64>) -> f64) -> Volume {
     Volume::new(grid, voxels, 1.0, 0.0).unwrap()
 }
 
-/// A person of 5 mm voxels, and the same with an incision held open, with the depth that its tissue had at rest.
+/// A person of 5 × 5 × 6 mm voxels, and the same with an incision held open, with the depth that its tissue had at rest.
 struct Person {
     whole: Volume,
     wounded: Volume,
@@ -69,7 +70,7 @@ struct Person {
 
 impl Person {
     fn new() -> Self {
-        let phantom = Phantom::new([80, 80, 80], 3).unwrap();
+        let phantom = Phantom::new([80, 80, 50], 3).unwrap();
         let whole = phantom.volume().unwrap();
         let depth = skin_depth(&whole, -300.0, 4.0, 30.0).unwrap();
         let (from, to) = phantom.incision_site();
@@ -140,7 +141,16 @@ fn a_wound_looks_the_same() {
     let Some(gpu) = open(&GpuOptions::default()) else { return };
     let person = Person::new();
     let wound = person.wound();
+    // The same depths on a coarser grid with other axes.
+    let rows =
+        [[0.0, 9.0, -3.0, -200.0], [7.0, 1.0, 0.0, -230.0], [1.0, 0.0, 12.0, -260.0], [0.0, 0.0, 0.0, 1.0]];
+    let grid = Grid { shape: [60, 60, 50], affine: Affine::from_rows(rows).unwrap() };
+    let depth_at =
+        |v: usize| person.depth.trilinear(person.depth.grid().affine.to_index(grid.mm(grid.point(v))));
+    let coarse = (0..grid.len()).map(|v| (50.0 * depth_at(v) + 200.0) as i16).collect();
+    let coarse = Volume::new(grid, coarse, 0.02, -4.0).unwrap();
     let cases = [
+        ("depth on another grid", &person.wounded, View { depth: Some(&coarse), ..wound }),
         ("from the front", &person.wounded, View { side: Side::Anterior, ..wound }),
         ("turned", &person.wounded, wound),
         ("all and clipped", &person.wounded, View { focus: None, clip: &CLIP, ..wound }),
@@ -255,9 +265,12 @@ fn a_raymarcher_serves_many_views_from_one_upload() {
     assert_eq!(made(after), made(before));
     assert_eq!(after.readbacks - before.readbacks, 4, "one for each picture of one ray per pixel");
     // Another depth replaces the first.
-    let shallow = Volume::new(*person.depth.grid(), vec![0; person.depth.grid().len()], 1.0, 0.0).unwrap();
+    let shallow = vec![100; person.depth.voxels().len()];
+    let shallow = Volume::new(*person.depth.grid(), shallow, person.depth.slope(), 0.0).unwrap();
+    let flat = View { depth: Some(&shallow), ..wound };
     let deep = raymarcher.render(&wound).unwrap();
-    assert_ne!(raymarcher.render(&View { depth: Some(&shallow), ..wound }).unwrap(), deep);
+    assert_ne!(raymarcher.render(&flat).unwrap(), deep);
+    assert_eq!(raymarcher.render(&flat).unwrap(), raymarch_gpu(&gpu, &person.wounded, &flat).unwrap());
     assert_eq!(gpu.counters().texture_bytes, before.texture_bytes);
     assert_eq!(raymarcher.render(&wound).unwrap(), deep);
 }
