@@ -50,9 +50,14 @@ impl Deviation {
 /// How many times as much as the CPU in `f32` a device may deviate from `f64`.
 pub const ALLOWANCE: f64 = 4.0;
 
+/// The least that the CPU is taken to deviate, in ulp: where it is exact by luck, a device still divides to 2.5 ulp and takes
+/// square roots by two such operations (Vulkan 1.3, "Precision and Operation of SPIR-V Instructions").
+const FLOOR: f64 = 2.0;
+
 /// What a device may deviate where the CPU deviates by `cpu`; an ulp is `ulp`.
 pub(crate) fn tolerance(cpu: Deviation, ulp: f64) -> Deviation {
-    Deviation { worst: ALLOWANCE * cpu.worst.max(ulp), rms: ALLOWANCE * cpu.rms.max(ulp) }
+    let of = |cpu: f64| ALLOWANCE * largest(cpu, FLOOR * ulp);
+    Deviation { worst: of(cpu.worst), rms: of(cpu.rms) }
 }
 
 /// How many times the tolerance a deviation is.

@@ -1,7 +1,7 @@
 //! The checks on a GPU, and which GPU.
 //!
 //! A device may deviate from `f64` at most [`ALLOWANCE`] times as much as the CPU does in `f32`, in the worst case and in the root mean
-//! square, with an ulp as the least that the CPU is taken to deviate. So the tolerance is not chosen, but follows from the formula.
+//! square, with two ulp as the least that the CPU is taken to deviate. So the tolerance is not chosen, but follows from the formula.
 //! On a software adapter, which rounds as the CPU does, every number must be equal.
 
 mod degenerate;
