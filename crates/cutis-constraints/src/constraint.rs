@@ -80,7 +80,9 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 /// `grad: array<vec3f, N>`) stand above it already. With the operations `+ − * /`, `sqrt`, `dot`, `cross`, `length`, `abs`,
 /// `floor`, `clamp`, `min`, `max` and `select`, in the same order as in Rust, a software device gives the bits of the CPU.
 /// `normalize`, `mix`, `fma`, `pow` and the transcendental functions differ. A denominator that may be zero is replaced by
-/// `select` before the division. The battery of the crate `cutis-conformance` holds one against the other.
+/// `select` before the division. Drivers turn `a·b + a·c` into `a·(b + c)`: where a sum of products shares a factor, take it out
+/// in both languages, or put the terms through `exact` (a scalar) or `exact3` (a vector), which return what they are given and
+/// which no optimiser sees through. The battery of the crate `cutis-conformance` holds one against the other.
 ///
 /// # Example
 /// A constraint of one's own: a point that should stay on the plane `z = height`.
