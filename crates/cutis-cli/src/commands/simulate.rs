@@ -70,6 +70,15 @@ fn place(backend: &Backend) -> String {
     }
 }
 
+/// Backend, reason, and threads where they do the work.
+fn running_on(backend: &Backend) -> String {
+    let threads = match backend.adapter {
+        Some(_) => String::new(),
+        None => format!(", {} threads", backend.threads),
+    };
+    format!("{} ({}){threads}", place(backend), backend.reason)
+}
+
 pub(crate) fn check(
     scene: &Path,
     change: &Change,
@@ -86,12 +95,7 @@ fn table(plan: &Plan) -> String {
     let sizes = &plan.sizes;
     let [nx, ny, nz] = sizes.lattice;
     let mut lines = vec![
-        format!(
-            "backend          {} ({}), {} threads",
-            place(&plan.backend),
-            plan.backend.reason,
-            plan.backend.threads
-        ),
+        format!("backend          {}", running_on(&plan.backend)),
         format!("lattice          {nx} x {ny} x {nz}"),
         format!(
             "vertices         {} ({} fixed, {} cut out)",
@@ -107,11 +111,13 @@ fn table(plan: &Plan) -> String {
         let colors = plan.colors.get(&part.part).map(|n| format!(", {n} colours")).unwrap_or_default();
         lines.push(format!("memory, {:8} {:.1} MB{colors}", part.part, part.bytes as f64 / 1e6));
     }
-    lines.extend(
-        plan.device_memory
-            .iter()
-            .map(|part| format!("on the GPU, {:5} {:.1} MB", part.part, part.bytes as f64 / 1e6)),
-    );
+    for part in &plan.device_memory {
+        lines.push(format!("GPU, {:11} {:.1} MB", part.part, part.bytes as f64 / 1e6));
+    }
+    if !plan.device_memory.is_empty() {
+        let parts: Vec<&str> = plan.device_memory.iter().map(|part| part.part.as_str()).collect();
+        lines.push(format!("GPU, kernels     for {}", parts.join(", ")));
+    }
     lines.push("left out:".into());
     lines.extend(plan.left_out.iter().map(|line| format!("  {line}")));
     lines.extend(plan.warnings.iter().map(|line| format!("note: {line}")));

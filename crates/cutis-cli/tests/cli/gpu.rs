@@ -111,11 +111,15 @@ fn a_run_on_a_gpu_says_where_it_ran() {
 
     let check = desk.cutis(&["check", "scene.toml", "--backend", "gpu", "--adapter", "0"]).expect_success();
     assert!(check.stdout.contains(&format!("gpu: {name}")), "{}", check.stdout);
-    assert!(check.stdout.contains("on the GPU, stc"), "{}", check.stdout);
+    assert!(
+        check.stdout.contains("GPU, stc") && check.stdout.contains("kernels     for vertices, distance"),
+        "{}",
+        check.stdout
+    );
     assert!(!check.stdout.contains("gpu: no device"), "{}", check.stdout);
 
-    let call = ["run", "scene.toml", "--backend", "gpu", "--adapter", &part, "--out", "run", "--json"];
-    let report = parsed(desk.cutis(&call));
+    let call = "run scene.toml --backend gpu --out run --json --set output={report=true} --adapter";
+    let report = parsed(desk.cutis(&[&words(call)[..], &[&part]].concat()));
     assert_eq!((&report["backend"]["name"], &report["backend"]["adapter"]), (&"gpu".into(), &name.into()));
     for key in ["adapter_kind", "driver", "reason"] {
         assert!(report["backend"][key].as_str().is_some_and(|text| !text.is_empty()), "{key}: {report}");
@@ -176,7 +180,10 @@ fn nobody_looks_for_a_gpu_unasked() {
         assert!(!speaks(call), "{call}");
     }
     if cfg!(target_os = "linux") {
-        assert!(speaks("devices") && speaks("run scene.toml --backend gpu --out gpu"), "the control");
+        assert!(
+            speaks("devices") && speaks("run scene.toml --backend gpu --set output={} --out gpu"),
+            "the control"
+        );
     }
     let printed = parsed(desk.cutis(&["check", "scene.toml", "--json"]));
     assert_eq!(printed["backend"]["name"], "cpu");
