@@ -1,5 +1,6 @@
 //! The result as JSON: every row, and what it was found with.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 use std::process::Command;
@@ -27,7 +28,7 @@ pub struct Document<'a> {
     commit: Option<String>,
     machine: Machine,
     settings: &'a Options,
-    environment: Vec<(&'static str, String)>,
+    environment: BTreeMap<&'static str, String>,
     adapters: Vec<AdapterEntry>,
     /// Whether every row is what it had to be.
     pub passed: bool,

@@ -15,14 +15,14 @@ use serde::Serialize;
 #[derive(Clone, Debug, Default, Parser, Serialize)]
 #[command(name = "parity", bin_name = "cargo xtask parity")]
 pub struct Options {
-    /// Fewer frames and smaller scenes: about a minute.
+    /// Fewer frames and smaller scenes: about half a minute on two cores.
     #[arg(long)]
     pub quick: bool,
     /// Also the demo as it is, which takes long on a software adapter.
     #[arg(long, conflicts_with = "quick")]
     pub full: bool,
     /// Instead of the rings: one step of a lattice of 129 × 129 × 289 vertices with three kinds of constraints, within
-    /// WebGPU's baseline limits. Needs about 8 GiB of memory.
+    /// WebGPU's baseline limits. Needs about 3 GiB of memory, on a software adapter for both sides together.
     #[arg(long, conflicts_with_all = ["quick", "full", "chunk_cap"])]
     pub full_size: bool,
     /// Write all rows to this file.

@@ -157,6 +157,7 @@ fn least(figures: &Figures) -> String {
 fn number(value: f64) -> String {
     match value.abs() {
         0.0 => "0".into(),
+        1.0..1e15 if value.fract() == 0.0 => format!("{value:.0}"),
         1e-3..1e6 => format!("{}", (value * 1e4).round() / 1e4),
         _ => format!("{value:.1e}"),
     }

@@ -97,7 +97,7 @@ impl Body {
         for (n, vertex) in vertices.iter_mut().enumerate() {
             let phase = n as f32 * 0.7;
             let push = Vector3::new(phase.sin(), (1.3 * phase).cos(), (2.1 * phase).sin());
-            vertex.set_position(vertex.position() + push * (0.1 * STEP as f32));
+            vertex.set_position(vertex.position() + push * (0.2 * STEP as f32));
         }
         Ok(Self { simulation, vertices, extent: plan.extent() })
     }
