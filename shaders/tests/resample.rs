@@ -64,5 +64,5 @@ fn invalid_sources_are_seen() {
     };
     assert!(broken(resample::claim(), "tet.rounding", "tet.roundings"));
     assert!(broken(resample::gather(), "texture_3d<i32>", "texture_2d<i32>"));
-    assert!(broken(resample::span(), "vec2u(0u, rest", "vec3u(0u, rest"));
+    assert!(broken(resample::span(), "vec2u(0u, left)", "vec3u(0u, left)"));
 }

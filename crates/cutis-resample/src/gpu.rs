@@ -3,10 +3,10 @@
 //! The passes of a frame, all of them over items that do not depend on each other's order:
 //!
 //! 1. `place`: positions of the vertices → places among the voxels.
-//! 2. `span`: the slices that each tet comes near, now and (if it moved) at rest. A slab's passes look at every tet and skip
-//!    those of other slabs after four bytes. A sort of tets by slab would spare that, but needs counts, sums and a second copy
-//!    of the list in every frame; within WebGPU's baseline 128 MiB of owners are a slab, so even 512 × 512 × 1152 voxels are
-//!    nine.
+//! 2. `span`: the slices that each tet comes near, now and (if it moved) at rest, and those that a chunk of tets comes near. A
+//!    slab's passes skip a chunk that does not touch it, and look at every tet of one that does, skipping those of other slabs
+//!    after four bytes. A sort of tets by slab would spare that, but needs counts, sums and a second copy of the list in every
+//!    frame; within WebGPU's baseline 128 MiB of owners are a slab, so even 512 × 512 × 1152 voxels are nine.
 //! 3. For each slab `claim`: a thread per tet walks the voxels of its box, and `atomicMin` on the owner of each that it holds or
 //!    comes near lets the tet with the smallest key win. A tet with a large box goes on a list instead, and the threads of a
 //!    workgroup share its rows.

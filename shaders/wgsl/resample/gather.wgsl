@@ -1,6 +1,6 @@
 // Each voxel of the slab takes its value: through its owner, air where the body has gone, else what it was. A thread fills two
-// voxels, the halves of one word. One dispatch serves the voxels that the tets of its chunk own; the one of the first chunk
-// serves those without an owner too.
+// voxels, the halves of one word. One dispatch serves the voxels that the tets of its chunk own, if those touch the slab; the one
+// of the first chunk serves the voxels without an owner too.
 @group(0) @binding(0) var<uniform> grid: Grid;
 @group(0) @binding(1) var<uniform> slab: Slab;
 @group(0) @binding(2) var<storage, read> owners: array<u32>;
@@ -8,6 +8,7 @@
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> values: array<u32>;
 @group(0) @binding(6) var source: texture_3d<i32>;
+@group(0) @binding(7) var<storage, read> reaches: array<vec2u>;
 @group(1) @binding(0) var<uniform> chunk: Chunk;
 @group(1) @binding(1) var<storage, read> tets: array<vec4u>;
 @group(1) @binding(2) var<storage, read> places: array<vec4f>;
@@ -98,7 +99,10 @@ fn gather(
     var moved = 0u;
     var vacated = 0u;
     var folds = 0u;
-    for (var pair = id.x; pair < (slab.voxels + 1u) / 2u; pair += groups.x * 64u) {
+    let reach = reaches[chunk.list];
+    let serves = chunk.first == 0u || touches(slab, reach.x, reach.y);
+    let pairs = select(0u, (slab.voxels + 1u) / 2u, serves);
+    for (var pair = id.x; pair < pairs; pair += groups.x * 64u) {
         var word = values[pair];
         for (var half = 0u; half < 2u; half++) {
             let voxel = 2u * pair + half;

@@ -44,6 +44,11 @@ struct Chunk {
     list: u32,
 }
 
+// True if slices `first..end` touch the slab.
+fn touches(slab: Slab, first: u32, end: u32) -> bool {
+    return first < slab.first + slab.slices && end > slab.first;
+}
+
 fn is_finite(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
 }

@@ -1,9 +1,12 @@
 // The slices that each tet comes near, as it is now and, if it moved, as it was at rest: what lets the passes over a slab skip
-// the tets of others after reading four bytes.
+// the tets of others after reading four bytes. And the slices that all tets of a chunk come near together, which lets them skip
+// whole chunks.
 @group(0) @binding(0) var<uniform> grid: Grid;
 @group(0) @binding(1) var<storage, read> places: array<vec4f>;
 @group(0) @binding(2) var<storage, read> rest_places: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> counters: array<atomic<u32>>;
+// For each list of large tets, that is for each walk over a chunk: first slice and end.
+@group(0) @binding(4) var<storage, read_write> reaches: array<atomic<u32>>;
 @group(1) @binding(0) var<uniform> chunk: Chunk;
 @group(1) @binding(1) var<storage, read> tets: array<vec4u>;
 @group(1) @binding(2) var<storage, read_write> spans: array<vec2u>;
@@ -46,6 +49,18 @@ fn is_inverted(corners: vec4u) -> bool {
     return is_finite(now) && is_finite(before) && now * select(1.0, -1.0, before < 0.0) <= 0.0;
 }
 
+// Widens the reach of a list by a span. Looking first keeps most threads from waiting for each other.
+fn widen(list: u32, span: u32) {
+    let first = span & 0xffffu;
+    let end = span >> 16u;
+    if end > 0u && first < atomicLoad(&reaches[2u * list]) {
+        atomicMin(&reaches[2u * list], first);
+    }
+    if end > atomicLoad(&reaches[2u * list + 1u]) {
+        atomicMax(&reaches[2u * list + 1u], end);
+    }
+}
+
 @compute @workgroup_size(64)
 fn span(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var t = id.x; t < chunk.count; t += groups.x * 64u) {
@@ -61,7 +76,10 @@ fn span(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
                 atomicAdd(&counters[0], 1u);
             }
         }
-        spans[t] = vec2u(span_of(a.xyz, b.xyz, c.xyz, d.xyz), left);
+        let now = span_of(a.xyz, b.xyz, c.xyz, d.xyz);
+        spans[t] = vec2u(now, left);
+        widen(chunk.list, now);
+        widen(chunk.list + 1u, left);
     }
 }
 
@@ -69,6 +87,8 @@ fn span(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
 @compute @workgroup_size(64)
 fn span_removed(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var t = id.x; t < chunk.count; t += groups.x * 64u) {
-        spans[t] = vec2u(0u, rest_span_of(tets[t]));
+        let left = rest_span_of(tets[t]);
+        spans[t] = vec2u(0u, left);
+        widen(chunk.list, left);
     }
 }

@@ -8,6 +8,8 @@
 @group(0) @binding(2) var<storage, read_write> marks: array<atomic<u32>>;
 // Lengths of the lists, then the one that is in use: numbers of tets in their chunk.
 @group(0) @binding(3) var<storage, read_write> large: array<atomic<u32>>;
+// First slice and end of all that a list's tets come near.
+@group(0) @binding(5) var<storage, read> reaches: array<vec2u>;
 @group(1) @binding(0) var<uniform> chunk: Chunk;
 @group(1) @binding(1) var<storage, read> tets: array<vec4u>;
 @group(1) @binding(2) var<storage, read> spans: array<vec2u>;
@@ -20,10 +22,6 @@ const LARGE: u32 = 1024u;
 // Words of one plane of `marks`.
 fn plane() -> u32 {
     return (slab.voxels + 31u) / 32u;
-}
-
-fn touches_slab(span: u32) -> bool {
-    return (span & 0xffffu) < slab.first + slab.slices && (span >> 16u) > slab.first;
 }
 
 // The part of a tet's box in this slab, which it touches.
@@ -81,8 +79,13 @@ fn is_left_to_others(t: u32, covered: Box) -> bool {
 
 @compute @workgroup_size(64)
 fn walk(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let reach = reaches[chunk.list];
+    if !touches(slab, reach.x, reach.y) {
+        return;
+    }
     for (var t = id.x; t < chunk.count; t += groups.x * 64u) {
-        if !touches_slab(span_of(t)) {
+        let span = span_of(t);
+        if !touches(slab, span & 0xffffu, span >> 16u) {
             continue;
         }
         let covered = box_in_slab(tets[t]);

@@ -129,9 +129,10 @@ impl BoundSlab {
         };
         let slab = gpu.uniform("resample: slab", &slab)?;
         let values = gpu.zeroed("resample: values", voxels.div_ceil(2))?;
-        let Memory { grid, owners, marks, large, counters, source, .. } = memory;
+        let Memory { grid, owners, marks, large, reaches, counters, source, .. } = memory;
         let clear = [(0, slab.whole()), (1, owners.whole()), (2, marks.whole()), (3, large.whole())];
         let vacate = [(0, grid.whole()), (1, slab.whole()), (2, marks.whole()), (3, large.whole())];
+        let reaches = reaches.whole();
         let claim = [vacate.as_slice(), &[(4, owners.whole())]].concat();
         let gather = [
             (0, grid.whole()),
@@ -141,13 +142,14 @@ impl BoundSlab {
             (4, counters.whole()),
             (5, values.whole()),
             (6, source.whole()),
+            (7, reaches.clone()),
         ];
         Ok(Self {
             voxels,
             counts,
             clear: gpu.bind(&kernels.clear, 0, &clear)?,
-            claim: kernels.claim.slab(gpu, &claim)?,
-            vacate: kernels.vacate.slab(gpu, &vacate)?,
+            claim: kernels.claim.slab(gpu, &claim, reaches.clone())?,
+            vacate: kernels.vacate.slab(gpu, &vacate, reaches)?,
             gather: gpu.bind(&kernels.gather, 0, &gather)?,
             values,
         })

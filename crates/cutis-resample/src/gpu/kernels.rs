@@ -53,9 +53,18 @@ impl Walk {
         })
     }
 
-    /// Group 0, what belongs to the slab.
-    pub fn slab(&self, gpu: &Gpu, bindings: &[(u32, Binding<'_>)]) -> Result<WalkGroups, GpuError> {
-        Ok(WalkGroups { all: gpu.bind(&self.all, 0, bindings)?, large: gpu.bind(&self.large, 0, bindings)? })
+    /// Group 0, what belongs to the slab: `bindings` without the reaches, which large tets have behind them.
+    pub fn slab<'a>(
+        &self,
+        gpu: &Gpu,
+        bindings: &[(u32, Binding<'a>)],
+        reaches: Binding<'a>,
+    ) -> Result<WalkGroups, GpuError> {
+        let with_reaches = [bindings, &[(5, reaches)]].concat();
+        Ok(WalkGroups {
+            all: gpu.bind(&self.all, 0, &with_reaches)?,
+            large: gpu.bind(&self.large, 0, bindings)?,
+        })
     }
 
     /// Group 1, the tets: `bindings` without the spans, which large tets have behind them.

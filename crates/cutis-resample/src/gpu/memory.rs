@@ -18,6 +18,9 @@ const TETS_PER_PLACE: usize = 8;
 /// Counts of a slab: covered, moved, vacated and folded voxels.
 pub const COUNTS: usize = 4;
 
+/// The reach of no tets.
+pub const NO_REACH: [u32; 2] = [u32::MAX, 0];
+
 /// How tets and slices are split.
 pub struct Plan {
     /// Most tets in a buffer.
@@ -68,6 +71,8 @@ pub struct Memory {
     pub marks: Buffer<u32>,
     /// Lengths of the lists of large tets, then the list in use.
     pub large: Buffer<u32>,
+    /// For each of these lists: first slice and end of all that its tets come near.
+    pub reaches: Buffer<[u32; 2]>,
     /// Inverted tets, then [`COUNTS`] for each slab.
     pub counters: Buffer<u32>,
 }
@@ -83,16 +88,17 @@ impl Memory {
             owners: gpu.zeroed("resample: owners", plan.slab_voxels)?,
             marks: gpu.zeroed("resample: marks", mark_words(plan.slab_voxels))?,
             large: gpu.zeroed("resample: large tets", plan.lists() + plan.listed)?,
+            reaches: gpu.buffer("resample: reaches", &vec![NO_REACH; plan.lists()])?,
             counters: gpu.zeroed("resample: counters", 1 + COUNTS * plan.slabs.len())?,
         })
     }
 
     /// Bytes of all of it.
     pub fn bytes(&self) -> u64 {
-        let Self { source, grid, rest, rest_places, places, owners, marks, large, counters } = self;
+        let Self { source, grid, rest, rest_places, places, owners, marks, large, reaches, counters } = self;
         let volume = source.shape().iter().product::<usize>() as u64 * size_of::<i16>() as u64;
         let vertices = rest.bytes() + rest_places.bytes() + places.bytes();
         let slab = owners.bytes() + marks.bytes() + large.bytes();
-        volume + vertices + slab + grid.bytes() + counters.bytes()
+        volume + vertices + slab + grid.bytes() + reaches.bytes() + counters.bytes()
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::bound::{BoundSlab, RemovedChunk, TetChunk};
 use super::kernels::Kernels;
-use super::memory::{COUNTS, Memory, Plan};
+use super::memory::{COUNTS, Memory, NO_REACH, Plan};
 use super::setup::{ResamplerOptions, Setup, relative};
 use super::state::{SlabState, mark_words, report};
 use crate::report::ResampleReport;
@@ -82,8 +82,14 @@ impl ResamplerGpu {
             BoundSlab::new(gpu, &kernels, &memory, number, slices, setup.slice_voxels(), plan.lists())
         };
         let slabs = plan.slabs.iter().enumerate().map(bind_slab).collect::<Result<Vec<_>, _>>()?;
-        let Memory { grid, places, rest_places, counters, .. } = &memory;
-        let mesh = [(0, grid.whole()), (1, places.whole()), (2, rest_places.whole()), (3, counters.whole())];
+        let Memory { grid, places, rest_places, counters, reaches, .. } = &memory;
+        let mesh = [
+            (0, grid.whole()),
+            (1, places.whole()),
+            (2, rest_places.whole()),
+            (3, counters.whole()),
+            (4, reaches.whole()),
+        ];
         let resampler = Self {
             span_mesh: gpu.bind(&kernels.span, 0, &mesh)?,
             gpu: gpu.clone(),
@@ -131,7 +137,9 @@ impl ResamplerGpu {
         if positions.len() < self.memory.rest.len() {
             return self.check_count(positions.len());
         }
-        self.gpu.write(&self.memory.counters, 0, &vec![0; self.memory.counters.len()])?;
+        let Memory { counters, reaches, .. } = &self.memory;
+        self.gpu.write(counters, 0, &vec![0; counters.len()])?;
+        self.gpu.write(reaches, 0, &vec![NO_REACH; 2 * self.chunks.len()])?;
         for slab in 0..self.slabs.len() {
             let mut pass = self.gpu.pass("resample");
             if slab == 0 {
@@ -215,11 +223,15 @@ impl ResamplerGpu {
 
     /// Places at rest, and the spans of removed tets.
     fn rest(&self) -> Result<(), GpuError> {
-        let Memory { grid, rest, rest_places, .. } = &self.memory;
+        let Memory { grid, rest, rest_places, reaches, .. } = &self.memory;
         let Kernels { place, span_removed, .. } = &self.kernels;
         let positions = [(0, grid.whole()), (1, rest.whole()), (2, rest.whole()), (3, rest_places.whole())];
         let positions = self.gpu.bind(place, 0, &positions)?;
-        let mesh = self.gpu.bind(span_removed, 0, &[(0, grid.whole()), (2, rest_places.whole())])?;
+        let mesh = self.gpu.bind(
+            span_removed,
+            0,
+            &[(0, grid.whole()), (2, rest_places.whole()), (4, reaches.whole())],
+        )?;
         let mut pass = self.gpu.pass("resample: at rest");
         pass.dispatch(place, &[&positions], self.threads(rest.len()));
         for chunk in &self.removed {

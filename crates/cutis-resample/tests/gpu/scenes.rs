@@ -122,6 +122,14 @@ pub fn almost_whole_voxels() -> Scene {
         .moved(|p| p + x * 3.000048 + y * 2.000032 + z * 1.000016)
 }
 
+/// A body that goes to slices where it was not, in a slab of its own each.
+pub fn gone() -> Scene {
+    let affine = Affine::from_spacing([1.0, 0.8, 1.2], [0.0, -3.0, 9.0]).expect("invertible");
+    let grid = Grid { shape: [13, 12, 21], affine };
+    let mesh = lattice(&grid, [3; 3], [1.0, 2.0, 1.0], [11.0, 10.0, 5.5]);
+    Scene::new("gone", noise(grid, 11), mesh).moved(|p| Point3::new(p.x, p.y + 0.0003, p.z + 0.0171))
+}
+
 /// Scenes that the CPU's resampling is fit for. Its tolerance grows with the farthest vertex, so [`far`] is none of them.
 pub fn near() -> Vec<Scene> {
     vec![
@@ -131,6 +139,7 @@ pub fn near() -> Vec<Scene> {
         padded(),
         thrown(),
         almost_whole_voxels(),
+        gone(),
     ]
 }
 
