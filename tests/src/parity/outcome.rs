@@ -16,6 +16,11 @@ pub enum Ring {
     Kernel,
     /// Whole runs.
     Scene,
+    /// What a long run must keep, on any device: momentum, energy.
+    Invariant,
+    /// What the device computes in `f32` and the CPU in `f64`: near, not equal. The same passes are equal to their `f32` twins
+    /// in the ring of kernels.
+    Oracle,
     /// The largest lattice, once.
     FullSize,
 }
@@ -27,6 +32,8 @@ impl Ring {
             Self::Op => "op",
             Self::Kernel => "kernel",
             Self::Scene => "scene",
+            Self::Invariant => "invariant",
+            Self::Oracle => "oracle",
             Self::FullSize => "full-size",
         }
     }

@@ -24,7 +24,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     let looked_at = view([x, y, z]);
     let expected = raymarch(&phantom, &looked_at)?;
     let measure = |gpu: &Gpu, view: &View<'_>| Ok(compared(&raymarch_gpu(gpu, &phantom, view)?, &expected));
-    bench.compare(Ring::Kernel, name, |gpu, _| measure(gpu, &looked_at))?;
+    bench.compare(Ring::Oracle, name, |gpu, _| measure(gpu, &looked_at))?;
     let (sin, cos) = 1f64.to_radians().sin_cos();
     let controls = [
         ("turned by 1 degree", view([x * cos + y * sin, y * cos - x * sin, z])),
@@ -32,7 +32,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
         ("occlusion 2 mm shorter", View { occlusion_mm: looked_at.occlusion_mm - 2.0, ..looked_at }),
     ];
     for (what, view) in &controls {
-        bench.control(Ring::Kernel, name, what, |gpu, _| measure(gpu, view))?;
+        bench.control(Ring::Oracle, name, what, |gpu, _| measure(gpu, view))?;
     }
     Ok(())
 }

@@ -70,15 +70,15 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     }
 
     let name = format!("{of}: momentum");
-    bench.compare(Ring::Scene, &name, |gpu, _| Ok(on_gpu(gpu, SETTINGS)?.momentum()))?;
-    bench.control(Ring::Scene, &name, push, |gpu, _| Ok(on_gpu(gpu, pushed)?.momentum()))?;
-    bench.control(Ring::Scene, &name, "one gradient × 1.001", |gpu, _| {
+    bench.compare(Ring::Invariant, &name, |gpu, _| Ok(on_gpu(gpu, SETTINGS)?.momentum()))?;
+    bench.control(Ring::Invariant, &name, push, |gpu, _| Ok(on_gpu(gpu, pushed)?.momentum()))?;
+    bench.control(Ring::Invariant, &name, "one gradient × 1.001", |gpu, _| {
         Ok(ran(&mut wrong::<LOPSIDED>(gpu)?, frames)?.momentum())
     })?;
 
     let name = format!("{of}: energy");
-    bench.compare(Ring::Scene, &name, |gpu, _| Ok(on_gpu(gpu, SETTINGS)?.energy()))?;
-    bench.control(Ring::Scene, &name, "rest lengths × 1.2", |gpu, _| {
+    bench.compare(Ring::Invariant, &name, |gpu, _| Ok(on_gpu(gpu, SETTINGS)?.energy()))?;
+    bench.control(Ring::Invariant, &name, "rest lengths × 1.2", |gpu, _| {
         Ok(ran(&mut wrong::<OVERLONG>(gpu)?, frames)?.energy())
     })
 }

@@ -67,12 +67,12 @@ pub fn compare(bench: &mut Bench<'_, '_>, case: &Case) -> Result<(), Failure> {
 
     let (Some(found), Some(expected_volume)) = (&found, &expected.volume) else { return Ok(()) };
     let name = format!("{}: deformed volume", case.name);
-    bench.compare(Ring::Scene, &name, |_, policy| {
+    bench.compare(Ring::Oracle, &name, |_, policy| {
         let volume = found.volume.as_ref().ok_or("the run left no volume")?;
         let alike = policy == Policy::Exact && found.resampled_on_cpu;
         Ok(voxels(volume.voxels(), expected_volume.voxels(), alike))
     })?;
-    bench.control(Ring::Scene, &name, "shifted by a voxel", |_, policy| {
+    bench.control(Ring::Oracle, &name, "shifted by a voxel", |_, policy| {
         let volume = found.volume.as_ref().ok_or("the run left no volume")?;
         let mut shifted = volume.voxels().to_vec();
         shifted.rotate_left(1);
