@@ -19,6 +19,7 @@
 mod backend;
 mod body;
 mod checkpoint;
+mod clock;
 mod demo;
 mod devices;
 mod dynamics;

@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 
 use crate::backend::{self, Chosen, Request, Work};
 use crate::body::{Body, needs_skin};
+use crate::clock::Clock;
 use crate::dynamics::{self, Dynamics};
-use crate::report::{Backend, Clock, MemoryPart, Sizes, Stage};
+use crate::report::{Backend, MemoryPart, Sizes, Stage};
 use crate::scene::LoadedScene;
 use crate::source::{self, Source};
 use crate::{Error, Progress};

@@ -6,11 +6,12 @@ use cutis_mesh::WoundGape;
 
 use crate::backend::{Metered, Request, Stages};
 use crate::checkpoint::{self, Checkpoint};
+use crate::clock::Clock;
 use crate::files::RunFolder;
 use crate::frames::{Course, Finish, earlier_frames, frame_times, frames_csv};
 use crate::output::{self, Outcome};
 use crate::plan::{self, Prepared};
-use crate::report::{Clock, KindResidual, Machine, Report, SCHEMA, Wound};
+use crate::report::{KindResidual, Machine, Report, SCHEMA, Wound};
 use crate::scene::LoadedScene;
 use crate::{Error, Progress, files};
 

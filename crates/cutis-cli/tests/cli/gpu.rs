@@ -118,6 +118,11 @@ fn a_run_on_a_gpu_says_where_it_ran() {
     );
     assert!(!check.stdout.contains("gpu: no device"), "{}", check.stdout);
 
+    let plan = parsed(desk.cutis(&["check", "scene.toml", "--backend", "gpu", "--json"]));
+    let parts: Vec<&Value> = plan["device_memory"].as_array().unwrap().iter().map(|p| &p["part"]).collect();
+    assert_eq!(parts, ["vertices", "distance", "volume", "stc"]);
+    assert!(plan["device_memory"].as_array().unwrap().iter().all(|p| p["bytes"].as_u64() > Some(0)));
+
     let call = "run scene.toml --backend gpu --out run --json --set output={report=true} --adapter";
     let report = parsed(desk.cutis(&[&words(call)[..], &[&part]].concat()));
     assert_eq!((&report["backend"]["name"], &report["backend"]["adapter"]), (&"gpu".into(), &name.into()));

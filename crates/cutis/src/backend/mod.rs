@@ -4,6 +4,8 @@
 //! there is refused, never replaced. `auto` waits until the size of the work is known ([`Request::settle`]), so that nobody
 //! looks for a GPU for a scene that is too small for one. No device is opened before [`Chosen::start`].
 
+#[cfg(feature = "gpu")]
+mod auto;
 #[cfg_attr(not(feature = "gpu"), path = "absent.rs")]
 mod gpu;
 mod stages;

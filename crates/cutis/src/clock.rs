@@ -1,0 +1,56 @@
+//! The stages of a run: timed for the report, and told to whoever watches.
+
+use std::time::Instant;
+
+use crate::report::Stage;
+use crate::{Error, Progress};
+
+/// Times the stages of a run and tells the user about them.
+pub(crate) struct Clock<'a> {
+    pub(crate) progress: &'a dyn Progress,
+    pub(crate) stages: Vec<Stage>,
+}
+
+impl<'a> Clock<'a> {
+    pub(crate) fn new(progress: &'a dyn Progress) -> Self {
+        Self { progress, stages: Vec::new() }
+    }
+
+    /// Runs one stage of `total` units (0: unknown) on the CPU.
+    pub(crate) fn stage<T>(
+        &mut self,
+        name: &str,
+        total: u64,
+        work: impl FnOnce(&dyn Progress) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        self.stage_on("cpu", name, total, work)
+    }
+
+    /// Runs one stage of `total` units (0: unknown), on what it is said to run on.
+    pub(crate) fn stage_on<T>(
+        &mut self,
+        on: &'static str,
+        name: &str,
+        total: u64,
+        work: impl FnOnce(&dyn Progress) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        self.stage_placed(name, total, |progress| Ok((work(progress)?, on)))
+    }
+
+    /// Runs one stage of `total` units (0: unknown), which tells what it ran on.
+    pub(crate) fn stage_placed<T>(
+        &mut self,
+        name: &str,
+        total: u64,
+        work: impl FnOnce(&dyn Progress) -> Result<(T, &'static str), Error>,
+    ) -> Result<T, Error> {
+        self.progress.begin(name, total);
+        let start = Instant::now();
+        let result = work(self.progress);
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let on = result.as_ref().map_or("", |(_, on)| on);
+        self.stages.push(Stage { name: name.into(), ms, on: on.into() });
+        self.progress.end();
+        result.map(|(value, _)| value)
+    }
+}
