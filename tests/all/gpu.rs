@@ -141,6 +141,9 @@ fn a_frame_reads_the_lips_only() {
         let folder = tempfile::tempdir().unwrap();
         let report = run_on(&gpu, folder.path(), &scene(&set), false).unwrap();
         let after = gpu.counters();
+        let told = report.device.unwrap();
+        let counted = (after.readback_bytes - before.readback_bytes, after.kernels - before.kernels);
+        assert_eq!((told.readback_bytes, told.kernels), counted, "of this run, not of those before it");
         let vertices = report.sizes.vertices as u64;
         (after.submits - before.submits, after.readback_bytes - before.readback_bytes, vertices)
     };
