@@ -1,0 +1,50 @@
+//! The passes of the solver, for each constraint.
+
+use cutis_shaders::constraints::{DISTANCE, SKIN_TENSION, SKIN_TENSION_PAPER, VOLUME};
+use cutis_shaders::solver::{self, Multiplier, Rule, Stiffness};
+
+use crate::{assert_baseline, size_of_struct, validated};
+
+/// Name, arity, number of parameters, source.
+const KINDS: [(&str, usize, u32, &str); 4] = [
+    ("distance", 2, 1, DISTANCE),
+    ("volume", 4, 1, VOLUME),
+    ("stc", 3, 2, SKIN_TENSION),
+    ("stc_paper", 3, 3, SKIN_TENSION_PAPER),
+];
+
+#[test]
+fn every_variant_of_every_kind_is_valid() {
+    for (name, arity, _, source) in KINDS {
+        for rule in [Rule::Pbd, Rule::Xpbd] {
+            for stiffness in [Stiffness::Uniform, Stiffness::Each] {
+                for multiplier in [Multiplier::None, Multiplier::First, Multiplier::Next] {
+                    let joined = solver::project(arity, source, rule, stiffness, multiplier);
+                    let what = format!("{name} {rule:?} {stiffness:?} {multiplier:?}");
+                    assert_baseline(&what, &joined, &[solver::PROJECT]);
+                }
+            }
+        }
+        assert_baseline(name, &solver::residual(arity, source), &[solver::RESIDUAL]);
+        assert_baseline(name, &solver::evaluate(arity, source), &[solver::EVALUATE]);
+    }
+    let passes = ["predict", "finish_and_predict", "finish", "check", "restore"];
+    assert_baseline("vertices", &solver::vertices(), &passes);
+    assert_baseline("carry", &solver::carry(), &[solver::CARRY]);
+    assert_baseline("gather", &solver::gather(), &[solver::GATHER]);
+}
+
+#[test]
+fn parameters_have_no_padding() {
+    for (name, arity, count, source) in KINDS {
+        assert_eq!(size_of_struct(&solver::evaluate(arity, source), "Params"), 4 * count, "{name}");
+    }
+}
+
+/// The control.
+#[test]
+fn another_field_or_another_arity_is_seen() {
+    let broken = DISTANCE.replace("p.rest_length", "p.length");
+    assert!(validated(&solver::evaluate(2, &broken)).is_err());
+    assert!(validated(&solver::evaluate(3, VOLUME)).is_err(), "three vertices where four are read");
+}
