@@ -52,7 +52,8 @@ fn row(number: usize, mutation: &Mutation, failed: &[String]) -> String {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    let code = |text: &str| format!("`{}`", text.split_whitespace().collect::<Vec<_>>().join(" "));
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|");
+    let code = |text: &str| format!("`{}`", words(text));
     let file = Path::new(mutation.file).file_name().unwrap_or_default().to_string_lossy();
     let (fault, from, to) = (mutation.fault, code(mutation.from), code(mutation.to));
     format!("| {number} | {fault} | {file}: {from} → {to} | {}{more} |", names.join(", "))
@@ -122,7 +123,9 @@ impl Copy {
 /// The names in `test NAME ... FAILED` lines.
 fn failed_tests(output: &str) -> Vec<String> {
     let name = |line: &str| line.strip_prefix("test ")?.strip_suffix(" ... FAILED").map(str::to_owned);
-    output.lines().filter_map(name).collect()
+    let mut names: Vec<String> = output.lines().filter_map(name).collect();
+    names.sort();
+    names
 }
 
 #[cfg(test)]
