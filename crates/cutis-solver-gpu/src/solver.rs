@@ -17,6 +17,8 @@ use crate::{GpuSolverError, device_bytes};
 const FRAMES_PER_LOOK: u64 = 64;
 /// Dispatches after which a frame goes on in another submit, so that a command buffer stays within memory.
 const DISPATCHES_PER_SUBMIT: usize = 1 << 16;
+/// Threads after which it does, so that a submit stays well within the two seconds after which desktops reset a device.
+const THREADS_PER_SUBMIT: usize = 1 << 28;
 
 /// The solver on a GPU.
 ///
@@ -27,15 +29,23 @@ pub struct SolverGpu {
     /// The clock is that of the device; the body is that of `read_at`.
     simulation: Simulation<f32>,
     read_at: Clock,
-    /// Whether the host's body is that of the device.
+    /// Whether the host's body is the present one.
     fresh: bool,
+    /// Whether the device's is not: a step failed on it half-way, and the host's is the one to go on from.
+    stale_device: bool,
     body: Body,
     kinds: Vec<Kind>,
     handles: Option<Handles>,
     gather: Option<Gather>,
     reductions: Vec<Reduction>,
-    /// Dispatches of one substep.
+    substep: Load,
+}
+
+/// What a substep asks of the device.
+#[derive(Clone, Copy, Default)]
+struct Load {
     dispatches: usize,
+    threads: usize,
 }
 
 /// Why a step ended early.
@@ -63,19 +73,27 @@ impl SolverGpu {
         let kind = |set: &cutis_solver::Kind<f32>| Kind::new(gpu, &body, &**set, &settings);
         let kinds: Vec<Kind> = simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?;
         let handles = Handles::new(gpu, &body, simulation.system(), &settings)?;
+        // Prediction, handles and the look at finiteness; then the colours.
+        let passes = 3;
+        let iterations = settings.iterations as usize;
         let chunks: usize = kinds.iter().flat_map(|kind| &kind.colors).map(Vec::len).sum();
-        let dispatches = 3 * body.check.dispatches() + chunks * settings.iterations as usize;
+        let constraints: usize = simulation.system().kinds().iter().map(|kind| kind.len()).sum();
+        let substep = Load {
+            dispatches: passes * body.check.dispatches() + chunks.saturating_mul(iterations),
+            threads: passes * body.vertices.len() + constraints.saturating_mul(iterations),
+        };
         Ok(Self {
             gpu: gpu.clone(),
             read_at: simulation.clock(),
             simulation,
             fresh: true,
+            stale_device: false,
             body,
             kinds,
             handles,
             gather: None,
             reductions: Vec::new(),
-            dispatches,
+            substep,
         })
     }
 
@@ -109,6 +127,7 @@ impl SolverGpu {
     fn run_unseen(&mut self, end: u64) -> Result<(), Stop> {
         let settings = *self.simulation.settings();
         let mut clock = self.simulation.clock();
+        self.bring_device_up_to_date()?;
         self.body.clear_status(&self.gpu)?;
         self.fresh = false;
         let mut predict = &self.body.predict;
@@ -120,13 +139,14 @@ impl SolverGpu {
                 handles.write_paths(&self.gpu, paths, clock, &settings, done)?;
             }
             let mut pass = self.gpu.pass("frame");
-            let mut encoded = 0;
+            let mut encoded = Load::default();
             while clock.frame == frame {
-                if encoded > DISPATCHES_PER_SUBMIT {
+                if encoded.dispatches > DISPATCHES_PER_SUBMIT || encoded.threads > THREADS_PER_SUBMIT {
                     pass.submit()?;
-                    (pass, encoded) = (self.gpu.pass("frame, further on"), 0);
+                    (pass, encoded) = (self.gpu.pass("frame, further on"), Load::default());
                 }
-                encoded += self.dispatches;
+                encoded.dispatches += self.substep.dispatches;
+                encoded.threads = encoded.threads.saturating_add(self.substep.threads);
                 predict.run(&mut pass);
                 predict = &self.body.finish_and_predict;
                 if let Some(handles) = &self.handles {
@@ -163,14 +183,34 @@ impl SolverGpu {
         Err(Stop::NotFinite(vertex))
     }
 
-    /// The error of a device, with the host's state made consistent: its body belongs to the time it was read at.
+    /// The error of a step: what the device holds is not to be relied on, and the host's body is the one that counts, at the
+    /// time that it was read at.
     fn stopped(&mut self, error: &GpuError) -> SolverError {
         self.simulation.set_clock(self.read_at);
-        SolverError::Device {
-            backend: self.name(),
-            reason: error.to_string(),
-            time_s: self.simulation.time_s(),
+        (self.fresh, self.stale_device) = (true, true);
+        self.unread(error)
+    }
+
+    /// The error of a look at the body, which changes nothing, unless the device is gone.
+    fn unseen(&mut self, error: &GpuError) -> SolverError {
+        match error {
+            GpuError::Lost { .. } => self.stopped(error),
+            _ => self.unread(error),
         }
+    }
+
+    fn unread(&self, error: &GpuError) -> SolverError {
+        let time_s = self.read_at.time_s(self.simulation.settings());
+        SolverError::Device { backend: self.name(), reason: error.to_string(), time_s }
+    }
+
+    /// Uploads the host's body where the device's is not to be relied on.
+    fn bring_device_up_to_date(&mut self) -> Result<(), GpuError> {
+        if self.stale_device {
+            self.body.upload(&self.gpu, &self.simulation)?;
+            self.stale_device = false;
+        }
+        Ok(())
     }
 
     /// Vertices and velocities as they are on the device.
@@ -181,6 +221,7 @@ impl SolverGpu {
     }
 
     fn reduce(&mut self) -> Result<Vec<Residual>, GpuError> {
+        self.bring_device_up_to_date()?;
         for n in self.reductions.len()..self.kinds.len() {
             let set = &*self.simulation.system().kinds()[n];
             self.reductions.push(Reduction::new(&self.gpu, &self.body, &self.kinds[n], set)?);
@@ -211,8 +252,8 @@ impl Solver<f32> for SolverGpu {
         frame: u64,
     ) -> Result<(), SolverError> {
         self.simulation.restore(positions, velocities, frame)?;
-        (self.fresh, self.read_at) = (true, self.simulation.clock());
-        self.body.upload(&self.gpu, &self.simulation).map_err(|error| self.stopped(&error))
+        (self.fresh, self.stale_device, self.read_at) = (true, true, self.simulation.clock());
+        self.bring_device_up_to_date().map_err(|error| self.stopped(&error))
     }
 
     fn simulation(&self) -> &Simulation<f32> {
@@ -223,7 +264,7 @@ impl Solver<f32> for SolverGpu {
         if self.fresh {
             return Ok(());
         }
-        let [vertices, velocities] = self.read_body().map_err(|error| self.stopped(&error))?;
+        let [vertices, velocities] = self.read_body().map_err(|error| self.unseen(&error))?;
         let velocities = velocities.iter().map(|&[x, y, z, _]| Vector3::new(x, y, z));
         self.simulation.set_state(bytemuck::cast_slice(&vertices), velocities)?;
         (self.fresh, self.read_at) = (true, self.simulation.clock());
@@ -236,7 +277,7 @@ impl Solver<f32> for SolverGpu {
             return self.simulation.system().positions_of(vertices);
         }
         let found = Gather::read(&mut self.gather, &self.gpu, &self.body, vertices);
-        let found = found.map_err(|error| self.stopped(&error))?;
+        let found = found.map_err(|error| self.unseen(&error))?;
         let origin = self.simulation.system().origin().coords;
         Ok(found.iter().map(|&[x, y, z, _]| Point3::new(x, y, z) + origin).collect())
     }
@@ -244,6 +285,6 @@ impl Solver<f32> for SolverGpu {
     /// By reduction on the device. Sums of squares over 64 constraints are `f32`, so that it differs from the CPU's by some
     /// 1e-7, relative.
     fn residuals(&mut self) -> Result<Vec<Residual>, SolverError> {
-        self.reduce().map_err(|error| self.stopped(&error))
+        self.reduce().map_err(|error| self.unseen(&error))
     }
 }
