@@ -21,7 +21,7 @@
 //! | [`projection`](checks::projection) | threads give the bits of the reference | value or gradient off by 1e-3 |
 //! | [`device::evaluation`] | the shader computes what Rust does | the shader off by 1e-3; gradients swapped |
 //! | [`device::projection`] | the GPU backend lands where the reference does | value or gradient off by 1e-3 |
-//! | [`device::degenerate`] | collapsed shapes stay finite on the device | a division by zero |
+//! | [`device::degenerate`] | collapsed shapes stay finite on the device | the exponent of infinity |
 //!
 //! Samples are random shapes at 1 mm, 1 m and 1 km, the same in every run. Everything is compared with `f64`, and **each check
 //! contains negative controls**: the same comparison must reject something that is wrong on purpose, or the check fails.

@@ -4,7 +4,7 @@
 //! device its results are those of [`SolverReference<f32>`](cutis_solver::SolverReference) bit for bit; a hardware
 //! device may fuse a multiplication with an addition, and then differs by rounding.
 //!
-//! - **The state stays on the device.** A frame is one submit. A call of `step` reads back twelve bytes, whether the body
+//! - **The state stays on the device.** A frame is one submit (a very long one is several). A call of `step` reads back twelve bytes, whether the body
 //!   is still finite; everything else is read when somebody asks for it, and no more than that:
 //!   [`positions_of`](cutis_solver::Solver::positions_of) reads the vertices it names,
 //!   [`residuals`](cutis_solver::Solver::residuals) two numbers per 64 constraints.
