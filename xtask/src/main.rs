@@ -2,6 +2,7 @@
 
 mod deny;
 mod mutations;
+mod publish;
 mod python;
 mod results;
 mod spdx;
@@ -57,7 +58,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["mutations"] => mutations::run(&workspace, ""),
         ["mutations", filter] => mutations::run(&workspace, filter),
         ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
-        ["publish", "--dry-run"] => steps::publish_dry_run(&workspace),
+        ["publish", "--dry-run"] => publish::dry_run(&workspace),
         ["publish"] => bail!(
             "only `cargo xtask publish --dry-run` is offered; a release is made by `cargo publish --workspace`"
         ),

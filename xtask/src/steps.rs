@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 
 use crate::workspace::{Workspace, execute};
-use crate::{deny, python, tidy, vulkan};
+use crate::{deny, publish, python, tidy, vulkan};
 
 struct Step {
     name: &'static str,
@@ -28,7 +28,7 @@ const STEPS: &[Step] = &[
     Step { name: "documentation", quick: false, run: documentation },
     Step { name: "program", quick: false, run: build_program },
     Step { name: "python", quick: false, run: python::run },
-    Step { name: "publish --dry-run", quick: false, run: publish_dry_run },
+    Step { name: "publish --dry-run", quick: false, run: publish::dry_run },
 ];
 
 /// Runs every step, or with `quick` the quick ones; prints what was run, how long it took and what was left out.
@@ -155,17 +155,6 @@ fn documentation(workspace: &Workspace) -> Result<()> {
 /// Builds the release program, which the Python checks run.
 pub fn build_program(workspace: &Workspace) -> Result<()> {
     execute(workspace.cargo("build").args(["--release", "--package", "cutis-cli"]))
-}
-
-/// Packages every publishable crate and builds each from its package. Outside CI a dirty checkout is allowed.
-pub fn publish_dry_run(workspace: &Workspace) -> Result<()> {
-    let mut command = workspace.cargo("publish");
-    // Nothing of what is built is run: debug information would be a quarter of the time.
-    command.args(["--workspace", "--dry-run", "--quiet"]).env("CARGO_PROFILE_DEV_DEBUG", "false");
-    if !workspace.ci {
-        command.arg("--allow-dirty");
-    }
-    execute(&mut command)
 }
 
 #[cfg(test)]
