@@ -14,7 +14,7 @@ pub type Failure = Box<dyn Error>;
 /// How much to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effort {
-    /// About a minute.
+    /// About half a minute.
     Quick,
     /// A few minutes.
     Normal,

@@ -17,7 +17,7 @@ use super::outcome::Row;
 const SCHEMA: &str = "cutis-parity/1";
 
 /// Variables that change how a software driver works.
-const VARIABLES: [&str; 2] = ["LP_NUM_THREADS", "VK_ICD_FILENAMES"];
+const VARIABLES: [&str; 3] = ["LP_NUM_THREADS", "VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
 
 /// The whole result.
 #[derive(Serialize)]

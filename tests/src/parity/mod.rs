@@ -35,6 +35,9 @@ pub use outcome::{Figures, Measured, Outcome, Ring, Row};
 use json::Document;
 use table::Table;
 
+/// Rings that a run goes through, of which each must have compared something.
+const RINGS: [Ring; 3] = [Ring::Op, Ring::Kernel, Ring::Scene];
+
 /// Compares, prints the table to `out` and writes the file of [`Options::json`]; whether every row is what it had to be.
 ///
 /// # Errors
@@ -60,9 +63,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         if options.full_size {
             full_size::run(&mut bench)?;
         } else {
-            if std::env::var_os("LONG").is_none() {
-                op::run(&mut bench)?;
-            }
+            op::run(&mut bench)?;
             kernel::run(&mut bench)?;
             scene::run(&mut bench)?;
         }
@@ -71,7 +72,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         table.line(&format!("nothing compared: {}", GpuError::NoAdapter))?;
         (Vec::new(), true)
     } else {
-        table.finish()?
+        table.finish(if options.full_size { &[Ring::FullSize] } else { &RINGS })?
     };
     if let Some(path) = &options.json {
         Document::new(options, &adapters, &rows, passed).write(path)?;
@@ -79,14 +80,18 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     Ok(passed)
 }
 
-/// The adapters to compare; none only where that is allowed.
+/// The adapters to compare; none only where that is allowed and no adapter is named.
 fn wanted(options: &Options) -> Result<Vec<Adapter>, GpuError> {
     choose(cutis_gpu::adapters(), options)
 }
 
 fn choose(all: Vec<Adapter>, options: &Options) -> Result<Vec<Adapter>, GpuError> {
     if all.is_empty() {
-        return if options.allow_no_gpu { Ok(all) } else { Err(GpuError::NoAdapter) };
+        return if options.allow_no_gpu && options.adapter.is_none() {
+            Ok(all)
+        } else {
+            Err(GpuError::NoAdapter)
+        };
     }
     match &options.adapter {
         Some(select) => Ok(vec![select.among(&all)?.clone()]),
@@ -112,6 +117,8 @@ mod tests {
         assert!(error.to_string().contains("mesa-vulkan-drivers"), "{error}");
         let options = Options { allow_no_gpu: true, ..Options::default() };
         assert_eq!(choose(Vec::new(), &options), Ok(Vec::new()));
+        let options = Options { adapter: Some(Select::Name("nvidia".into())), ..options };
+        assert!(choose(Vec::new(), &options).is_err(), "an adapter that is named has to be there");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::io::{self, IsTerminal, Write};
 
 use super::expected::ExpectedFailure;
-use super::outcome::{Figures, Measured, Outcome, Row, Subject};
+use super::outcome::{Figures, Measured, Outcome, Ring, Row, Subject};
 
 /// Takes the rows, prints and keeps them.
 pub struct Table<'a> {
@@ -88,15 +88,17 @@ impl<'a> Table<'a> {
         self.out.flush()
     }
 
-    /// Prints the summary and gives the rows, with whether all is well.
+    /// Prints the summary and gives the rows, with whether all is well: each of the `required` rings has a row, and none is bad.
     ///
     /// # Errors
     /// The terminal's.
-    pub fn finish(mut self) -> io::Result<(Vec<Row>, bool)> {
+    pub fn finish(mut self, required: &[Ring]) -> io::Result<(Vec<Row>, bool)> {
         self.flush()?;
         let count = |outcome| self.rows.iter().filter(|row| row.outcome == outcome).count();
         let bad: Vec<&Row> = self.rows.iter().filter(|row| !row.outcome.is_good()).collect();
-        let well = bad.is_empty() && !self.rows.is_empty();
+        let is_missing = |ring: &&Ring| self.rows.iter().all(|row| row.ring != **ring);
+        let missing: Vec<&Ring> = required.iter().filter(is_missing).collect();
+        let well = bad.is_empty() && missing.is_empty() && !self.rows.is_empty();
         let verdict = if well { "parity holds" } else { "PARITY DOES NOT HOLD" };
         writeln!(
             self.out,
@@ -118,6 +120,9 @@ impl<'a> Table<'a> {
                 row.adapter,
                 outcome(row)
             )?;
+        }
+        for ring in missing {
+            writeln!(self.out, "  {}: no row", ring.name())?;
         }
         if self.rows.is_empty() {
             writeln!(self.out, "  nothing was compared")?;
@@ -166,7 +171,6 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parity::outcome::Ring;
 
     /// The text of a table with these rows (control, agrees), and whether all is well.
     fn table(rows: &[(Option<&str>, bool)]) -> (String, bool) {
@@ -177,7 +181,7 @@ mod tests {
             let subject = Subject { ring: Ring::Op, name: "springs", adapter: "card", control };
             table.add(&subject, Ok(Measured::at_most(7, worst, 1e-6, "extent"))).unwrap();
         }
-        let (kept, well) = table.finish().unwrap();
+        let (kept, well) = table.finish(&[Ring::Op]).unwrap();
         assert_eq!(kept.len(), rows.len());
         (String::from_utf8(text).unwrap(), well)
     }
@@ -199,5 +203,15 @@ mod tests {
     fn a_row_that_fails_and_a_table_without_rows_fail_the_command() {
         assert!(!table(&[(None, false), (Some("first"), false)]).1);
         assert!(!table(&[]).1);
+    }
+
+    #[test]
+    fn a_ring_without_a_row_fails_the_command() {
+        let mut text = Vec::new();
+        let mut table = Table::new(&mut text, &[]);
+        let subject = Subject { ring: Ring::Op, name: "springs", adapter: "card", control: None };
+        table.add(&subject, Ok(Measured::at_most(7, 0.0, 0.0, "extent"))).unwrap();
+        assert!(!table.finish(&[Ring::Op, Ring::Scene]).unwrap().1);
+        assert!(String::from_utf8(text).unwrap().contains("scene: no row"));
     }
 }

@@ -166,7 +166,7 @@ fn the_backends_agree() -> Result<()> {
         } else {
             // A device that fuses operations differs by rounding, which ten frames of motion enlarge.
             let difference = farthest(&on_device, &reference);
-            assert!(difference < 1e-3 * EDGE, "{formulation:?}: {difference} m");
+            assert!(difference < 1e-5 * EDGE, "{formulation:?}: {difference} m");
         }
     }
     Ok(())
