@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 
 use self::list::{MUTATIONS, Mutation, Suite};
+use crate::vulkan;
 use crate::workspace::{Workspace, execute};
 
 /// Names of tests that stand in the table for one fault; the others are counted.
@@ -17,6 +18,7 @@ const NAMED: usize = 2;
 
 /// Tries every fault whose description contains `filter`; writes the page only when all were tried.
 pub fn run(workspace: &Workspace, filter: &str) -> Result<()> {
+    let adapters = vulkan::require(workspace)?;
     let copy = Copy::new(workspace)?;
     let chosen: Vec<&Mutation> =
         MUTATIONS.iter().filter(|mutation| mutation.fault.contains(filter)).collect();
@@ -34,13 +36,14 @@ pub fn run(workspace: &Workspace, filter: &str) -> Result<()> {
         }
         writeln!(rows, "{}", row(number, mutation, &failed))?;
     }
+    let commit = copy.commit()?;
     copy.remove(workspace)?;
     if !unseen.is_empty() {
         bail!("no test saw: {}", unseen.join("; "));
     }
     if filter.is_empty() {
         let path = workspace.root.join("docs/results/mutations.md");
-        fs::write(&path, page(&rows, chosen.len()))?;
+        fs::write(&path, page(&rows, chosen.len(), &commit, &adapters))?;
         println!("written: {}", path.display());
     }
     Ok(())
@@ -59,11 +62,11 @@ fn row(number: usize, mutation: &Mutation, failed: &[String]) -> String {
     format!("| {number} | {fault} | {file}: {from} → {to} | {}{more} |", names.join(", "))
 }
 
-fn page(rows: &str, count: usize) -> String {
+fn page(rows: &str, count: usize, commit: &str, adapters: &str) -> String {
     format!(
         "# Mutations\n\n\
          {count} faults, put in one at a time; each made at least one test fail. Without a fault all of these tests passed in the same\n\
-         run. Written by `cargo xtask mutations`, with Mesa's software Vulkan or whatever adapter the machine has; the list is in\n\
+         run. Written by `cargo xtask mutations` at commit {commit}; adapters: {adapters}. The list is in\n\
          `xtask/src/mutations/list.rs`.\n\n\
          | | fault | change | seen by |\n|---|---|---|---|\n{rows}"
     )
@@ -82,6 +85,12 @@ impl Copy {
         copy.remove(workspace)?;
         execute(workspace.command("git").args(["worktree", "add", "--detach", "--quiet"]).arg(&copy.root))?;
         Ok(copy)
+    }
+
+    fn commit(&self) -> Result<String> {
+        let here = Workspace { root: self.root.clone(), ci: false };
+        let output = here.command("git").args(["rev-parse", "--short", "HEAD"]).output()?;
+        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     }
 
     fn remove(&self, workspace: &Workspace) -> Result<()> {
@@ -137,6 +146,15 @@ mod tests {
         let output = "running 3 tests\ntest a::b ... ok\ntest a::c ... FAILED\ntest d ... ignored\n\nfailures:\n    a::c\n";
         assert_eq!(failed_tests(output), ["a::c"]);
         assert!(failed_tests("test result: FAILED. 2 passed").is_empty());
+    }
+
+    #[test]
+    fn the_page_says_where_it_was_written() {
+        let text = page("| 1 |\n", 1, "0123abc", "card (driver 1.0)");
+        assert!(
+            text.contains("commit 0123abc; adapters: card (driver 1.0).") && text.ends_with("| 1 |\n"),
+            "{text}"
+        );
     }
 
     /// Every fault can be put in: its text stands in its file exactly once, and the change is one.
