@@ -2,6 +2,7 @@
 
 mod deny;
 mod mutations;
+mod parity;
 mod publish;
 mod python;
 mod results;
@@ -26,6 +27,7 @@ usage: cargo xtask COMMAND
   python              outputs and awkward inputs compared with nibabel and SimpleITK
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
                       lists the options, and the exit code is that of the comparison
+  parity-page         the same three ways, as it is, in small chunks and at full size: docs/results/parity.md
   mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
                       with a text only those whose description contains it, and nothing is written
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
@@ -55,6 +57,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["parity", arguments @ ..] => {
             return workspace::exit_code(&mut steps::parity_command(&workspace, arguments));
         }
+        ["parity-page"] => parity::run(&workspace),
         ["mutations"] => mutations::run(&workspace, ""),
         ["mutations", filter] => mutations::run(&workspace, filter),
         ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),

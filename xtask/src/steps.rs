@@ -141,9 +141,13 @@ pub fn parity_command(workspace: &Workspace, arguments: &[&str]) -> Command {
 }
 
 /// Runs the program that the step `tests` has built. `cargo run` would build it once more, since the features of shared
-/// dependencies differ from those of the whole workspace.
+/// dependencies differ from those of the whole workspace. Once as the device is, and once in small chunks within the limits
+/// that any device has.
 fn parity(workspace: &Workspace) -> Result<()> {
-    execute(vulkan::for_gpu_tests(workspace.command(workspace.parity()?).arg("--quick")))
+    for arguments in [&["--quick"][..], &["--quick", "--chunk-cap", "200", "--baseline-limits"]] {
+        execute(vulkan::for_gpu_tests(workspace.command(workspace.parity()?).args(arguments)))?;
+    }
+    Ok(())
 }
 
 /// Libraries only: the program `cutis` and the crate `cutis` would write the same page.
