@@ -147,7 +147,7 @@ impl Gpu {
     ///
     /// # Errors
     ///
-    /// [`GpuError::Lost`]; [`GpuError::Device`] when the driver cannot wait.
+    /// [`GpuError::Lost`]; [`GpuError::Wait`] when the driver cannot wait.
     pub fn wait(&self) -> Result<(), GpuError> {
         self.flush(&|| "waiting for the device".to_owned())
     }
@@ -210,7 +210,7 @@ impl Gpu {
             Ok(Err(error)) => error.to_string(),
             Err(_) => "the wait failed".to_owned(),
         };
-        Err(GpuError::Device { adapter: self.shared.adapter.name.clone(), reason })
+        Err(GpuError::Wait { adapter: self.shared.adapter.name.clone(), reason })
     }
 
     /// An error for a need that the device cannot meet.
@@ -253,16 +253,34 @@ fn readable(error: &wgpu::Error) -> String {
 mod tests {
     use super::*;
 
-    #[test]
-    fn an_error_that_nobody_heard_is_told_by_the_next_call_and_once() {
-        let gpu = match Gpu::open(&GpuOptions::default()) {
-            Ok(gpu) => gpu,
+    fn first_gpu() -> Option<Gpu> {
+        match Gpu::open(&GpuOptions::default()) {
+            Ok(gpu) => Some(gpu),
             Err(error) => {
                 assert!(std::env::var_os("CI").is_none(), "CI is set and there is no GPU: {error}");
                 eprintln!("skipped: {error}");
-                return;
+                None
             }
-        };
+        }
+    }
+
+    #[test]
+    fn a_wait_that_fails_is_not_a_device_that_cannot_be_opened() {
+        let (Some(gpu), Some(other)) = (first_gpu(), first_gpu()) else { return };
+        for _ in 0..8 {
+            other.shared.queue.submit([]);
+        }
+        let foreign = other.shared.queue.submit([]);
+        let until = |index| wgpu::PollType::Wait { submission_index: Some(index), timeout: None };
+        assert_eq!(other.poll(until(foreign.clone())), Ok(()), "the control: on its own device");
+        let error = gpu.poll(until(foreign)).unwrap_err();
+        assert!(matches!(error, GpuError::Wait { .. }), "{error}");
+        assert!(error.to_string().starts_with("waiting for the GPU '"), "{error}");
+    }
+
+    #[test]
+    fn an_error_that_nobody_heard_is_told_by_the_next_call_and_once() {
+        let Some(gpu) = first_gpu() else { return };
         let _ = gpu.shared.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("of no use"),
             size: 4,

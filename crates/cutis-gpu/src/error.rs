@@ -94,6 +94,14 @@ pub enum GpuError {
         /// The driver's reason.
         reason: String,
     },
+    /// The driver could not wait for work that was submitted.
+    #[error("waiting for the GPU '{adapter}' failed: {reason}")]
+    Wait {
+        /// Name of the adapter.
+        adapter: String,
+        /// The driver's reason.
+        reason: String,
+    },
     /// Memory of the device could not be mapped for reading.
     #[error("cannot read {what} back from the GPU: {reason}")]
     Readback {

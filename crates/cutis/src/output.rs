@@ -9,7 +9,7 @@ use cutis_resample::Warp;
 use cutis_volume::{Volume, nifti};
 use nalgebra::Point3;
 
-use crate::backend::Stages;
+use crate::backend::{Request, Stages};
 use crate::body::Body;
 use crate::checkpoint::{self, Checkpoint};
 use crate::clock::Clock;
@@ -209,6 +209,7 @@ pub fn resample_run(
 ) -> Result<Resample, Error> {
     let mut clock = Clock::new(progress);
     let folder = RunFolder(request.run.clone());
+    let mut stages = Stages::on(Request::of(loaded)?.open()?);
     let source = clock.stage("read the CT", 0, |_| source::load(loaded))?;
     let body = clock.stage("lattice, skin, incision", 0, |_| Body::build(loaded, &source.volume))?;
     let fingerprint = checkpoint::fingerprint(&loaded.scene, &source.sha256);
@@ -219,7 +220,8 @@ pub fn resample_run(
     };
     let warp = BodyWarp::new(&body, &saved.positions)?;
     let (deformed, report) =
-        clock.stage("resample", 0, |progress| warp.apply(&volume, &mut Stages::on(None), progress))?;
+        clock.stage("resample", 0, |progress| warp.apply(&volume, &mut stages, progress))?;
+    stages.notes.iter().for_each(|note| progress.note(note));
     clock.stage("write", 0, |_| Ok(nifti::write(&request.out, &deformed)?))?;
     Ok(report)
 }

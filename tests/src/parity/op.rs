@@ -3,7 +3,7 @@
 //!
 //! These are the checks of `cutis-conformance`: a device may be at most 4 times as far from `f64` as the CPU's `f32`, and on
 //! software every number has to be the CPU's. Controls: the shader with value or gradient off by 1e-3, with gradients swapped,
-//! with a division by zero.
+//! with the exponent of infinity.
 
 use cutis_conformance::{ConformanceError, Limit, Report, Row, Subject, device};
 use cutis_constraints::{

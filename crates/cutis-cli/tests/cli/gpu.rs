@@ -42,6 +42,7 @@ fn a_gpu_that_is_not_there_is_refused_with_what_to_install() {
         "check scene.toml --backend gpu",
         "run scene.toml --set solver.backend=gpu --resume",
         "demo --backend gpu --out elsewhere",
+        "resample scene.toml --run elsewhere --out ct.nii.gz --backend gpu",
     ] {
         let scene = if call.starts_with("demo") { "demo.toml" } else { "scene.toml" };
         desk.cutis_with(&NO_DRIVER, &words(call))

@@ -127,14 +127,19 @@ pub(super) fn memory(_: &Device, system: &System<f32>, settings: &Settings) -> V
     cutis_solver_gpu::device_bytes(system, settings).iter().map(MemoryPart::from).collect()
 }
 
-/// Opens the device, uploads the body and compiles the kernels that it needs.
-pub(super) fn start(device: &Device, system: System<f32>, settings: Settings) -> Result<Running, Error> {
-    let gpu = match device {
+/// Opens the device.
+pub(super) fn open(device: &Device) -> Result<Gpu, Error> {
+    Ok(match device {
         Device::Opened(gpu) => gpu.clone(),
         Device::Adapter(index) => {
             Gpu::open(&GpuOptions { select: Select::Index(*index), ..GpuOptions::default() })?
         }
-    };
+    })
+}
+
+/// Opens the device, uploads the body and compiles the kernels that it needs.
+pub(super) fn start(device: &Device, system: System<f32>, settings: Settings) -> Result<Running, Error> {
+    let gpu = open(device)?;
     let before = work(&gpu);
     let solver = SolverGpu::new(&gpu, system, settings).map_err(|e| match e {
         GpuSolverError::Solver(e) => Error::Solver(e),
@@ -149,7 +154,14 @@ pub(super) fn lacks_device(error: &Error) -> bool {
     match error {
         Error::Resample(ResampleError::TooLarge { .. }) => true,
         Error::Resample(ResampleError::Gpu(e)) | Error::Render(RenderError::Gpu(e)) => {
-            matches!(e, GpuError::Limit { .. } | GpuError::OutOfMemory { .. } | GpuError::Lost { .. })
+            matches!(
+                e,
+                GpuError::Limit { .. }
+                    | GpuError::OutOfMemory { .. }
+                    | GpuError::Lost { .. }
+                    | GpuError::Wait { .. }
+                    | GpuError::Readback { .. }
+            )
         }
         _ => false,
     }
@@ -180,8 +192,22 @@ mod tests {
             assert!(error.is_bad_input() && error.to_string().contains("\"cpu\""), "{error}");
         }
         let shader = GpuError::Shader { label: "stc".into(), message: "line 1".into() };
-        for error in [shader, GpuError::Lost { adapter: adapter(), reason: "reset".into() }] {
+        let lost = GpuError::Lost { adapter: adapter(), reason: "reset".into() };
+        let wait = GpuError::Wait { adapter: adapter(), reason: "time out".into() };
+        for error in [shader, lost, wait] {
             assert!(!Error::Gpu(error).is_bad_input());
         }
+    }
+
+    #[test]
+    fn a_stage_does_without_a_device_that_fails_and_not_without_a_kernel_that_is_wrong() {
+        let wait = GpuError::Wait { adapter: "Card".into(), reason: "time out".into() };
+        let read = GpuError::Readback { what: "buffer 'image'".into(), reason: "unmapped".into() };
+        for error in [wait, read] {
+            assert!(lacks_device(&Error::Resample(ResampleError::Gpu(error.clone()))), "{error}");
+            assert!(lacks_device(&Error::Render(RenderError::Gpu(error.clone()))), "{error}");
+        }
+        let shader = GpuError::Shader { label: "trace".into(), message: "line 1".into() };
+        assert!(!lacks_device(&Error::Render(RenderError::Gpu(shader))));
     }
 }

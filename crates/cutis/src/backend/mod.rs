@@ -87,6 +87,18 @@ impl Request {
         })
     }
 
+    /// Opens the GPU that is asked for by name; none for any other backend, and for `auto`, which weighs the size of a
+    /// simulation.
+    ///
+    /// # Errors
+    /// As the device gives them.
+    pub(crate) fn open(&self) -> Result<Option<Gpu>, Error> {
+        match self {
+            Self::Settled(Chosen { place: Place::Gpu(device), .. }) => gpu::open(device).map(Some),
+            Self::Settled(_) | Self::Auto => Ok(None),
+        }
+    }
+
     /// A device that the caller opened.
     #[cfg(feature = "gpu")]
     pub(crate) fn opened(gpu: &Gpu) -> Self {
