@@ -10,7 +10,7 @@ pub enum Select {
     /// The first of [`adapters`](fn@crate::adapters): the best hardware, a software adapter if there is nothing else.
     #[default]
     First,
-    /// The adapter with this [`Adapter::index`].
+    /// The adapter with this [`Adapter::index`]; if there is none, the first whose name has this number in it.
     Index(usize),
     /// The first adapter whose name has this part, upper or lower case alike.
     Name(String),
@@ -26,13 +26,14 @@ impl Select {
         if adapters.is_empty() {
             return Err(GpuError::NoAdapter);
         }
+        let named = |part: &str| {
+            let part = part.to_lowercase();
+            adapters.iter().find(|adapter| adapter.name.to_lowercase().contains(&part))
+        };
         let found = match self {
             Select::First => adapters.first(),
-            Select::Index(index) => adapters.get(*index),
-            Select::Name(part) => {
-                let part = part.to_lowercase();
-                adapters.iter().find(|adapter| adapter.name.to_lowercase().contains(&part))
-            }
+            Select::Index(index) => adapters.get(*index).or_else(|| named(&index.to_string())),
+            Select::Name(part) => named(part),
         };
         found.ok_or_else(|| GpuError::NoSuchAdapter {
             asked: self.to_string(),
@@ -44,7 +45,8 @@ impl Select {
 impl FromStr for Select {
     type Err = Infallible;
 
-    /// A number is an index, `first` is the first, anything else a part of a name.
+    /// A number is an index (or, where there are not so many, a part of a name), `first` is the first, anything else a part of
+    /// a name.
     fn from_str(text: &str) -> Result<Select, Infallible> {
         let text = text.trim();
         Ok(match text.parse() {
@@ -90,6 +92,7 @@ mod tests {
         assert_eq!(chosen("1"), Ok(1));
         assert_eq!(chosen("LLVMPIPE"), Ok(1));
         assert_eq!(chosen("a"), Ok(0), "the first of several");
+        assert_eq!(chosen("9000"), Ok(0), "no index, but a part of a name");
         for missing in ["2", "other card"] {
             let error = chosen(missing).unwrap_err().to_string();
             assert_eq!(

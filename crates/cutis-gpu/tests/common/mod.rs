@@ -11,7 +11,7 @@ pub const DOUBLE: &str = "
         if id.x < arrayLength(&values) { values[id.x] = 2.0 * values[id.x]; }
     }";
 
-/// Runs a test on every adapter. Without one the test is skipped with a reason, or fails where CI is set.
+/// Runs a test on every adapter. Without one the test is skipped with a reason, or fails where CI or CUTIS_REQUIRE_GPU is set.
 pub fn on_every_adapter(test: impl Fn(Gpu)) {
     with_options(&GpuOptions::default(), test);
 }
@@ -20,7 +20,8 @@ pub fn on_every_adapter(test: impl Fn(Gpu)) {
 pub fn with_options(options: &GpuOptions, test: impl Fn(Gpu)) {
     let found = adapters();
     if found.is_empty() {
-        assert!(std::env::var_os("CI").is_none(), "CI is set and there is no GPU adapter");
+        let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
+        assert!(!required, "a GPU adapter is required, and there is none");
         eprintln!("skipped: no GPU adapter");
     }
     for adapter in found {
