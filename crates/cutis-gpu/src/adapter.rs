@@ -4,7 +4,7 @@ use std::{fmt, sync::LazyLock};
 
 use crate::{GpuError, Limits, Select, limits};
 
-/// One adapter that can be opened.
+/// One adapter of the machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Adapter {
     /// Place in the order of [`adapters`]: best hardware first, software last.
@@ -21,6 +21,8 @@ pub struct Adapter {
     pub limits: Limits,
     /// Whether it can time its work.
     pub timestamps: bool,
+    /// Why it cannot be opened: the limit of WebGPU's baseline that it does not reach. None: it reaches them all.
+    pub lacking: Option<String>,
 }
 
 /// What sort of adapter it is, from best to last.
@@ -50,7 +52,7 @@ impl fmt::Display for AdapterKind {
     }
 }
 
-/// The adapters of this machine that can be opened, each once, best hardware first and software last. No device is
+/// The adapters of this machine, each once, best hardware first and software last. No device is
 /// made. Empty when there is no driver.
 pub fn adapters() -> Vec<Adapter> {
     enumerate().into_iter().map(|(adapter, _)| adapter).collect()
@@ -102,14 +104,19 @@ fn instance() -> Option<&'static wgpu::Instance> {
 
 fn describe(index: usize, info: wgpu::AdapterInfo, handle: &wgpu::Adapter) -> Adapter {
     let offered = handle.limits();
+    let (limits, lacking) = match limits::requested(&offered, false) {
+        Ok(limits) => (limits, None),
+        Err(shortfall) => (offered, Some(shortfall.to_string())),
+    };
     Adapter {
         index,
         name: info.name,
         kind: kind(info.device_type),
         api: api(info.backend).1,
         driver: [info.driver, info.driver_info].join(" ").trim().to_owned(),
-        limits: Limits::of(&limits::requested(&offered, false).unwrap_or(offered)),
+        limits: Limits::of(&limits),
         timestamps: handle.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+        lacking,
     }
 }
 

@@ -1,5 +1,7 @@
 //! What a device offers, and what is asked of it.
 
+use std::fmt;
+
 use crate::WORKGROUP;
 
 /// The limits that matter to compute kernels. WebGPU's baseline, which every adapter that can be opened offers, is
@@ -40,6 +42,13 @@ pub(crate) struct Shortfall {
     pub(crate) needed: u64,
     /// The adapter's value.
     pub(crate) available: u64,
+}
+
+impl fmt::Display for Shortfall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Shortfall { name, needed, available } = self;
+        write!(f, "WebGPU's baseline limit {name}: {needed} needed, {available} offered")
+    }
 }
 
 /// The limits to ask of an adapter that offers `offered`: the baseline exactly, or the baseline raised where compute
@@ -99,5 +108,7 @@ mod tests {
         let expected = Shortfall { name: "max_storage_buffers_per_shader_stage", needed: 8, available: 4 };
         assert_eq!(requested(&offered, false), Err(expected));
         assert_eq!(requested(&offered, true), Err(expected));
+        let words = "WebGPU's baseline limit max_storage_buffers_per_shader_stage: 8 needed, 4 offered";
+        assert_eq!(expected.to_string(), words);
     }
 }

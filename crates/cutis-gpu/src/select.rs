@@ -81,6 +81,7 @@ mod tests {
             driver: String::new(),
             limits: Limits::of(&wgpu::Limits::default()),
             timestamps: false,
+            lacking: None,
         }
     }
 

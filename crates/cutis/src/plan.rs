@@ -88,6 +88,12 @@ pub(crate) fn prepare(
     let work = work(loaded, &dynamics);
     let backend = request.settle(loaded, &work)?;
     warnings.extend(backend.note.clone());
+    if let (Some(adapter), false) = (&loaded.scene.solver.adapter, backend.on_gpu()) {
+        warnings.push(format!(
+            "solver.adapter = {adapter:?} has no effect: the run is on {}, which is no GPU",
+            backend.report.name
+        ));
+    }
     let plan = Plan {
         backend: backend.report.clone(),
         sizes,

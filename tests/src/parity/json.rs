@@ -116,6 +116,7 @@ mod tests {
             driver: "driver 1.0".into(),
             limits,
             timestamps: false,
+            lacking: None,
         };
         let subject = Subject { ring: Ring::Scene, name: "demo", adapter: "card", control: None };
         let rows = [Row::judge(&subject, Ok(Measured::at_most(1, 0.0, 0.0, "extent")), &[])];

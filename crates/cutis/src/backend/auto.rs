@@ -69,6 +69,9 @@ pub(super) fn weigh(
 
 /// Why `auto` does not take an adapter, whatever the scene.
 pub(super) fn objection(adapter: &Adapter) -> Option<String> {
+    if let Some(lacking) = &adapter.lacking {
+        return Some(format!("{} cannot be opened: {lacking}", adapter.name));
+    }
     match adapter.kind {
         AdapterKind::Discrete | AdapterKind::Integrated | AdapterKind::Virtual => None,
         AdapterKind::Software => {
@@ -129,6 +132,7 @@ mod tests {
             driver: "test".into(),
             limits,
             timestamps: false,
+            lacking: None,
         }
     }
 
@@ -171,6 +175,16 @@ mod tests {
             let why = verdict(LARGE, asked, &all).unwrap_err();
             assert!(why.contains(word), "{why}");
         }
+    }
+
+    #[test]
+    fn auto_passes_by_what_cannot_be_opened() {
+        let lacking = Some("WebGPU's baseline limit max_bind_groups: 4 needed, 2 offered".to_owned());
+        let old = Adapter { lacking, ..adapter(0, "Old", AdapterKind::Discrete) };
+        let chip = adapter(1, "Chip", AdapterKind::Integrated);
+        assert_eq!(verdict(LARGE, None, &[old.clone(), chip.clone()]), Ok(1));
+        let why = verdict(LARGE, Some("old"), &[old, chip]).unwrap_err();
+        assert!(why.contains("Old") && why.contains("max_bind_groups"), "{why}");
     }
 
     #[test]

@@ -54,20 +54,34 @@ pub(super) fn auto(loaded: &LoadedScene, work: &Work) -> Result<Chosen, Error> {
 /// What there is; each adapter is opened once.
 pub(crate) fn devices() -> Devices {
     let all = adapters();
-    let auto = all.iter().find(|adapter| auto::objection(adapter).is_none());
-    let note = match (auto, all.first()) {
-        (Some(adapter), _) => format!("\"auto\" takes {} for a scene that is large enough", adapter.name),
-        (None, Some(first)) => {
-            let why = auto::objection(first).unwrap_or_default();
-            format!("\"auto\" takes the CPU backend: {why}")
-        }
-        (None, None) => format!("\"auto\" takes the CPU backend: {}", GpuError::NoAdapter),
+    let devices: Vec<Listed> = all.iter().map(listed).collect();
+    let (auto, note) = taken_by_auto(&all, &devices);
+    Devices { gpu_backend: true, auto, note, devices }
+}
+
+/// The adapter that `auto` takes for a scene that is large enough, marked only if it was opened, and what to say of it.
+fn taken_by_auto(all: &[Adapter], listed: &[Listed]) -> (Option<usize>, String) {
+    let Some(first) = all.first() else {
+        return (None, format!("\"auto\" takes the CPU backend: {}", GpuError::NoAdapter));
     };
-    Devices {
-        gpu_backend: true,
-        auto: auto.map(|adapter| adapter.index),
-        note,
-        devices: all.iter().map(listed).collect(),
+    let Some((adapter, device)) =
+        all.iter().zip(listed).find(|(adapter, _)| auto::objection(adapter).is_none())
+    else {
+        let why = auto::objection(first).unwrap_or_default();
+        return (None, format!("\"auto\" takes the CPU backend: {why}"));
+    };
+    match &device.why {
+        None => {
+            (Some(adapter.index), format!("\"auto\" takes {} for a scene that is large enough", adapter.name))
+        }
+        Some(why) => {
+            let note = format!(
+                "\"auto\" takes {} for a scene that is large enough, and fails: {why}; name another with --adapter, or \
+                 use \"cpu\"",
+                adapter.name
+            );
+            (None, note)
+        }
     }
 }
 
