@@ -50,7 +50,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
 
 /// One run: with what it was made, how many rows ended how, and the rows.
 fn section(title: &str, options: &[&str], load: Option<&str>, found: &Value) -> String {
-    let text = |value: &Value| value.as_str().unwrap_or("unknown").to_owned();
+    let text = |value: &Value| value.as_str().unwrap_or("unknown").replace('|', "\\|");
     let rows = found["rows"].as_array().map(Vec::as_slice).unwrap_or_default();
     let count = |outcome: &str| rows.iter().filter(|row| row["outcome"] == outcome).count();
     let command = [&["cargo xtask parity"], options].concat().join(" ");
