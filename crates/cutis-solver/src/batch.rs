@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use cutis_coloring::Groups;
 use cutis_constraints::{Constraint, Params, Scalar};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use simba::simd::SimdValue;
 
 use crate::coloured::SharedVertices;
@@ -292,6 +292,14 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
             if compliance > 0.0 { 0.5 * c * c / compliance } else { 0.0 }
         };
         Some((0..self.indices.len()).map(energy).sum())
+    }
+
+    fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64 {
+        let params = self.params[k].as_ref();
+        let params = <C::Params<f64> as Params<f64>>::from_fn(|j| params[j].to_f64());
+        let eval = C::eval(&std::array::from_fn(|i| x[i]), &params);
+        grad.copy_from_slice(&eval.grad);
+        eval.c
     }
 
     fn bytes(&self) -> usize {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use cutis_constraints::Scalar;
+use nalgebra::{Point3, Vector3};
 
 use crate::batch::Project;
 use crate::{Residual, Stiffness, Vertex};
@@ -47,6 +48,12 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     fn residual(&self, vertices: &[Vertex<T>]) -> Residual;
     /// `Σ ½C²/α` in joules over the constraints with `α > 0`; `None` for a PBD stiffness, which stands for no energy.
     fn elastic_energy(&self, vertices: &[Vertex<T>]) -> Option<f64>;
+    /// `C` of constraint `k` (in the order of the colours) in `f64`, with its vertices at `x`; `grad` takes the gradients. For
+    /// whoever needs the energies without a solver.
+    ///
+    /// # Panics
+    /// If there is no such constraint, or if `x` or `grad` has not [`arity`](Self::arity) elements.
+    fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64;
     /// Bytes that the kind stores.
     fn bytes(&self) -> usize;
 

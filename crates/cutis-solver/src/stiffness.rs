@@ -14,8 +14,12 @@ pub enum Values<T> {
 }
 
 impl<T: Copy> Values<T> {
+    /// The value of constraint `index`.
+    ///
+    /// # Panics
+    /// If there is none.
     #[inline(always)]
-    pub(crate) fn at(&self, index: usize) -> T {
+    pub fn at(&self, index: usize) -> T {
         match self {
             Self::Uniform(value) => *value,
             Self::Each(values) => values[index],
