@@ -37,6 +37,7 @@ pub mod report;
 mod run;
 pub mod scene;
 mod source;
+mod system;
 
 pub use cutis_coloring as coloring;
 pub use cutis_constraints as constraints;
@@ -64,6 +65,7 @@ pub use progress::{Progress, Silent};
 pub use run::run_on;
 pub use run::{RunOptions, run};
 pub use scene::{LoadedScene, Override, Scene};
+pub use system::{SceneSystem, build_system};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
