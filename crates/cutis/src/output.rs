@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cutis_mesh::Shell;
 use cutis_mesh::vtk::{self, Cells, Piece, PointData, PointValues, Space};
-use cutis_render::plot::{Axis, Scale, Series, line_chart};
+use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
 use cutis_resample::Warp;
 use cutis_volume::{Volume, nifti};
 use nalgebra::Point3;
@@ -174,7 +174,8 @@ pub(crate) fn write_html(
                 [(name("mean"), mean), (name("in the middle"), middle)]
             })
             .collect();
-        let series: Vec<Series<'_>> = curves.iter().map(|(name, points)| Series { name, points }).collect();
+        let series: Vec<Series<'_>> =
+            curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Line }).collect();
         let axis = |label| Axis { label, scale: Scale::Linear };
         plots.push(line_chart(
             "Opening of the wound",
