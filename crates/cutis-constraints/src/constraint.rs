@@ -128,6 +128,7 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;
     /// `C` and `∇C` at `x` (positions in metres).
     fn eval<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Eval<T, N>;
-    /// The size that `C` is compared with in residuals: rest length (m), rest area (m²), rest volume (m³).
+    /// The size that `C` is compared with in residuals: rest length (m), rest area (m²), rest volume (m³). Zero stands for a
+    /// rest shape without size, from which `SystemBuilder` takes no parameters.
     fn rest_size<T: Real>(params: &Self::Params<T>) -> T;
 }

@@ -3,6 +3,7 @@
 
 use std::marker::PhantomData;
 use std::ops::Range;
+use std::sync::Arc;
 
 use cutis_coloring::Groups;
 use cutis_constraints::{Constraint, Params, Scalar};
@@ -11,7 +12,7 @@ use simba::simd::SimdValue;
 
 use crate::coloured::SharedVertices;
 use crate::{
-    ConstraintSet, Pbd, Residual, Rule, SolverError, Step, Stiffness, Values, Vertex, Xpbd, project,
+    ConstraintSet, Kind, Pbd, Residual, Rule, SolverError, Step, Stiffness, Values, Vertex, Xpbd, project,
 };
 
 /// Where a loop over constraints reads and moves vertices.
@@ -294,12 +295,37 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
         Some((0..self.indices.len()).map(energy).sum())
     }
 
+    fn collapsed(&self, vertices: &[Vertex<T>], tolerance: f64) -> Option<(usize, f64)> {
+        (0..self.indices.len()).find_map(|k| {
+            let eval = C::eval(&self.positions(k, vertices), &self.params[k]);
+            let ratio = eval.c.to_f64() / C::rest_size(&self.params[k]).to_f64();
+            let free = |&i: &usize| vertices[self.indices[k][i] as usize].inverse_mass() > T::zero();
+            let mut movable = (0..N).filter(free).peekable();
+            let cannot_act = movable.peek().is_some() && movable.all(|i| eval.grad[i] == Vector3::zeros());
+            (ratio.is_finite() && ratio.abs() > tolerance && cannot_act).then_some((k, ratio))
+        })
+    }
+
     fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64 {
         let params = self.params[k].as_ref();
         let params = <C::Params<f64> as Params<f64>>::from_fn(|j| params[j].to_f64());
         let eval = C::eval(&std::array::from_fn(|i| x[i]), &params);
         grad.copy_from_slice(&eval.grad);
         eval.c
+    }
+
+    fn to_f64(&self) -> Kind<f64> {
+        let wide = |params: &C::Params<T>| {
+            <C::Params<f64> as Params<f64>>::from_fn(|j| params.as_ref()[j].to_f64())
+        };
+        Arc::new(Batch::<C, N, f64, C::Params<f64>> {
+            vertex_count: self.vertex_count,
+            offsets: self.offsets.clone(),
+            indices: self.indices.clone(),
+            params: self.params.iter().map(wide).collect(),
+            stiffness: self.stiffness.to_f64(),
+            kind: PhantomData,
+        })
     }
 
     fn bytes(&self) -> usize {

@@ -1,6 +1,7 @@
 //! Building a system: everything is checked here, so that nothing has to be checked in a step.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use cutis_coloring::Groups;
 use cutis_constraints::{Constraint, Scalar};
@@ -94,14 +95,15 @@ impl<T: Scalar> SystemBuilder<T> {
         groups: &Groups,
     ) -> Result<Self, SolverError> {
         let batch = Batch::<C, N, T, _>::new(self.system.vertices.len(), indices, params, stiffness, groups)?;
-        self.system.kinds.push(Box::new(batch));
+        self.system.kinds.push(Arc::new(batch));
         Ok(self)
     }
 
     /// The same with parameters taken from the positions given to [`new`](Self::new).
     ///
     /// # Errors
-    /// As for [`add`](Self::add).
+    /// As for [`add`](Self::add), and [`SolverError::RestShape`] for a rest shape without size. A rest size of zero that
+    /// is wanted, as of a spring of length zero, is given to [`add`](Self::add).
     pub fn add_from_rest<C: Constraint<N>, const N: usize>(
         self,
         indices: &[[u32; N]],
@@ -118,7 +120,12 @@ impl<T: Scalar> SystemBuilder<T> {
                 let error = SolverError::VertexOutOfRange { kind, constraint, vertex, vertex_count };
                 *place = vertices.get(vertex as usize).ok_or(error)?.position();
             }
-            params.push(C::from_rest(&x, material));
+            let of_rest = C::from_rest(&x, material);
+            if C::rest_size(&of_rest) == T::zero() {
+                let (kind, vertices) = (C::NAME, tuple.to_vec());
+                return Err(SolverError::RestShape { kind, constraint, vertices });
+            }
+            params.push(of_rest);
         }
         self.add::<C, N>(indices, &params, stiffness, groups)
     }

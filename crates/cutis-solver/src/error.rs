@@ -92,6 +92,33 @@ pub enum SolverError {
         /// What it was.
         value: f64,
     },
+    /// The rest shape of a constraint has no size: a mesh with two vertices at one place, a flat triangle or tetrahedron.
+    #[error(
+        "{kind} constraint {constraint} of the vertices {vertices:?} has a rest shape of size 0; \
+             its vertices must span an element"
+    )]
+    RestShape {
+        /// Which kind.
+        kind: &'static str,
+        /// Which constraint.
+        constraint: usize,
+        /// Its vertices.
+        vertices: Vec<u32>,
+    },
+    /// A constraint is violated and cannot act: its gradient is zero, as where its vertices have collapsed to a point or a
+    /// line. No step will change that by itself.
+    #[error(
+        "{kind} of the vertices {vertices:?} is off by {ratio} of its rest size and has no gradient there: \
+             its vertices have collapsed, and nothing says in which direction they should part"
+    )]
+    Collapsed {
+        /// Which kind.
+        kind: &'static str,
+        /// The vertices of the constraint.
+        vertices: Vec<u32>,
+        /// Its value over its rest size.
+        ratio: f64,
+    },
     /// A stiffness or a compliance is out of range.
     #[error("{kind}{}: stiffness is {value}; expected {expected}", constraint.map(|k| format!(" constraint {k}")).unwrap_or_default())]
     Stiffness {

@@ -1,6 +1,7 @@
 //! A kind of constraint as backends see it: one virtual call per chunk of a colour, never per constraint.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
@@ -48,12 +49,18 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     fn residual(&self, vertices: &[Vertex<T>]) -> Residual;
     /// `Σ ½C²/α` in joules over the constraints with `α > 0`; `None` for a PBD stiffness, which stands for no energy.
     fn elastic_energy(&self, vertices: &[Vertex<T>]) -> Option<f64>;
+    /// The first constraint (in the order of the colours) that is off by more than `tolerance` of its rest size and cannot
+    /// act, because its gradient is zero at every vertex that could move: its index, and its value over its rest size. Rest
+    /// sizes of zero are left out, and so are constraints of which no vertex can move.
+    fn collapsed(&self, vertices: &[Vertex<T>], tolerance: f64) -> Option<(usize, f64)>;
     /// `C` of constraint `k` (in the order of the colours) in `f64`, with its vertices at `x`; `grad` takes the gradients. For
     /// whoever needs the energies without a solver.
     ///
     /// # Panics
     /// If there is no such constraint, or if `x` or `grad` has not [`arity`](Self::arity) elements.
     fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64;
+    /// The same constraints in double precision, with exactly these parameters and stiffnesses.
+    fn to_f64(&self) -> Kind<f64>;
     /// Bytes that the kind stores.
     fn bytes(&self) -> usize;
 
@@ -78,5 +85,5 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     }
 }
 
-/// A kind as a system stores it.
-pub type Kind<T> = Box<dyn ConstraintSet<T>>;
+/// A kind as a system stores it. It never changes, so that copies of a system share it.
+pub type Kind<T> = Arc<dyn ConstraintSet<T>>;

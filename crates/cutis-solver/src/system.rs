@@ -7,7 +7,8 @@ use crate::{Carried, Energy, Kind, MemoryPart, Momentum, Residual, SolverError, 
 
 /// A body ready to be solved; built and checked by [`SystemBuilder`](crate::SystemBuilder).
 ///
-/// A kind that was not added has no storage here at all.
+/// A kind that was not added has no storage here at all. Clones share the kinds.
+#[derive(Clone)]
 pub struct System<T: Scalar> {
     pub(crate) origin: Vector3<T>,
     pub(crate) vertices: Vec<Vertex<T>>,
@@ -80,6 +81,19 @@ impl<T: Scalar> System<T> {
         (&mut self.vertices, &self.kinds)
     }
 
+    /// The same body in double precision: each number is what it was, only what a solver makes of them has fewer
+    /// rounding errors. For references.
+    pub fn to_f64(&self) -> System<f64> {
+        System {
+            origin: self.origin.map(T::to_f64),
+            vertices: self.vertices.iter().map(|vertex| vertex.to_f64()).collect(),
+            previous: self.previous.iter().map(|place| place.map(T::to_f64)).collect(),
+            velocities: self.velocities.iter().map(|velocity| velocity.map(T::to_f64)).collect(),
+            kinds: self.kinds.iter().map(|kind| kind.to_f64()).collect(),
+            handles: self.handles.iter().map(Carried::to_f64).collect(),
+        }
+    }
+
     pub(crate) fn block(&mut self) -> VertexBlock<'_, T> {
         VertexBlock {
             vertices: &mut self.vertices,
@@ -135,6 +149,21 @@ impl<T: Scalar> System<T> {
     /// Residual of each kind at the present positions.
     pub fn residuals(&self) -> Vec<Residual> {
         self.kinds.iter().map(|kind| kind.residual(&self.vertices)).collect()
+    }
+
+    /// Whether every violated constraint can act at the present positions; `tolerance` is the value over the rest size from
+    /// which on it counts as violated.
+    ///
+    /// # Errors
+    /// [`SolverError::Collapsed`] names the first that cannot.
+    pub fn check_collapsed(&self, tolerance: f64) -> Result<(), SolverError> {
+        for set in &self.kinds {
+            if let Some((k, ratio)) = set.collapsed(&self.vertices, tolerance) {
+                let vertices = set.indices().chunks_exact(set.arity()).nth(k).unwrap_or_default().to_vec();
+                return Err(SolverError::Collapsed { kind: set.name(), vertices, ratio });
+            }
+        }
+        Ok(())
     }
 
     /// Vertices with finite mass: mass in kg, position in the caller's coordinates, velocity.

@@ -189,3 +189,39 @@ fn measures_agree_with_closed_forms() {
     assert_eq!(system.max_displacement(&moved).unwrap(), 3.0);
     assert!(system.max_displacement(&moved[1..]).is_err());
 }
+
+#[test]
+fn rest_shapes_without_size_are_named() {
+    let mut points = points().to_vec();
+    points[2] = points[1];
+    points.push(Point3::new(0.0, 1.0, 0.0));
+    let builder = || SystemBuilder::<f64>::new(&points, &[1.0; 4]).unwrap();
+    let error = builder().add_from_rest::<Distance, 2>(&EDGES, &Default::default(), soft(), &groups());
+    let error = error.err().unwrap();
+    assert_eq!(error, SolverError::RestShape { kind: "distance", constraint: 1, vertices: vec![1, 2] });
+    let flat = [[0, 1, 2, 3]];
+    let groups = greedy(&flat, 4).unwrap();
+    let error = builder().add_from_rest::<Volume, 4>(&flat, &Default::default(), soft(), &groups);
+    assert!(matches!(error.err(), Some(SolverError::RestShape { kind: "volume", constraint: 0, .. })));
+    // Asked for by name, a spring of length zero is no mistake.
+    assert!(add(&EDGES, &[[0.0], [1.0]], soft(), &self::groups()).is_none());
+}
+
+#[test]
+fn a_collapsed_constraint_is_named_and_others_are_not() {
+    let system = |points: &[Point3<f64>], masses: &[f64; 3], lengths: &[[f64; 1]]| {
+        let builder = SystemBuilder::<f64>::new(points, masses).unwrap();
+        builder.add::<Distance, 2>(&EDGES, lengths, soft(), &groups()).unwrap().build()
+    };
+    let mut together = points();
+    together[2] = together[1];
+    let error = system(&together, &[0.0, 0.0, 1.0], &[[1.0], [2.0]]).check_collapsed(0.1);
+    assert_eq!(
+        error,
+        Err(SolverError::Collapsed { kind: "distance", vertices: vec![1, 2], ratio: -1.0 }),
+        "the first edge is at rest, the second has no direction"
+    );
+    assert_eq!(system(&together, &[0.0; 3], &[[1.0], [2.0]]).check_collapsed(0.1), Ok(()), "held on purpose");
+    assert_eq!(system(&together, &[1.0; 3], &[[1.0], [0.0]]).check_collapsed(0.1), Ok(()), "at rest");
+    assert_eq!(system(&points(), &[1.0; 3], &[[5.0], [5.0]]).check_collapsed(0.1), Ok(()), "can act");
+}
