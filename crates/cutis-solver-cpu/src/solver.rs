@@ -1,7 +1,7 @@
 //! The solver of this backend: a simulation and, if more than one thread is asked for, its own pool.
 
 use cutis_constraints::Scalar;
-use cutis_solver::{Settings, Simulation, Solver, SolverError, System};
+use cutis_solver::{Execute, Ledger, Settings, Simulation, Solver, SolverError, System, Timed};
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -42,6 +42,20 @@ impl<T: Scalar> SolverCpu<T> {
     pub fn threads(&self) -> usize {
         self.threads
     }
+
+    /// Runs frames on the threads of the pool, by what `wrap` makes of their execution.
+    fn run<E: Execute<T>>(
+        &mut self,
+        frames: usize,
+        wrap: impl FnOnce(Parallel) -> E + Send,
+    ) -> Result<(), SolverError> {
+        let (simulation, threads) = (&mut self.simulation, self.threads);
+        let run = || simulation.run(frames, &wrap(Parallel { threads }));
+        match &self.pool {
+            Some(pool) => pool.install(run),
+            None => run(),
+        }
+    }
 }
 
 fn pool(threads: usize) -> Result<ThreadPool, CpuError> {
@@ -58,12 +72,11 @@ impl<T: Scalar> Solver<T> for SolverCpu<T> {
     }
 
     fn step(&mut self, frames: usize) -> Result<(), SolverError> {
-        let (simulation, threads) = (&mut self.simulation, self.threads);
-        let mut run = || simulation.run(frames, &Parallel { threads });
-        match &self.pool {
-            Some(pool) => pool.install(run),
-            None => run(),
-        }
+        self.run(frames, |parallel| parallel)
+    }
+
+    fn step_timed(&mut self, frames: usize, ledger: &mut Ledger) -> Result<(), SolverError> {
+        self.run(frames, |parallel| Timed::new(parallel, ledger))
     }
 
     fn restore(

@@ -2,14 +2,17 @@
 
 mod lattice;
 
+use std::time::Instant;
+
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
 use cutis_solver::{
-    Formulation, Handle, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
-    Values,
+    Formulation, Handle, Ledger, Settings, Solver, SolverError, SolverReference, Stiffness, System,
+    SystemBuilder, Values,
 };
 use cutis_solver_cpu::{CpuError, SolverCpu};
 use lattice::Kuhn;
+use nalgebra::Point3;
 
 /// A block large enough for several chunks of every colour and several blocks of vertices: all kinds, one face fixed,
 /// an edge carried by a handle.
@@ -116,5 +119,61 @@ fn a_number_of_threads_that_makes_no_sense_is_refused() {
         let solver =
             SolverCpu::new(body::<f32>(Formulation::Pbd), settings(Formulation::Pbd, 1), Some(threads));
         assert!(matches!(solver.err(), Some(CpuError::Threads { .. })));
+    }
+}
+
+/// What timing tells, and that it changes no bit.
+#[test]
+fn a_timed_step_has_the_same_bits_and_tells_its_parts() {
+    let settings = |iterations| Settings { iterations, substeps: 3, ..Settings::default() };
+    for iterations in [1, 2] {
+        let mut plain = SolverReference::<f32>::new(body(Formulation::Xpbd), settings(iterations)).unwrap();
+        plain.step(2).unwrap();
+        let mut timed: [Box<dyn Solver<f32>>; 3] = [
+            Box::new(SolverReference::new(body(Formulation::Xpbd), settings(iterations)).unwrap()),
+            Box::new(SolverCpu::new(body(Formulation::Xpbd), settings(iterations), Some(1)).unwrap()),
+            Box::new(SolverCpu::new(body(Formulation::Xpbd), settings(iterations), Some(3)).unwrap()),
+        ];
+        for solver in &mut timed {
+            let mut ledger = Ledger::default();
+            let start = Instant::now();
+            solver.step_timed(1, &mut ledger).unwrap();
+            solver.step_timed(1, &mut ledger).unwrap();
+            let wall = start.elapsed().as_secs_f64();
+            assert!(solver.positions().unwrap() == plain.positions().unwrap());
+            assert!(solver.velocities().unwrap() == plain.velocities().unwrap());
+            let names: Vec<&str> = ledger.parts().iter().map(|part| part.name).collect();
+            let clear: &[&str] = if iterations > 1 { &["multipliers"] } else { &[] };
+            let expected =
+                [&["vertices", "handles"], clear, &["distance", "stc", "volume", "check"]].concat();
+            assert_eq!(names, expected);
+            assert!(ledger.parts().iter().all(|part| part.seconds > 0.0));
+            assert!(ledger.total_s() <= wall && ledger.total_s() > 0.5 * wall, "{ledger:?} of {wall} s");
+        }
+    }
+}
+
+/// The same body in double precision, moved as a body that was built in double precision from the same numbers.
+#[test]
+fn a_body_in_double_precision_is_the_same_body() {
+    for formulation in [Formulation::Pbd, Formulation::Xpbd] {
+        let settings = Settings { formulation, substeps: 2, iterations: 2, ..Settings::default() };
+        let same = body::<f64>(formulation).to_f64();
+        let mut expected = SolverCpu::new(body::<f64>(formulation), settings, Some(1)).unwrap();
+        let mut found = SolverCpu::new(same, settings, Some(2)).unwrap();
+        let mut wide = SolverCpu::new(body::<f32>(formulation).to_f64(), settings, Some(2)).unwrap();
+        let mut narrow = SolverCpu::new(body::<f32>(formulation), settings, Some(2)).unwrap();
+        for solver in [&mut expected, &mut found, &mut wide] {
+            solver.step(2).unwrap();
+        }
+        narrow.step(2).unwrap();
+        assert!(found.positions().unwrap() == expected.positions().unwrap());
+        let apart = |a: &[Point3<f64>], b: &[Point3<f64>]| {
+            a.iter().zip(b).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+        };
+        let narrow: Vec<Point3<f64>> = narrow.positions().unwrap().iter().map(|p| p.cast()).collect();
+        let wide = wide.positions().unwrap();
+        assert!((1e-12..1e-5).contains(&apart(&wide, &narrow)), "{}", apart(&wide, &narrow));
+        assert!(apart(&wide, &expected.positions().unwrap()) < 1e-5);
     }
 }

@@ -315,9 +315,8 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
     }
 
     fn to_f64(&self) -> Kind<f64> {
-        let wide = |params: &C::Params<T>| {
-            <C::Params<f64> as Params<f64>>::from_fn(|j| params.as_ref()[j].to_f64())
-        };
+        let wide =
+            |params: &C::Params<T>| <C::Params<f64> as Params<f64>>::from_fn(|j| params.as_ref()[j].to_f64());
         Arc::new(Batch::<C, N, f64, C::Params<f64>> {
             vertex_count: self.vertex_count,
             offsets: self.offsets.clone(),

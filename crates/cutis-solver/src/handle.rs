@@ -78,6 +78,15 @@ impl<T: Scalar> Carried<T> {
         Vector3::from(self.move_m.map(|d| T::constant(d * share)))
     }
 
+    pub(crate) fn to_f64(&self) -> Carried<f64> {
+        Carried {
+            vertices: self.vertices.clone(),
+            rest: self.rest.iter().map(|place| place.map(T::to_f64)).collect(),
+            move_m: self.move_m,
+            over_s: self.over_s,
+        }
+    }
+
     /// Puts the vertices where they are at `time_s`.
     pub(crate) fn carry(&self, vertices: &mut [Vertex<T>], time_s: f64) {
         let path = self.path(time_s);

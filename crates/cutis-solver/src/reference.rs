@@ -4,8 +4,8 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    ConstraintSet, Execute, Settings, Simulation, Solver, SolverError, Step, Sweep, System, Vertex,
-    VertexBlock,
+    ConstraintSet, Execute, Ledger, Settings, Simulation, Solver, SolverError, Step, Sweep, System, Timed,
+    Vertex, VertexBlock,
 };
 
 /// Runs every pass on the calling thread, in ascending order.
@@ -57,6 +57,10 @@ impl<T: Scalar> Solver<T> for SolverReference<T> {
 
     fn step(&mut self, frames: usize) -> Result<(), SolverError> {
         self.simulation.run(frames, &Serial)
+    }
+
+    fn step_timed(&mut self, frames: usize, ledger: &mut Ledger) -> Result<(), SolverError> {
+        self.simulation.run(frames, &Timed::new(Serial, ledger))
     }
 
     fn restore(

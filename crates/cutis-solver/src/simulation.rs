@@ -5,8 +5,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::passes::Integrator;
 use crate::{
-    Clock, ConstraintSet, Formulation, Motion, Schedule, Settings, SolverError, Step, Sweep, System, Vertex,
-    VertexBlock,
+    Clock, ConstraintSet, Formulation, Ledger, Motion, Schedule, Settings, SolverError, Step, Sweep, System,
+    Vertex, VertexBlock,
 };
 
 /// How the passes of a substep are executed on the host: one after the other, or by several threads.
@@ -23,6 +23,11 @@ pub trait Execute<T: Scalar> {
         step: Step<T>,
         multipliers: &mut [T],
     );
+
+    /// Runs what one thread does between the passes; `part` is its name in a [`Ledger`](crate::Ledger).
+    fn alone(&self, _part: &'static str, work: &mut dyn FnMut()) {
+        work();
+    }
 
     /// The first vertex with a coordinate that is not finite.
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize>;
@@ -140,7 +145,10 @@ impl<T: Scalar> Simulation<T> {
         let end = self.clock.frame.saturating_add(frames as u64);
         while self.clock.frame < end {
             self.move_vertices(motion, execute);
-            self.system.carry_handles(self.time_s() + self.settings.substep_s());
+            if !self.system.handles.is_empty() {
+                let time_s = self.time_s() + self.settings.substep_s();
+                execute.alone(Ledger::HANDLES, &mut || self.system.carry_handles(time_s));
+            }
             self.project(execute);
             if let Some(vertex) = execute.first_not_finite(&self.system.vertices) {
                 self.move_vertices(Motion::Restore, execute);
@@ -179,8 +187,10 @@ impl<T: Scalar> Simulation<T> {
     }
 
     fn project(&mut self, execute: &impl Execute<T>) {
-        for kind in &mut self.multipliers {
-            kind.fill(T::zero());
+        if self.settings.keeps_multipliers() {
+            let multipliers = &mut self.multipliers;
+            let clear = &mut || multipliers.iter_mut().for_each(|kind| kind.fill(T::zero()));
+            execute.alone(Ledger::MULTIPLIERS, clear);
         }
         for _ in 0..self.schedule.iterations {
             for &sweep in &self.schedule.sweeps {

@@ -27,6 +27,15 @@ impl<T: Copy> Values<T> {
     }
 }
 
+impl<T: Scalar> Values<T> {
+    fn to_f64(&self) -> Values<f64> {
+        match self {
+            Self::Uniform(value) => Values::Uniform(value.to_f64()),
+            Self::Each(values) => Values::Each(values.iter().map(|value| value.to_f64()).collect()),
+        }
+    }
+}
+
 /// Stiffness of a kind, in the terms of one formulation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stiffness<T> {
@@ -59,6 +68,14 @@ impl<T: Scalar> Stiffness<T> {
     pub fn values(&self) -> &Values<T> {
         match self {
             Self::Pbd(values) | Self::Compliance(values) => values,
+        }
+    }
+
+    /// The same numbers in double precision.
+    pub fn to_f64(&self) -> Stiffness<f64> {
+        match self {
+            Self::Pbd(values) => Stiffness::Pbd(values.to_f64()),
+            Self::Compliance(values) => Stiffness::Compliance(values.to_f64()),
         }
     }
 

@@ -34,6 +34,10 @@ impl<T: Scalar> Vertex<T> {
         self.0[index]
     }
 
+    pub(crate) fn to_f64(self) -> Vertex<f64> {
+        Vertex(self.0.map(T::to_f64))
+    }
+
     /// Moves the vertex; the mass stays.
     #[inline(always)]
     pub fn set_position(&mut self, position: Point3<T>) {

@@ -1,0 +1,121 @@
+//! Where the time of a step goes, part by part; only for whoever asks.
+
+use std::cell::RefCell;
+use std::time::Instant;
+
+use cutis_constraints::Scalar;
+
+use crate::{ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
+
+/// Time of one part of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimePart {
+    /// One of the constants of [`Ledger`], or the name of a kind of constraint.
+    pub name: &'static str,
+    /// Wall time in seconds.
+    pub seconds: f64,
+}
+
+/// Wall time of steps by part, added up over as many steps as it is given to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ledger {
+    parts: Vec<TimePart>,
+}
+
+impl Ledger {
+    /// Prediction and velocities.
+    pub const VERTICES: &'static str = "vertices";
+    /// Vertices that handles carry.
+    pub const HANDLES: &'static str = "handles";
+    /// Multipliers, set to zero at the start of a substep.
+    pub const MULTIPLIERS: &'static str = "multipliers";
+    /// The look at whether all positions are finite.
+    pub const CHECK: &'static str = "check";
+    /// The whole step, of a backend that cannot tell its parts.
+    pub const STEP: &'static str = "step";
+
+    /// The parts in the order in which they first ran; a kind under its name, and what did not run not at all.
+    pub fn parts(&self) -> &[TimePart] {
+        &self.parts
+    }
+
+    /// Seconds of one part; 0 if it did not run.
+    pub fn seconds(&self, name: &str) -> f64 {
+        self.parts.iter().filter(|part| part.name == name).map(|part| part.seconds).sum()
+    }
+
+    /// Seconds of all parts.
+    pub fn total_s(&self) -> f64 {
+        self.parts.iter().map(|part| part.seconds).sum()
+    }
+
+    /// Adds `seconds` to a part.
+    pub fn add(&mut self, name: &'static str, seconds: f64) {
+        match self.parts.iter_mut().find(|part| part.name == name) {
+            Some(part) => part.seconds += seconds,
+            None => self.parts.push(TimePart { name, seconds }),
+        }
+    }
+
+    /// Runs `work` and adds the time that it takes to a part.
+    pub fn time<R>(&mut self, name: &'static str, work: impl FnOnce() -> R) -> R {
+        let start = Instant::now();
+        let result = work();
+        self.add(name, start.elapsed().as_secs_f64());
+        result
+    }
+}
+
+/// Executes as another does, with the same bits, and enters the time of every pass.
+pub struct Timed<'a, E> {
+    inner: E,
+    ledger: RefCell<&'a mut Ledger>,
+}
+
+impl<'a, E> Timed<'a, E> {
+    /// Enters what `inner` takes into `ledger`.
+    pub fn new(inner: E, ledger: &'a mut Ledger) -> Self {
+        Self { inner, ledger: RefCell::new(ledger) }
+    }
+}
+
+impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
+    fn vertices(&self, block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync)) {
+        self.ledger.borrow_mut().time(Ledger::VERTICES, || self.inner.vertices(block, pass));
+    }
+
+    fn sweep(
+        &self,
+        sweep: Sweep,
+        set: &dyn ConstraintSet<T>,
+        vertices: &mut [Vertex<T>],
+        step: Step<T>,
+        multipliers: &mut [T],
+    ) {
+        let work = || self.inner.sweep(sweep, set, vertices, step, multipliers);
+        self.ledger.borrow_mut().time(set.name(), work);
+    }
+
+    fn alone(&self, part: &'static str, work: &mut dyn FnMut()) {
+        self.ledger.borrow_mut().time(part, || self.inner.alone(part, work));
+    }
+
+    fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {
+        self.ledger.borrow_mut().time(Ledger::CHECK, || self.inner.first_not_finite(vertices))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_add_up_and_keep_their_order() {
+        let mut ledger = Ledger::default();
+        ledger.add("b", 1.0);
+        ledger.add("a", 2.0);
+        ledger.add("b", 0.5);
+        assert_eq!(ledger.parts().iter().map(|part| part.name).collect::<Vec<_>>(), ["b", "a"]);
+        assert_eq!((ledger.seconds("b"), ledger.seconds("c"), ledger.total_s()), (1.5, 0.0, 3.5));
+    }
+}
