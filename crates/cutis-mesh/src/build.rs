@@ -5,9 +5,8 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::cells::CellMasks;
-use crate::component;
-use crate::select::{HalfSpace, present};
-use crate::{Frame, Lattice, MeshError, edges};
+use crate::select::HalfSpace;
+use crate::{Frame, Frozen, Lattice, MeshError, WholeBody, edges};
 
 /// Stands for "no vertex" in [`TetMesh::vertex_of_point`].
 pub const NO_VERTEX: u32 = u32::MAX;
@@ -47,6 +46,8 @@ pub struct TetMesh {
     pub components: usize,
     /// Tissue tets that were dropped with the smaller components.
     pub dropped_tets: usize,
+    /// What a region left out of the mesh, if it was built within one ([`WholeBody::mesh_within`]).
+    pub frozen: Option<Frozen>,
 }
 
 impl TetMesh {
@@ -67,38 +68,20 @@ impl TetMesh {
     /// [`MeshError::Length`] for arrays of another length, [`MeshError::NotFinite`] for a HU value of a mesh vertex that is NaN or
     /// infinite, [`MeshError::Plane`] for a bad half-space, [`MeshError::NoTissue`] if no tet is kept.
     pub fn build(lattice: &Lattice, hu: &[f32], tissue: &Tissue<'_>) -> Result<Self, MeshError> {
-        let grid = lattice.grid();
-        if hu.len() != grid.len() {
-            return Err(MeshError::Length { array: "hu", expected: grid.len(), found: hu.len() });
-        }
-        let present = present(lattice, tissue.air, tissue.cut_away)?;
-        let all = CellMasks::of_points(lattice, &present);
-        let before = all.tet_count();
-        if before == 0 {
-            return Err(MeshError::NoTissue {
-                tets: lattice.tet_count(),
-                tissue_vertices: present.iter().filter(|&&p| p).count(),
-                vertices: grid.len(),
-            });
-        }
-        drop(present);
-        let (masks, components) = if tissue.largest_component {
-            let largest = component::largest(all);
-            (largest.masks, largest.components)
-        } else {
-            (all, 1)
-        };
-        Self::from_masks(lattice, hu, &masks, components, before)
+        WholeBody::find(lattice, tissue)?.mesh(hu)
     }
 
-    fn from_masks(
-        lattice: &Lattice,
+    /// Numbers the vertices of the tets in `masks` and lists tets and edges.
+    pub(crate) fn from_masks(
+        whole: &WholeBody,
         hu_at_grid: &[f32],
         masks: &CellMasks,
-        components: usize,
-        before: usize,
     ) -> Result<Self, MeshError> {
+        let lattice = whole.lattice();
         let grid = lattice.grid();
+        if hu_at_grid.len() != grid.len() {
+            return Err(MeshError::Length { array: "hu", expected: grid.len(), found: hu_at_grid.len() });
+        }
         let used = masks.used_points();
         let lattice_index: Vec<u32> =
             used.iter().enumerate().filter_map(|(point, &used)| used.then_some(point as u32)).collect();
@@ -111,22 +94,22 @@ impl TetMesh {
             });
         }
         let frame = Frame::center_of(grid);
-        let local = |&point: &u32| frame.to_local(grid.mm(grid.point(point as usize)));
+        let local = |&point: &u32| frame.to_local(lattice.mm(grid.point(point as usize)));
         let positions = lattice_index.par_iter().map(local).collect();
         let vertex_of = invert(grid, &lattice_index);
         let tets = tets(grid, masks, &vertex_of);
         let edges = edges::generate(grid, masks, &lattice_index, &vertex_of);
-        let dropped_tets = before - tets.len();
         Ok(Self {
             frame,
-            lattice: *lattice,
+            lattice: lattice.clone(),
             positions,
             tets,
             edges,
             lattice_index,
             hu,
-            components,
-            dropped_tets,
+            components: whole.components(),
+            dropped_tets: whole.dropped_tets(),
+            frozen: None,
         })
     }
 

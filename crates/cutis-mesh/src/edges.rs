@@ -7,7 +7,48 @@ use crate::build::split;
 use crate::cells::CellMasks;
 use crate::{Split, TetMesh};
 
-/// An edge is there if any of the tets around it is. Ascending; lower vertex first.
+/// Which edges start at a point: an edge is there if any of the tets around it is.
+struct Starting<'a> {
+    grid: &'a Grid,
+    masks: &'a CellMasks,
+    /// Per parity and direction: step in points, and the cells around with their tets.
+    directions: [Vec<(isize, Vec<(isize, u8)>)>; 2],
+}
+
+impl<'a> Starting<'a> {
+    fn new(grid: &'a Grid, masks: &'a CellMasks) -> Self {
+        let point_step = |[i, j, k]: [i8; 3]| {
+            i as isize + grid.shape[0] as isize * (j as isize + grid.shape[1] as isize * k as isize)
+        };
+        let directions = masks.stencil.directions.each_ref().map(|directions| {
+            let around = |cells: &[([i8; 3], u8)]| {
+                cells.iter().map(|&(cell, mask)| (masks.delta(cell), mask)).collect()
+            };
+            directions.iter().map(|d| (point_step(d.step), around(&d.cells))).collect()
+        });
+        Self { grid, masks, directions }
+    }
+
+    /// A bit per direction.
+    fn at(&self, point: usize) -> u16 {
+        let [i, j, k] = self.grid.point(point);
+        let cell = self.masks.flat([i, j, k]);
+        let has = |around: &[(isize, u8)]| {
+            around.iter().any(|&(delta, mask)| self.masks.bytes[cell.wrapping_add_signed(delta)] & mask != 0)
+        };
+        let own = self.directions[(i + j + k) & 1].iter().enumerate();
+        own.fold(0u16, |bits, (d, (_, around))| bits | u16::from(has(around)) << d)
+    }
+}
+
+/// Number of edges of the tets in `masks`, whose corners are the points `used`.
+pub(crate) fn count(grid: &Grid, masks: &CellMasks, used: &[bool]) -> usize {
+    let starting = Starting::new(grid, masks);
+    let edges = |(point, _): (usize, &bool)| starting.at(point).count_ones() as usize;
+    used.par_iter().enumerate().filter(|(_, used)| **used).map(edges).sum()
+}
+
+/// Ascending; lower vertex first.
 pub(crate) fn generate(
     grid: &Grid,
     masks: &CellMasks,
@@ -17,29 +58,9 @@ pub(crate) fn generate(
     let layer_size = grid.shape[0] * grid.shape[1];
     let start = |layer: usize| lattice_index.partition_point(|&point| (point as usize) < layer * layer_size);
     let starts: Vec<usize> = (0..=grid.shape[2]).map(start).collect();
-    // Per parity and direction: step in points, and the cells around with their tets.
-    let point_step = |[i, j, k]: [i8; 3]| {
-        i as isize + grid.shape[0] as isize * (j as isize + grid.shape[1] as isize * k as isize)
-    };
-    let directions = masks.stencil.directions.each_ref().map(|directions| {
-        let around =
-            |cells: &[([i8; 3], u8)]| cells.iter().map(|&(cell, mask)| (masks.delta(cell), mask)).collect();
-        directions
-            .iter()
-            .map(|d| (point_step(d.step), around(&d.cells)))
-            .collect::<Vec<(isize, Vec<(isize, u8)>)>>()
-    });
+    let starting = Starting::new(grid, masks);
     // First pass: which directions each vertex has an edge in.
-    let present = |&point: &u32| {
-        let [i, j, k] = grid.point(point as usize);
-        let cell = masks.flat([i, j, k]);
-        let has = |around: &[(isize, u8)]| {
-            around.iter().any(|&(delta, mask)| masks.bytes[cell.wrapping_add_signed(delta)] & mask != 0)
-        };
-        let own = directions[(i + j + k) & 1].iter().enumerate();
-        own.fold(0u16, |bits, (d, (_, around))| bits | u16::from(has(around)) << d)
-    };
-    let bits: Vec<u16> = lattice_index.par_iter().map(present).collect();
+    let bits: Vec<u16> = lattice_index.par_iter().map(|&point| starting.at(point as usize)).collect();
     let layers: Vec<_> = starts.windows(2).map(|w| w[0]..w[1]).collect();
     let count =
         |layer: &std::ops::Range<usize>| bits[layer.clone()].iter().map(|b| b.count_ones() as usize).sum();
@@ -51,7 +72,8 @@ pub(crate) fn generate(
         for vertex in layer {
             let point = lattice_index[vertex] as usize;
             let parity = grid.point(point).iter().sum::<usize>() & 1;
-            let own = directions[parity].iter().enumerate().filter(|(d, _)| bits[vertex] >> d & 1 == 1);
+            let own =
+                starting.directions[parity].iter().enumerate().filter(|(d, _)| bits[vertex] >> d & 1 == 1);
             for ((_, (step, _)), edge) in own.zip(&mut out) {
                 *edge = [vertex as u32, vertex_of[point.wrapping_add_signed(*step)]];
             }

@@ -132,6 +132,53 @@ pub enum MeshError {
         /// Longest lattice step, mm.
         step_mm: f64,
     },
+    /// The slit touches vertices of the body that a region froze, or that lie where a graded lattice is coarse.
+    #[error(
+        "incision {incision} is not all inside: a vertex of the body at {at_mm:.1?} mm, {distance_mm:.1} mm from the middle of the slit, could be cut by it and lies {}",
+        if *coarse { "where the lattice is coarse" } else { "outside the region" }
+    )]
+    IncisionBeyond {
+        /// Which incision, from 0.
+        incision: usize,
+        /// How far the farthest such vertex is from the surface in the middle of the slit, mm.
+        distance_mm: f64,
+        /// Where it is, mm.
+        at_mm: [f64; 3],
+        /// It lies where a graded lattice is coarse; else a region froze it.
+        coarse: bool,
+    },
+    /// A region holds no vertex of the body.
+    #[error("the region holds none of the {vertices} vertices of the body")]
+    RegionEmpty {
+        /// Vertices of the whole body.
+        vertices: usize,
+    },
+    /// The fine zone of a graded lattice is not within the lattice.
+    #[error(
+        "along axis {axis} the fine zone reaches from step {from} to step {to} of the even lattice; it must begin before it ends and meet the lattice's {steps} steps"
+    )]
+    FineZone {
+        /// Index axis.
+        axis: usize,
+        /// Where the zone begins, in steps of the even lattice.
+        from: f64,
+        /// Where it ends.
+        to: f64,
+        /// Steps of the even lattice.
+        steps: usize,
+    },
+    /// A number of a grading is out of range.
+    #[error("the grading's `{key}` is {value}; it must lie between {low} and {high}")]
+    Grading {
+        /// `growth` or `coarsest`.
+        key: &'static str,
+        /// The value given.
+        value: f64,
+        /// Lowest value allowed.
+        low: f64,
+        /// Highest value allowed.
+        high: f64,
+    },
     /// The slit leaves no skin vertices on one of its sides.
     #[error(
         "incision {incision} leaves no lips: {left} skin vertices to the left of the slit and {right} to the right"

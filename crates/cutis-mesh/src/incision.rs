@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use crate::gape::Gape;
-use crate::slit::{Facet, Slit};
+use crate::slit::{Facet, Slit, check_indices};
 use crate::{MeshError, TetMesh};
 
 /// A straight cut along a segment on or near the skin. World millimetres.
@@ -62,16 +62,19 @@ impl Cut {
     /// not finite and positive; [`MeshError::IncisionOffSkin`], [`MeshError::IncisionThroughSkin`], [`MeshError::IncisionEmpty`] and
     /// [`MeshError::IncisionWithoutLips`] as they say.
     pub fn plan(mesh: &TetMesh, triangles: &[[u32; 3]], incisions: &[Incision]) -> Result<Self, MeshError> {
-        let vertices = mesh.positions.len();
-        for (position, triangle) in triangles.iter().enumerate() {
-            if let Some(&vertex) = triangle.iter().find(|&&vertex| vertex as usize >= vertices) {
-                return Err(MeshError::VertexIndex { array: "triangles", position, vertex, vertices });
-            }
-        }
-        let place = |(number, incision)| Slit::place(mesh, triangles, number, incision);
-        let slits = incisions.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
+        Self::of_slits(mesh, triangles, Slit::on_mesh(mesh, triangles, incisions)?)
+    }
+
+    /// As [`Cut::plan`], with slits that were placed before ([`Slit::on_lattice`]) and may lie on skin which the mesh does not have.
+    ///
+    /// # Errors
+    /// As [`Cut::plan`], less those of placing; [`MeshError::IncisionBeyond`] if a slit touches what a region left out of the mesh,
+    /// or the coarse part of a graded lattice.
+    pub fn of_slits(mesh: &TetMesh, triangles: &[[u32; 3]], slits: Vec<Slit>) -> Result<Self, MeshError> {
+        check_indices(triangles, mesh.positions.len())?;
         // Whatever a slit cuts has all corners within a cell's diagonal of it.
         let margin = mesh.lattice.grid().affine.spacing_mm().iter().sum::<f64>() / 1000.0;
+        check_within(mesh, &slits, margin)?;
         let near = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.near(p, margin))).collect();
         let removed = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.holds(p))).collect();
         let mut cut = Self { removed, slits, gapes: Vec::new(), near };
@@ -164,7 +167,9 @@ impl Cut {
                 let touched = triangle.iter().all(|v| slit.near(corner(v), step))
                     && (triangle.iter().any(|v| self.removed[*v as usize])
                         || pairs(triangle).any(|(a, b)| slit.crosses(corner(&a), corner(&b))));
-                touched && Facet::of(mesh, triangle).area_vector.dot(&slit.inward) < 0.0
+                touched
+                    && Facet::of(triangle.map(|v| mesh.positions[v as usize])).area_vector.dot(&slit.inward)
+                        < 0.0
             };
             let mut lips: Vec<u32> = triangles.iter().filter(opened).flatten().copied().collect();
             lips.sort_unstable();
@@ -174,6 +179,37 @@ impl Cut {
         };
         self.slits.iter().enumerate().map(gape).collect()
     }
+}
+
+/// Refuses slits that come within `margin` of a vertex of the body that a region froze, or that lies where a lattice is coarse.
+fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshError> {
+    let (lattice, grid) = (&mesh.lattice, mesh.lattice.grid());
+    let refuse = |positions: &mut dyn Iterator<Item = Point3<f32>>, coarse: bool| {
+        let near = positions.flat_map(|position| {
+            let touching = slits.iter().enumerate().filter(move |(_, slit)| slit.near(position, margin));
+            touching.map(move |(incision, slit)| (incision, slit.distance(position), position))
+        });
+        match near.max_by(|(_, a, _), (_, b, _)| a.total_cmp(b)) {
+            None => Ok(()),
+            Some((incision, distance, position)) => Err(MeshError::IncisionBeyond {
+                incision,
+                distance_mm: distance * 1000.0,
+                at_mm: mesh.frame.to_mm(position).into(),
+                coarse,
+            }),
+        }
+    };
+    if let Some(frozen) = &mesh.frozen {
+        let border = mesh.positions.iter().zip(&frozen.border).filter(|(_, border)| **border);
+        let beyond = frozen.points.iter().enumerate().filter(|(_, frozen)| **frozen);
+        let beyond = beyond.map(|(point, _)| mesh.frame.to_local(lattice.mm(grid.point(point))));
+        refuse(&mut border.map(|(position, _)| *position).chain(beyond), false)?;
+    }
+    if let Some(planes) = lattice.planes() {
+        let coarse = |vertex: &usize| !planes.is_fine(mesh.point(*vertex as u32));
+        refuse(&mut (0..mesh.positions.len()).filter(coarse).map(|vertex| mesh.positions[vertex]), true)?;
+    }
+    Ok(())
 }
 
 /// The edges of a simplex.

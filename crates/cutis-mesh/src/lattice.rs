@@ -1,9 +1,13 @@
 //! A grid of points whose cells are split into tetrahedra.
 
-use cutis_volume::Grid;
+use std::sync::Arc;
+
+use cutis_volume::{Grid, Volume, sample};
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use crate::MeshError;
+use crate::grading::Planes;
 use crate::stencil::Stencil;
 
 /// How a cell is split into tetrahedra.
@@ -22,10 +26,14 @@ pub enum Split {
 /// A lattice: a grid of at least 2×2×2 points, and the split of its cells.
 ///
 /// Corners of a cell are numbered `di + 2 dj + 4 dk`; cell `(i, j, k)` has its corner 0 at point `(i, j, k)`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// The points lie evenly, or ([`Lattice::graded`]) on planes across each axis that are further apart away from a fine zone.
+/// Cells, tets, neighbours and colours are the same for both; only the places of the points differ.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
     grid: Grid,
     split: Split,
+    planes: Option<Arc<Planes>>,
 }
 
 impl Lattice {
@@ -38,25 +46,63 @@ impl Lattice {
     /// [`MeshError::LatticeSize`] if an axis has fewer than 2 points or there are more than [`Lattice::MAX_POINTS`];
     /// [`MeshError::LatticeExtent`] if positions or steps vanish or overflow in 32-bit metres.
     pub fn new(grid: Grid, split: Split) -> Result<Self, MeshError> {
+        Self::check(&grid, grid.shape)?;
+        Ok(Self { grid, split, planes: None })
+    }
+
+    /// The lattice whose points lie where the planes of `planes` meet; their positions are in steps of `even`.
+    ///
+    /// # Errors
+    /// As [`Lattice::new`], for `even`.
+    pub fn graded(even: Grid, split: Split, planes: Planes) -> Result<Self, MeshError> {
+        Self::check(&even, even.shape)?;
+        let grid = Grid { shape: planes.shape(), affine: even.affine };
+        Self::check(&grid, even.shape)?;
+        Ok(Self { grid, split, planes: Some(Arc::new(planes)) })
+    }
+
+    /// `reach`: points along each axis if they lay evenly.
+    fn check(grid: &Grid, reach: [usize; 3]) -> Result<(), MeshError> {
         let shape = grid.shape;
         let points = shape[0].checked_mul(shape[1]).and_then(|n| n.checked_mul(shape[2]));
         if shape.iter().any(|&n| n < 2) || points.is_none_or(|n| n > Self::MAX_POINTS) {
             return Err(MeshError::LatticeSize { shape, max: Self::MAX_POINTS });
         }
         let spacing_mm = grid.affine.spacing_mm();
-        let extent = shape.iter().zip(spacing_mm).map(|(&n, step)| n as f64 * step / 1000.0).sum::<f64>();
+        let extent = reach.iter().zip(spacing_mm).map(|(&n, step)| n as f64 * step / 1000.0).sum::<f64>();
         // Volumes are products of three lengths: keep the cubes of step and extent within f32's normal range.
         let smallest = spacing_mm.iter().fold(f64::INFINITY, |a, &b| a.min(b)) / 1000.0;
         let holds = |length: f64| (1e-12..=1e12).contains(&length);
         if !holds(smallest) || !holds(extent) {
             return Err(MeshError::LatticeExtent { spacing_mm, shape });
         }
-        Ok(Self { grid, split })
+        Ok(())
     }
 
-    /// The points.
+    /// The numbering of the points, and the affine map of the finest steps. Where a point lies is [`Lattice::mm`].
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// World position of a point, mm.
+    pub fn mm(&self, point: [usize; 3]) -> Point3<f64> {
+        match &self.planes {
+            None => self.grid.mm(point),
+            Some(planes) => self.grid.affine.to_mm(planes.index(point)),
+        }
+    }
+
+    /// The planes of a graded lattice.
+    pub fn planes(&self) -> Option<&Planes> {
+        self.planes.as_deref()
+    }
+
+    /// HU at each point, in the order of the numbering; filtered as [`sample::to_grid`] and [`sample::to_planes`] say.
+    pub fn sample(&self, volume: &Volume) -> Vec<f32> {
+        match &self.planes {
+            None => sample::to_grid(volume, &self.grid),
+            Some(planes) => sample::to_planes(volume, &self.grid, planes.axes()),
+        }
     }
 
     /// The split.
@@ -102,7 +148,7 @@ impl Lattice {
         [i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)]
     }
 
-    /// Longest of the three lattice steps, mm.
+    /// Longest of the three lattice steps, mm; on a graded lattice of the steps in its fine zone.
     pub fn longest_step_mm(&self) -> f64 {
         self.grid.affine.spacing_mm().into_iter().fold(0.0, f64::max)
     }

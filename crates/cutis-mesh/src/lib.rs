@@ -10,6 +10,7 @@ mod edges;
 mod error;
 mod frame;
 mod gape;
+mod grading;
 mod incision;
 mod lattice;
 mod mass;
@@ -21,11 +22,13 @@ mod slit;
 mod stencil;
 mod surface;
 pub mod vtk;
+mod whole;
 
 pub use build::{NO_VERTEX, TetMesh, Tissue};
 pub use error::MeshError;
 pub use frame::Frame;
 pub use gape::{Gape, WoundGape};
+pub use grading::{Grading, Planes};
 pub use incision::{Cut, Incision, Taken};
 pub use lattice::{Lattice, Split};
 pub use select::HalfSpace;
@@ -33,6 +36,7 @@ pub use shell::Shell;
 pub use skin::{Skin, SkinMode, SkinOptions, SkinReport};
 pub use slit::Slit;
 pub use surface::Topology;
+pub use whole::{Frozen, StillSkin, WholeBody};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

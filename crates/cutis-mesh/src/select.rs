@@ -48,7 +48,7 @@ pub(crate) fn present(
     cut_away.iter().try_for_each(HalfSpace::validate)?;
     let kept = |point: usize| {
         cut_away.is_empty() || {
-            let mm = grid.mm(grid.point(point));
+            let mm = lattice.mm(grid.point(point));
             !cut_away.iter().any(|half_space| half_space.contains(mm))
         }
     };
@@ -81,7 +81,7 @@ impl TetMesh {
 
     /// Tests the exact positions of the lattice points, not their 32-bit roundings.
     fn select_mm(&self, inside: impl Fn(Point3<f64>) -> bool) -> Vec<bool> {
-        let grid = self.lattice.grid();
-        self.lattice_index.iter().map(|&point| inside(grid.mm(grid.point(point as usize)))).collect()
+        let (lattice, grid) = (&self.lattice, self.lattice.grid());
+        self.lattice_index.iter().map(|&point| inside(lattice.mm(grid.point(point as usize)))).collect()
     }
 }

@@ -6,7 +6,8 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::cells::CornerBits;
-use crate::{Cut, Lattice, MeshError, NO_VERTEX, TetMesh};
+use crate::neighbors::Neighbors;
+use crate::{Cut, Frozen, Lattice, MeshError, NO_VERTEX, TetMesh};
 
 /// Tets with one to three air corners and at least one corner in the mesh.
 ///
@@ -25,12 +26,17 @@ pub struct Shell {
     pub offsets: Vec<u32>,
     /// Mesh vertices.
     pub neighbors: Vec<u32>,
+    /// Vertices of the body that a region left out and that extra vertex `n` follows besides: they hold it back.
+    pub held_by: Vec<u32>,
 }
 
 impl Shell {
     /// The shell of a mesh of this lattice. `air` is as for [`TetMesh::build`]; `cut` is what was cut out of the mesh.
     ///
     /// An extra vertex follows the mesh vertices that a lattice edge joins with it, except removed ones and those on the other side of a slit.
+    ///
+    /// Of a mesh within a region ([`TetMesh::frozen`]) the shell is that part of the whole body's shell that can move. What the region left out
+    /// stays, and holds back what follows it, so that where the mesh moves as the whole body would, the shell does too.
     ///
     /// # Errors
     /// [`MeshError::Length`] if `air` has not one value per lattice point, or `cut` belongs to another mesh.
@@ -48,7 +54,20 @@ impl Shell {
             });
         }
         let mut vertex_of = mesh.vertex_of_point();
-        let found = mixed_tets(lattice, &vertex_of, air);
+        let found = match &mesh.frozen {
+            None => {
+                let body: Vec<bool> = vertex_of.iter().map(|&vertex| vertex != NO_VERTEX).collect();
+                mixed_tets(lattice, air, &body, &body)
+            }
+            Some(frozen) => {
+                let body: Vec<bool> = vertex_of
+                    .iter()
+                    .zip(&frozen.points)
+                    .map(|(&v, &frozen)| v != NO_VERTEX || frozen)
+                    .collect();
+                mixed_tets(lattice, air, &body, &moving(mesh, frozen, &body))
+            }
+        };
         let mut points: Vec<u32> = found.iter().flatten().copied().collect();
         points.sort_unstable();
         points.dedup();
@@ -57,7 +76,7 @@ impl Shell {
             return Err(MeshError::LatticeSize { shape: grid.shape, max: Lattice::MAX_POINTS });
         }
         let positions: Vec<Point3<f32>> =
-            points.iter().map(|&point| mesh.frame.to_local(grid.mm(grid.point(point as usize)))).collect();
+            points.iter().map(|&point| mesh.frame.to_local(lattice.mm(grid.point(point as usize)))).collect();
         let rows = Followed::by(mesh, cut, &vertex_of, &points, &positions);
         for (n, &point) in points.iter().enumerate() {
             vertex_of[point as usize] = (vertices + n) as u32;
@@ -76,11 +95,11 @@ impl Shell {
             tet.iter().any(|&v| is_gone(v))
                 || (0..4).any(|a| (0..a).any(|b| cut.crosses(place(tet[a]), place(tet[b]))))
         });
-        let (offsets, neighbors) = (rows.offsets, rows.neighbors);
-        Ok(Self { first_extra: vertices as u32, positions, tets, removed, offsets, neighbors })
+        let Followed { offsets, neighbors, held_by } = rows;
+        Ok(Self { first_extra: vertices as u32, positions, tets, removed, offsets, neighbors, held_by })
     }
 
-    /// Deformed positions of the extra vertices: rest plus the mean displacement of the mesh vertices each one follows.
+    /// Deformed positions of the extra vertices: rest plus the mean displacement of the vertices each one follows.
     ///
     /// `rest` and `deformed` hold a position per mesh vertex. A vertex that follows none stays.
     ///
@@ -92,59 +111,72 @@ impl Shell {
             let displacement = |&v: &u32| deformed[v as usize] - rest[v as usize];
             let sum =
                 followed.iter().map(displacement).fold(Vector3::zeros(), |sum: Vector3<f32>, d| sum + d);
-            position + sum / followed.len().max(1) as f32
+            position + sum / (followed.len() + self.held_by[n] as usize).max(1) as f32
         };
         self.positions.iter().enumerate().map(moved).collect()
     }
 }
 
-/// Lattice tets with an air corner and a corner in the mesh, as flat lattice indices.
-fn mixed_tets(lattice: &Lattice, vertex_of: &[u32], air: &[bool]) -> Vec<[u32; 4]> {
+/// Points that can move: mesh vertices within the region, and points outside the body that follow one.
+fn moving(mesh: &TetMesh, frozen: &Frozen, body: &[bool]) -> Vec<bool> {
+    let around = Neighbors::new(&mesh.lattice);
+    let mut moving = vec![false; body.len()];
+    for (&point, _) in mesh.lattice_index.iter().zip(&frozen.border).filter(|(_, border)| !**border) {
+        moving[point as usize] = true;
+        around.of(point as usize, |neighbor| moving[neighbor] |= !body[neighbor]);
+    }
+    moving
+}
+
+/// Lattice tets with an air corner, a corner in the body, and a corner that can move, as flat lattice indices.
+fn mixed_tets(lattice: &Lattice, air: &[bool], body: &[bool], moving: &[bool]) -> Vec<[u32; 4]> {
     let (grid, [_, cy, cz]) = (lattice.grid(), lattice.cells());
-    let in_mesh: Vec<bool> = vertex_of.iter().map(|&vertex| vertex != NO_VERTEX).collect();
-    let (mesh_corners, air_corners) = (CornerBits::new(lattice, &in_mesh), CornerBits::new(lattice, air));
+    let corners = [air, body, moving].map(|points| CornerBits::new(lattice, points));
     let mut found = Vec::new();
-    let mut airy = vec![0u8; grid.shape[0] - 1];
+    let mut row = vec![[0u8; 3]; grid.shape[0] - 1];
     for k in 0..cz {
         for j in 0..cy {
-            air_corners.for_row(j, k, |i, bits| airy[i] = bits);
-            mesh_corners.for_row(j, k, |i, bits| {
-                if bits == 0 || airy[i] == 0 {
-                    return;
-                }
+            for (n, corners) in corners.iter().enumerate() {
+                corners.for_row(j, k, |i, bits| row[i][n] = bits);
+            }
+            for (i, cell) in row.iter().enumerate().filter(|(_, cell)| cell.iter().all(|&bits| bits != 0)) {
                 for tet in lattice.cell_tets(i, j, k) {
-                    let any = |bits: u8| tet.iter().any(|corner| bits >> corner & 1 == 1);
-                    if any(bits) && any(airy[i]) {
+                    let any = |bits: &u8| tet.iter().any(|corner| bits >> corner & 1 == 1);
+                    if cell.iter().all(any) {
                         found.push(tet.map(|corner| grid.index(Lattice::corner([i, j, k], corner)) as u32));
                     }
                 }
-            });
+            }
         }
     }
     found
 }
 
-/// Rows of mesh vertices, one row per extra vertex.
+/// Rows of mesh vertices, one row per extra vertex, and how many frozen ones each follows besides.
 struct Followed {
     offsets: Vec<u32>,
     neighbors: Vec<u32>,
+    held_by: Vec<u32>,
 }
 
 impl Followed {
     fn by(mesh: &TetMesh, cut: &Cut, vertex_of: &[u32], points: &[u32], positions: &[Point3<f32>]) -> Self {
-        let around = crate::neighbors::Neighbors::new(&mesh.lattice);
-        let mut rows = Self { offsets: vec![0], neighbors: Vec::new() };
+        let around = Neighbors::new(&mesh.lattice);
+        let frozen = |point: usize| mesh.frozen.as_ref().is_some_and(|frozen| frozen.points[point]);
+        let mut rows = Self { offsets: vec![0], neighbors: Vec::new(), held_by: Vec::new() };
         for (&point, &position) in points.iter().zip(positions) {
-            around.of(point as usize, |neighbor| {
-                let vertex = vertex_of[neighbor];
-                if vertex != NO_VERTEX
-                    && !cut.removed[vertex as usize]
-                    && !cut.crosses(position, mesh.positions[vertex as usize])
-                {
-                    rows.neighbors.push(vertex);
-                }
-            });
+            let mut held_by = 0;
+            // What a region left out follows nobody.
+            if !frozen(point as usize) {
+                around.of(point as usize, |neighbor| match vertex_of[neighbor] {
+                    NO_VERTEX => held_by += u32::from(frozen(neighbor)),
+                    vertex if cut.removed[vertex as usize] => {}
+                    vertex if cut.crosses(position, mesh.positions[vertex as usize]) => {}
+                    vertex => rows.neighbors.push(vertex),
+                });
+            }
             rows.offsets.push(rows.neighbors.len() as u32);
+            rows.held_by.push(held_by);
         }
         rows
     }

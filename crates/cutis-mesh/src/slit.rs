@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::incision::Incision;
-use crate::{MeshError, TetMesh};
+use crate::{Frame, Lattice, MeshError, TetMesh};
 
 /// Most stations and bins along one slit; bounds the work for absurdly long segments.
 const MOST_BINS: f64 = 1024.0;
@@ -38,17 +38,51 @@ pub(crate) struct SlitPoint {
 }
 
 impl Slit {
+    /// Places incisions on the skin of a lattice: `skin` holds triangles in flat lattice indices ([`crate::WholeBody::skin`]). No mesh is
+    /// needed, so that what of the body becomes one can depend on where the slits lie. On the mesh of the whole body they are the
+    /// slits of [`crate::Cut::plan`].
+    ///
+    /// # Errors
+    /// [`MeshError::VertexIndex`] for a triangle of points that are not there, [`MeshError::IncisionSize`], [`MeshError::IncisionOffSkin`]
+    /// and [`MeshError::IncisionThroughSkin`] as they say.
+    pub fn on_lattice(
+        lattice: &Lattice,
+        skin: &[[u32; 3]],
+        incisions: &[Incision],
+    ) -> Result<Vec<Self>, MeshError> {
+        let (grid, frame) = (lattice.grid(), Frame::center_of(lattice.grid()));
+        check_indices(skin, grid.len())?;
+        let position = |point: u32| frame.to_local(lattice.mm(grid.point(point as usize)));
+        let ground = Ground::new(frame, lattice, skin, &position);
+        incisions
+            .iter()
+            .enumerate()
+            .map(|(number, incision)| Self::place(&ground, number, incision))
+            .collect()
+    }
+
+    /// The slits of [`Slit::on_lattice`], on a mesh with its skin in mesh vertices.
+    pub(crate) fn on_mesh(
+        mesh: &TetMesh,
+        skin: &[[u32; 3]],
+        incisions: &[Incision],
+    ) -> Result<Vec<Self>, MeshError> {
+        check_indices(skin, mesh.positions.len())?;
+        let position = |vertex: u32| mesh.positions[vertex as usize];
+        let ground = Ground::new(mesh.frame, &mesh.lattice, skin, &position);
+        incisions
+            .iter()
+            .enumerate()
+            .map(|(number, incision)| Self::place(&ground, number, incision))
+            .collect()
+    }
+
     /// Finds the slit's frame and the skin's height along it.
     ///
     /// The segment must come within `reach` = max(depth, a quarter of the length, two lattice steps) of the centre of a skin triangle: enough for
     /// the chord of a strongly curved belly. Along at least half of it there must be skin within reach above or below.
-    pub(crate) fn place(
-        mesh: &TetMesh,
-        skin: &[[u32; 3]],
-        number: usize,
-        cut: &Incision,
-    ) -> Result<Self, MeshError> {
-        let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - mesh.frame.origin_mm) / 1000.0);
+    pub(crate) fn place(ground: &Ground<'_>, number: usize, cut: &Incision) -> Result<Self, MeshError> {
+        let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - ground.frame.origin_mm) / 1000.0);
         let (start, end) = (local(cut.from_mm), local(cut.to_mm));
         let length = (end - start).norm();
         let sizes = [("length", length * 1000.0), ("depth_mm", cut.depth_mm), ("width_mm", cut.width_mm)];
@@ -57,10 +91,9 @@ impl Slit {
         }
         let along = (end - start) / length;
         let (depth, half_width) = (cut.depth_mm / 1000.0, cut.width_mm / 2000.0);
-        let step = mesh.lattice.longest_step_mm() / 1000.0;
+        let (step, facets) = (ground.step, &ground.facets);
         let reach = depth.max(length / 4.0).max(2.0 * step);
 
-        let facets: Vec<Facet> = skin.iter().map(|triangle| Facet::of(mesh, triangle)).collect();
         let from_segment = |facet: &Facet| {
             let s = (facet.center - start).dot(&along).clamp(0.0, length);
             (facet.center - (start + along * s)).norm()
@@ -95,7 +128,7 @@ impl Slit {
         let lateral = inward.cross(&along);
         let mut slit =
             Self { start, along, lateral, inward, length, half_width, depth, above: reach, skin: Vec::new() };
-        let (heights, on_skin) = slit.heights(mesh, skin, &facets, step);
+        let (heights, on_skin) = slit.heights(ground);
         if 2 * on_skin < heights.len() {
             let from = |end: Point3<f64>| {
                 facets.iter().map(|facet| (facet.center - end).norm()).fold(f64::INFINITY, f64::min)
@@ -108,15 +141,20 @@ impl Slit {
 
     /// Mean height of the skin in bins of about two lattice steps, and in how many of them there is skin. The others take theirs
     /// from their neighbours.
-    fn heights(&self, mesh: &TetMesh, skin: &[[u32; 3]], facets: &[Facet], step: f64) -> (Vec<f64>, usize) {
+    fn heights(&self, ground: &Ground<'_>) -> (Vec<f64>, usize) {
+        let step = ground.step;
         let count = (self.length / (2.0 * step)).floor().clamp(1.0, MOST_BINS) as usize;
         let mut bins: Vec<Vec<f64>> = vec![Vec::new(); count];
-        let facing = skin.iter().zip(facets).filter(|(_, facet)| facet.area_vector.dot(&self.inward) < 0.0);
+        let facing = ground
+            .triangles
+            .iter()
+            .zip(&ground.facets)
+            .filter(|(_, facet)| facet.area_vector.dot(&self.inward) < 0.0);
         let mut vertices: Vec<u32> = facing.flat_map(|(triangle, _)| *triangle).collect();
         vertices.sort_unstable();
         vertices.dedup();
         for vertex in vertices {
-            let from_start = mesh.positions[vertex as usize].cast::<f64>() - self.start;
+            let from_start = (ground.position)(vertex).cast::<f64>() - self.start;
             let (s, t, q) =
                 (from_start.dot(&self.along), from_start.dot(&self.lateral), from_start.dot(&self.inward));
             let beside = t.abs() <= self.half_width + 1.5 * step && (-step..=self.length + step).contains(&s);
@@ -214,6 +252,29 @@ impl Slit {
     }
 }
 
+/// The skin that slits are placed on.
+pub(crate) struct Ground<'a> {
+    frame: Frame,
+    /// Longest lattice step, m.
+    step: f64,
+    triangles: &'a [[u32; 3]],
+    /// Place of a corner at rest, local metres.
+    position: &'a dyn Fn(u32) -> Point3<f32>,
+    facets: Vec<Facet>,
+}
+
+impl<'a> Ground<'a> {
+    pub fn new(
+        frame: Frame,
+        lattice: &Lattice,
+        triangles: &'a [[u32; 3]],
+        position: &'a dyn Fn(u32) -> Point3<f32>,
+    ) -> Self {
+        let facets = triangles.iter().map(|triangle| Facet::of(triangle.map(position))).collect();
+        Self { frame, step: lattice.longest_step_mm() / 1000.0, triangles, position, facets }
+    }
+}
+
 /// A skin triangle's centre, and its outward normal times its area.
 pub(crate) struct Facet {
     center: Point3<f64>,
@@ -221,11 +282,22 @@ pub(crate) struct Facet {
 }
 
 impl Facet {
-    pub fn of(mesh: &TetMesh, triangle: &[u32; 3]) -> Self {
-        let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize].cast::<f64>());
+    pub fn of(corners: [Point3<f32>; 3]) -> Self {
+        let [a, b, c] = corners.map(|corner| corner.cast::<f64>());
         Self {
             center: Point3::from((a.coords + b.coords + c.coords) / 3.0),
             area_vector: (b - a).cross(&(c - a)) / 2.0,
+        }
+    }
+}
+
+/// Refuses triangles of vertices that are not there.
+pub(crate) fn check_indices(triangles: &[[u32; 3]], vertices: usize) -> Result<(), MeshError> {
+    let outside = |triangle: &[u32; 3]| triangle.iter().copied().find(|&vertex| vertex as usize >= vertices);
+    match triangles.iter().enumerate().find_map(|(n, triangle)| Some((n, outside(triangle)?))) {
+        None => Ok(()),
+        Some((position, vertex)) => {
+            Err(MeshError::VertexIndex { array: "triangles", position, vertex, vertices })
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::Axis;
+use super::{Axis, Stop};
 use crate::{AIR_HU, Volume};
 
 /// Voxels that a grid point draws on, with weights that sum to 1; none outside the volume.
@@ -11,9 +11,10 @@ struct Taps {
     weights: Vec<f32>,
 }
 
-/// HU at the points of three axes.
-pub(super) fn sample(volume: &Volume, axes: [Axis; 3]) -> Vec<f32> {
-    let [x, y, z] = axes.map(|axis| (0..axis.points).map(|n| taps(axis, n)).collect::<Vec<_>>());
+/// HU at the stops of three axes.
+pub(super) fn sample(volume: &Volume, axes: [Axis; 3], stops: &[Vec<Stop>; 3]) -> Vec<f32> {
+    let along = |a: usize| stops[a].iter().map(|&stop| taps(axes[a], stop)).collect::<Vec<_>>();
+    let [x, y, z] = [along(0), along(1), along(2)];
     let slice_len = x.len() * y.len();
     if slice_len == 0 {
         return Vec::new();
@@ -95,16 +96,16 @@ fn reduce(volume: &Volume, k: usize, x: &[Taps], y: &[Taps]) -> Vec<f32> {
     out
 }
 
-/// The tent around point `n`.
-fn taps(axis: Axis, n: usize) -> Taps {
-    let centre = axis.start + n as f64 * axis.step;
+/// The tent around a stop.
+fn taps(axis: Axis, stop: Stop) -> Taps {
+    let centre = axis.start + stop.at * axis.step;
     let last = (axis.voxels - 1) as f64;
     // Half a voxel beyond the last centre is still that voxel.
     if !(-0.5..=last + 0.5).contains(&centre) {
         return Taps { first: 0, weights: Vec::new() };
     }
     let centre = centre.clamp(0.0, last);
-    let radius = axis.step.abs().max(1.0);
+    let radius = (stop.reach * axis.step).abs().max(1.0);
     let first = (centre - radius).floor().max(0.0) as usize;
     let end = (centre + radius).ceil().min(last) as usize;
     let weight = |voxel: usize| (1.0 - (voxel as f64 - centre).abs() / radius).max(0.0);

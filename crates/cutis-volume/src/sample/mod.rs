@@ -29,10 +29,58 @@ use crate::{Grid, Volume};
 /// # Ok::<(), cutis_volume::VolumeError>(())
 /// ```
 pub fn to_grid(volume: &Volume, grid: &Grid) -> Vec<f32> {
+    at_stops(volume, grid, grid.shape.map(|points| (0..points).map(Stop::even).collect()))
+}
+
+/// HU at the points of planes that need not lie evenly: `planes` holds their positions along the three axes in steps of `grid`,
+/// ascending. The result has a value for each combination of planes, the first axis fastest. Half the width of the tent around a
+/// plane is the mean of the steps to its two neighbours. Where the planes are those of `grid`, the bits are those of [`to_grid`].
+///
+/// ```
+/// use cutis_volume::{Affine, Grid, Volume, sample};
+/// let affine = Affine::from_spacing([1.0; 3], [0.0; 3])?;
+/// let volume = Volume::new(Grid { shape: [9, 9, 9], affine }, vec![40; 729], 1.0, 0.0)?;
+/// let planes = [vec![0.0, 1.0, 2.5, 5.0, 8.0], vec![0.0, 8.0], vec![0.0, 4.0, 8.0]];
+/// assert_eq!(sample::to_planes(&volume, volume.grid(), &planes), [40.0; 30]);
+/// # Ok::<(), cutis_volume::VolumeError>(())
+/// ```
+pub fn to_planes(volume: &Volume, grid: &Grid, planes: &[Vec<f64>; 3]) -> Vec<f32> {
+    at_stops(volume, grid, planes.each_ref().map(|planes| Stop::uneven(planes)))
+}
+
+fn at_stops(volume: &Volume, grid: &Grid, stops: [Vec<Stop>; 3]) -> Vec<f32> {
     let map = IndexMap::new(volume.grid(), grid);
-    match map.aligned(volume.grid(), grid) {
-        Some(axes) => aligned::sample(volume, axes),
-        None => oblique::sample(volume, grid, &map),
+    match map.aligned(volume.grid(), &stops) {
+        Some(axes) => aligned::sample(volume, axes, &stops),
+        None => oblique::sample(volume, &map, &stops),
+    }
+}
+
+/// A plane of points across an axis, in steps of the grid.
+#[derive(Clone, Copy)]
+struct Stop {
+    at: f64,
+    /// Half the width of its tent.
+    reach: f64,
+}
+
+impl Stop {
+    fn even(n: usize) -> Self {
+        Self { at: n as f64, reach: 1.0 }
+    }
+
+    fn uneven(planes: &[f64]) -> Vec<Self> {
+        let step = |n: usize| planes.get(n + 1).map(|next| next - planes[n]);
+        let stop = |n: usize| {
+            let (before, after) = (n.checked_sub(1).and_then(step), step(n));
+            let reach = match (before, after) {
+                (Some(before), Some(after)) => (before + after) / 2.0,
+                (Some(only), None) | (None, Some(only)) => only,
+                (None, None) => 1.0,
+            };
+            Self { at: planes[n], reach }
+        };
+        (0..planes.len()).map(stop).collect()
     }
 }
 
@@ -54,28 +102,27 @@ impl IndexMap {
     }
 
     /// Start and step along each axis, in voxels, if the grids share their axes to within a thousandth of a voxel everywhere.
-    fn aligned(&self, voxels: &Grid, grid: &Grid) -> Option<[Axis; 3]> {
+    fn aligned(&self, voxels: &Grid, stops: &[Vec<Stop>; 3]) -> Option<[Axis; 3]> {
+        let last = |axis: usize| stops[axis].last().map_or(0.0, |stop| stop.at);
         let strays = (0..3).any(|axis| {
-            let reach = grid.shape[axis].saturating_sub(1) as f64;
+            let reach = last(axis);
             (0..3).any(|other| other != axis && (self.steps[axis][other] * reach).abs() > 1e-3)
         });
         let axis = |a: usize| Axis {
             start: snap(self.origin[a], 1.0),
-            step: snap(self.steps[a][a], voxels.shape[a].max(grid.shape[a]) as f64),
+            step: snap(self.steps[a][a], (voxels.shape[a] as f64).max(last(a) + 1.0)),
             voxels: voxels.shape[a],
-            points: grid.shape[a],
         };
         (!strays).then(|| [axis(0), axis(1), axis(2)])
     }
 }
 
-/// One axis of an aligned grid: its points lie at voxel `start + n · step`.
+/// One axis of an aligned grid: its stops lie at voxel `start + at · step`.
 #[derive(Clone, Copy)]
 struct Axis {
     start: f64,
     step: f64,
     voxels: usize,
-    points: usize,
 }
 
 /// The whole number that `x` is meant to be, if rounding alone keeps it from it: affines are in f32 in a file, and `reach` steps
@@ -166,10 +213,39 @@ mod tests {
     fn both_paths_agree_where_the_step_is_whole() {
         let volume = volume([25, 13, 9], noise);
         let grid = lattice(&volume, [9, 5, 9]);
-        let turned = oblique::sample(&volume, &grid, &IndexMap::new(volume.grid(), &grid));
+        let stops = grid.shape.map(|points| (0..points).map(Stop::even).collect());
+        let turned = oblique::sample(&volume, &IndexMap::new(volume.grid(), &grid), &stops);
         let largest =
             to_grid(&volume, &grid).iter().zip(&turned).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(largest < 1e-2, "{largest} HU");
+    }
+
+    #[test]
+    fn uneven_planes_read_a_linear_field_and_where_they_are_even_the_bits_of_the_grid() {
+        let linear = volume([30, 30, 30], |[i, j, k]| (10 * i + 20 * j + 30 * k) as i16);
+        let grid = lattice(&linear, [15, 30, 12]);
+        // Even in the middle; the ends of a tent are cut off at the sides of the volume.
+        let axis = |last: f64| vec![0.0, 3.0, 5.0, 6.0, 7.0, 8.0, 9.5, last];
+        let planes = [axis(14.0), axis(29.0), axis(11.0)];
+        let (hu, even) = (to_planes(&linear, &grid, &planes), to_grid(&linear, &grid));
+        let mut same = 0;
+        for (n, hu) in hu.into_iter().enumerate() {
+            let at = [n % 8, n / 8 % 8, n / 64];
+            if at.iter().any(|&p| p == 0 || p == 7) {
+                continue;
+            }
+            let index = Point3::from(std::array::from_fn::<f64, 3, _>(|a| planes[a][at[a]]));
+            let voxel = linear.grid().affine.to_index(grid.affine.to_mm(index));
+            let right = 0.5 * (10.0 * voxel.x + 20.0 * voxel.y + 30.0 * voxel.z) - 24.0;
+            assert!((f64::from(hu) - right).abs() < 0.02 * right, "{at:?}: {hu}, not {right}");
+            if at.iter().all(|&p| (3..=4).contains(&p)) {
+                assert_eq!(hu, even[grid.index(at.map(|p| p + 3))]);
+                same += 1;
+            }
+        }
+        assert_eq!(same, 8);
+        let all = grid.shape.map(|points| (0..points).map(|n| n as f64).collect());
+        assert_eq!(to_planes(&linear, &grid, &all), even);
     }
 
     #[test]
