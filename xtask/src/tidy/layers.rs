@@ -39,6 +39,7 @@ const LAYERS: &[Layer] = &[
         level: 3,
         may_use: These(&["cutis-solver", "cutis-constraints", "cutis-gpu", "cutis-shaders"]),
     },
+    Layer { name: "cutis-newton", level: 3, may_use: These(&["cutis-solver", "cutis-constraints"]) },
     Layer {
         name: "cutis-resample",
         level: 3,

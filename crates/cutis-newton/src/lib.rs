@@ -1,0 +1,27 @@
+//! The yardstick for the errors of a solver: implicit steps and static equilibria of a body, by Newton's method in double
+//! precision with a sparse direct solver.
+//!
+//! A [`Problem`] takes the energies `½C²/α`, masses and positions from a system of `cutis-solver` and nothing of how that
+//! steps. [`Problem::step`] finds the minimiser of an implicit Euler step, which XPBD approaches with its iterations;
+//! [`Problem::equilibrium`] finds where the body comes to rest. [`relative_rms`] says how far a solver is from either.
+#![forbid(unsafe_code)]
+
+mod dissection;
+mod elements;
+mod error;
+mod field;
+mod floating;
+mod hessian;
+mod newton;
+mod objective;
+mod options;
+mod pattern;
+mod problem;
+
+pub use error::NewtonError;
+pub use options::{Minimum, Options, relative_rms};
+pub use problem::Problem;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

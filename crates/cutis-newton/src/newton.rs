@@ -1,0 +1,158 @@
+//! Newton's method with a line search, and a shift of the Hessian where it is not positive definite.
+
+use nalgebra::Point3;
+
+use crate::hessian::{Form, assemble};
+use crate::objective::{Objective, State};
+use crate::pattern::{Factors, Pattern};
+use crate::{NewtonError, Options};
+
+/// Share of the decrease promised by the slope that a step must bring (Armijo).
+const DECREASE: f64 = 1e-4;
+/// Step lengths below this are given up.
+const SHORTEST: f64 = 1e-9;
+/// The first shift of the Hessian, as a share of its diagonal.
+const FIRST_SHIFT: f64 = 1e-6;
+/// With so large a shift every matrix with a positive diagonal would be definite.
+const LARGEST_SHIFT: f64 = 1e6;
+
+/// The end of a minimisation.
+pub(crate) struct Found {
+    pub state: State,
+    /// Relative gradient.
+    pub gradient: f64,
+    pub iterations: usize,
+    pub definite: bool,
+}
+
+/// Minimises `objective` from `start`.
+pub(crate) fn minimise(
+    objective: &Objective<'_>,
+    start: Vec<Point3<f64>>,
+    options: &Options,
+) -> Result<Found, NewtonError> {
+    let pattern = objective.problem.pattern()?;
+    let mut search = Search { objective, pattern, factors: pattern.factors()?, shift: 0.0, definite: None };
+    let mut state = objective.at(start);
+    if let Some(n) = state.gradient.iter().position(|g| !g.is_finite()) {
+        let (vertex, what) = (objective.problem.free[n / 3] as usize, "the force at the start");
+        return Err(NewtonError::NotFinite { vertex, what });
+    }
+    let mut scale = 0.0_f64;
+    for iterations in 0.. {
+        scale = scale.max(state.scale);
+        let gradient = if state.norm > 0.0 { state.norm / scale } else { 0.0 };
+        if state.norm <= (options.tolerance * scale).max(state.floor) {
+            let definite = match search.definite {
+                Some(definite) => definite,
+                None => search.factorise(&state, Form::Exact, 0.0),
+            };
+            return Ok(Found { state, gradient, iterations, definite });
+        }
+        let next = if iterations < options.max_iterations { search.step(&state) } else { None };
+        let tolerance = options.tolerance;
+        state = next.ok_or(NewtonError::NotConverged { iterations, gradient, tolerance })?;
+    }
+    unreachable!("the iterations end by a return")
+}
+
+struct Search<'a> {
+    objective: &'a Objective<'a>,
+    pattern: &'a Pattern,
+    factors: Factors<'a>,
+    /// What is added to the diagonal of the Hessian, as a share of it. Zero near a minimum.
+    shift: f64,
+    /// Whether the Hessian was positive definite as it is, when last looked at.
+    definite: Option<bool>,
+}
+
+impl Search<'_> {
+    /// The next state, lower than `state`; `None` if no step is.
+    fn step(&mut self, state: &State) -> Option<State> {
+        let plain = self.factorise(state, Form::Exact, 0.0);
+        self.definite = Some(plain);
+        if plain && let Some((next, _)) = self.along_direction(state) {
+            self.shift = 0.0;
+            return Some(next);
+        }
+        // Where the Hessian bends downwards: the absolute one, and the more of a shift the shorter its steps must be.
+        while self.shift <= LARGEST_SHIFT {
+            if self.factorise(state, Form::Absolute, self.shift)
+                && let Some((next, length)) = self.along_direction(state)
+            {
+                self.shift = match length {
+                    1.0 if self.shift <= FIRST_SHIFT => 0.0,
+                    1.0 => self.shift / 10.0,
+                    length if length < 0.1 => (10.0 * self.shift).max(FIRST_SHIFT),
+                    _ => self.shift,
+                };
+                return Some(next);
+            }
+            self.shift = (10.0 * self.shift).max(FIRST_SHIFT);
+        }
+        None
+    }
+
+    fn factorise(&mut self, state: &State, form: Form, shift: f64) -> bool {
+        assemble(self.objective, state, &self.pattern.places, form, &mut self.factors);
+        if shift > 0.0 {
+            let diagonal: Vec<usize> = (0..state.gradient.len()).map(|n| self.factors.diagonal(n)).collect();
+            let mean = diagonal.iter().map(|&n| self.factors.values[n]).sum::<f64>() / diagonal.len() as f64;
+            for n in diagonal {
+                self.factors.values[n] += shift * (self.factors.values[n] + mean);
+            }
+        }
+        self.factors.factorise()
+    }
+
+    /// A step along the direction that the factors give, and its length as a share of the whole.
+    fn along_direction(&mut self, state: &State) -> Option<(State, f64)> {
+        let direction = self.direction(state);
+        let slope = dot(&state.gradient, &direction);
+        if !(slope < 0.0 && slope.is_finite()) {
+            return None;
+        }
+        let mut length = 1.0;
+        while length >= SHORTEST {
+            let next = self.objective.moved(state, &direction, length);
+            let change = self.objective.difference(state, &next);
+            if decreases(change, slope, length, state.noise + next.noise, dot(&next.gradient, &direction)) {
+                return Some((next, length));
+            }
+            // The minimum of the parabola through what is known, within bounds.
+            let parabola = -0.5 * slope * length * length / (change - slope * length);
+            let within = (0.1 * length)..=(0.5 * length);
+            length = if within.contains(&parabola) { parabola } else { 0.3 * length };
+        }
+        None
+    }
+
+    /// `−H⁻¹ g`, by vertices that can move.
+    fn direction(&mut self, state: &State) -> Vec<f64> {
+        let free = &self.objective.problem.free;
+        let place = |&v: &u32| 3 * self.pattern.places[v as usize] as usize;
+        let mut right = vec![0.0; state.gradient.len()];
+        for (v, gradient) in free.iter().zip(state.gradient.chunks_exact(3)) {
+            for (to, from) in right[place(v)..].iter_mut().zip(gradient) {
+                *to = -from;
+            }
+        }
+        self.factors.solve(&mut right);
+        free.iter().flat_map(|v| right[place(v)..place(v) + 3].to_vec()).collect()
+    }
+}
+
+/// Whether a step of `length` brings enough: by the energy, or, where its change drowns in the rounding `noise`, by the slope at the
+/// end, which for a parabola says the same (Hager and Zhang, *A new conjugate gradient method with guaranteed descent*, SIAM J.
+/// Optim. 16 (2005), eq. 4.1).
+fn decreases(change: f64, slope: f64, length: f64, noise: f64, slope_there: f64) -> bool {
+    if !(change.is_finite() && slope_there.is_finite()) {
+        return false;
+    }
+    let drowned = change.abs() <= noise && slope_there <= (2.0 * DECREASE - 1.0) * slope;
+    change <= DECREASE * length * slope && change < -noise || drowned
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,110 @@
+//! What is minimised: the elastic energy, and with it either gravity or the inertia of an implicit step.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::Problem;
+use crate::field::Field;
+
+/// What stands beside the elastic energy.
+pub(crate) enum Outer {
+    /// `−m g·x` for a gravity `g` in m/s²: static equilibrium.
+    Gravity(Vector3<f64>),
+    /// `m/(2h²)|x − x̃|²`: an implicit step.
+    Inertia {
+        /// `x̃` of each vertex, in the problem's own coordinates.
+        predicted: Vec<Point3<f64>>,
+        /// `1/h²` in 1/s².
+        inverse_h_squared: f64,
+    },
+}
+
+/// An energy to be minimised over the vertices that can move.
+pub(crate) struct Objective<'a> {
+    pub problem: &'a Problem,
+    pub outer: Outer,
+}
+
+/// The objective at one placement of all vertices. Gradient, parts and rounding are those of the vertices that can move.
+pub(crate) struct State {
+    pub x: Vec<Point3<f64>>,
+    pub field: Field,
+    /// `∂U/∂x` of each vertex that can move, three numbers in a row.
+    pub gradient: Vec<f64>,
+    /// Norm of the gradient, in N.
+    pub norm: f64,
+    /// Norm of the sizes of what is summed up in the gradient at each vertex, in N.
+    pub scale: f64,
+    /// Norm of what rounding alone can leave of the gradient, in N.
+    pub floor: f64,
+    /// Energy that rounding alone can feign, in J.
+    pub noise: f64,
+}
+
+impl Objective<'_> {
+    /// Stiffness of the inertia of `mass`, in N/m: what the outer energy adds to the diagonal of the Hessian.
+    pub fn inertia(&self, mass: f64) -> f64 {
+        match self.outer {
+            Outer::Gravity(_) => 0.0,
+            Outer::Inertia { inverse_h_squared, .. } => mass * inverse_h_squared,
+        }
+    }
+
+    /// Gradient of the outer energy at vertex `v`, and the sizes of what it is the sum of (m as a factor of eps).
+    fn outer_gradient(&self, v: usize, x: &Point3<f64>) -> (Vector3<f64>, f64) {
+        let mass = self.problem.masses()[v];
+        match &self.outer {
+            Outer::Gravity(gravity) => (gravity * -mass, 0.0),
+            Outer::Inertia { predicted, inverse_h_squared } => {
+                let stiffness = mass * inverse_h_squared;
+                ((x - predicted[v]) * stiffness, stiffness * x.coords.norm())
+            }
+        }
+    }
+
+    /// Everything about the placement `x`.
+    pub fn at(&self, x: Vec<Point3<f64>>) -> State {
+        let field = self.problem.elastic.at(&x);
+        let free = &self.problem.free;
+        let mut gradient = Vec::with_capacity(3 * free.len());
+        let (mut square, mut scale, mut floor, mut noise) = (0.0, 0.0, 0.0, field.energy_rounding);
+        for &v in free {
+            let v = v as usize;
+            let (outer, rounding) = self.outer_gradient(v, &x[v]);
+            let total = field.gradient[v] + outer;
+            square += total.norm_squared();
+            scale += (field.parts[v] + outer.norm()).powi(2);
+            floor += (field.rounding[v] + rounding).powi(2);
+            noise += outer.norm() * x[v].coords.norm();
+            gradient.extend(total.iter());
+        }
+        let noise = f64::EPSILON * noise;
+        let (norm, scale, floor) = (square.sqrt(), scale.sqrt(), f64::EPSILON * floor.sqrt());
+        State { x, field, gradient, norm, scale, floor, noise }
+    }
+
+    /// The objective at `to` less that at `from`, to the rounding of the change.
+    pub fn difference(&self, from: &State, to: &State) -> f64 {
+        let mut sum = self.problem.elastic.difference(&from.field, &to.field);
+        for &v in &self.problem.free {
+            let v = v as usize;
+            let (mass, step) = (self.problem.masses()[v], to.x[v] - from.x[v]);
+            sum += match &self.outer {
+                Outer::Gravity(gravity) => -mass * gravity.dot(&step),
+                Outer::Inertia { predicted, inverse_h_squared } => {
+                    let middle = (to.x[v] - predicted[v]) + (from.x[v] - predicted[v]);
+                    0.5 * mass * inverse_h_squared * step.dot(&middle)
+                }
+            };
+        }
+        sum
+    }
+
+    /// `from` with the vertices that can move displaced by `length · direction`.
+    pub fn moved(&self, from: &State, direction: &[f64], length: f64) -> State {
+        let mut x = from.x.clone();
+        for (&v, step) in self.problem.free.iter().zip(direction.chunks_exact(3)) {
+            x[v as usize] += Vector3::from_column_slice(step) * length;
+        }
+        self.at(x)
+    }
+}

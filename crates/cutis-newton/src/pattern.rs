@@ -1,0 +1,213 @@
+//! Where the entries of the Hessian are, and of its factors: found once for a problem, since only the numbers change.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{LltParams, LltRegularization};
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky, supernodal::SupernodalLltRef,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side, Spec};
+use nalgebra::{Matrix3, Point3};
+
+use crate::dissection::{self, Graph};
+use crate::{NewtonError, Problem};
+
+/// Below this share of a diagonal entry of the Hessian, its pivot is nothing but rounding.
+const SINGULAR: f64 = 16.0 * f64::EPSILON;
+
+/// The upper triangle of the Hessian in 3×3 blocks, one row and column for each vertex that can move, in the order of their
+/// elimination.
+pub(crate) struct Pattern {
+    /// The row and column of each vertex of the body; `u32::MAX` for those that do not move.
+    pub places: Vec<u32>,
+    /// Start of each block column in `rows`.
+    starts: Vec<usize>,
+    /// The block rows of each column, ascending, up to the diagonal.
+    rows: Vec<u32>,
+    /// The same for single numbers, three columns for each vertex.
+    column_starts: Vec<usize>,
+    row_indices: Vec<usize>,
+    symbolic: SymbolicCholesky<usize>,
+}
+
+/// The numbers of a Hessian and of its factors `L Lᵀ`.
+pub(crate) struct Factors<'a> {
+    pattern: &'a Pattern,
+    /// The numbers of the Hessian, column by column.
+    pub values: Vec<f64>,
+    factors: Vec<f64>,
+    scratch: MemBuffer,
+}
+
+impl Pattern {
+    /// The pattern of a problem whose vertices are about at `x`.
+    pub fn of(problem: &Problem, x: &[Point3<f64>]) -> Result<Self, NewtonError> {
+        let free = &problem.free;
+        let mut numbers = vec![u32::MAX; x.len()];
+        for (number, &v) in (0..).zip(free) {
+            numbers[v as usize] = number;
+        }
+        let graph = graph(problem, &numbers);
+        let positions: Vec<Point3<f64>> = free.iter().map(|&v| x[v as usize]).collect();
+        let order = dissection::order(&graph, &positions);
+        let mut ranks = vec![0; free.len()];
+        for (rank, &number) in (0..).zip(&order) {
+            ranks[number as usize] = rank;
+        }
+        let (mut starts, mut rows) = (vec![0], Vec::new());
+        for (column, &number) in (0..).zip(&order) {
+            let from = rows.len();
+            let above =
+                graph.neighbours(number).iter().map(|&n| ranks[n as usize]).filter(|&row| row < column);
+            rows.extend(above);
+            rows[from..].sort_unstable();
+            rows.push(column);
+            starts.push(rows.len());
+        }
+        let places = numbers.iter().map(|&n| ranks.get(n as usize).copied().unwrap_or(u32::MAX)).collect();
+        let (column_starts, row_indices) = single(&starts, &rows);
+        let n = 3 * free.len();
+        let matrix = SymbolicSparseColMatRef::new_checked(n, n, &column_starts, None, &row_indices);
+        let parameters = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let symbolic =
+            factorize_symbolic_cholesky(matrix, Side::Upper, SymmetricOrdering::Identity, parameters)
+                .map_err(|_| NewtonError::Memory { free: free.len(), bytes: None })?;
+        Ok(Self { places, starts, rows, column_starts, row_indices, symbolic })
+    }
+
+    /// Numbers in the factors.
+    pub fn factor_len(&self) -> usize {
+        self.symbolic.len_val()
+    }
+
+    /// Room for the numbers, all zero.
+    pub fn factors(&self) -> Result<Factors<'_>, NewtonError> {
+        let bytes = |numbers: usize| u64::try_from(numbers).ok()?.checked_mul(size_of::<f64>() as u64);
+        let error = |numbers| NewtonError::Memory { free: self.starts.len() - 1, bytes: bytes(numbers) };
+        let zeros = |len: usize| {
+            let mut numbers = Vec::new();
+            numbers.try_reserve_exact(len).map_err(|_| error(len))?;
+            numbers.resize(len, 0.0);
+            Ok(numbers)
+        };
+        let request = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, parameters());
+        let request = request.or(self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        Ok(Factors {
+            pattern: self,
+            values: zeros(9 * self.rows.len())?,
+            factors: zeros(self.factor_len())?,
+            scratch: MemBuffer::try_new(request).map_err(|_| error(self.factor_len()))?,
+        })
+    }
+}
+
+/// Vertices that can move, by number, and those they share a constraint with.
+fn graph(problem: &Problem, numbers: &[u32]) -> Graph {
+    let mut pairs = Vec::new();
+    for elements in &problem.elastic.kinds {
+        for k in 0..elements.len() {
+            let moving =
+                || elements.vertices(k).iter().map(|&v| numbers[v as usize]).filter(|&n| n != u32::MAX);
+            pairs.extend(moving().flat_map(|a| moving().filter(move |&b| b != a).map(move |b| (a, b))));
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+    }
+    let mut offsets = vec![0; problem.free.len() + 1];
+    for &(from, _) in &pairs {
+        offsets[from as usize + 1] += 1;
+    }
+    for n in 1..offsets.len() {
+        offsets[n] += offsets[n - 1];
+    }
+    Graph { offsets, targets: pairs.into_iter().map(|(_, to)| to).collect() }
+}
+
+/// Starts of the columns and rows of the single numbers of blocks.
+fn single(starts: &[usize], rows: &[u32]) -> (Vec<usize>, Vec<usize>) {
+    let (mut column_starts, mut row_indices) = (vec![0], Vec::with_capacity(9 * rows.len()));
+    for column in starts.windows(2) {
+        for _ in 0..3 {
+            let rows = rows[column[0]..column[1]].iter().map(|&row| 3 * row as usize);
+            row_indices.extend(rows.flat_map(|row| [row, row + 1, row + 2]));
+            column_starts.push(row_indices.len());
+        }
+    }
+    (column_starts, row_indices)
+}
+
+fn parameters() -> Spec<LltParams, f64> {
+    Spec::default()
+}
+
+impl Factors<'_> {
+    /// Adds a block to the Hessian. Blocks below the diagonal are those above it, transposed, and are left out.
+    pub fn add(&mut self, row: u32, column: u32, block: &Matrix3<f64>) {
+        if row > column {
+            return;
+        }
+        let pattern = self.pattern;
+        let (start, end) = (pattern.starts[column as usize], pattern.starts[column as usize + 1]);
+        let rows = &pattern.rows[start..end];
+        let local = rows.partition_point(|&other| other < row);
+        debug_assert_eq!(rows[local], row, "every pair of vertices in a constraint has a block");
+        for (k, values) in block.column_iter().enumerate() {
+            let first = 9 * start + 3 * (k * rows.len() + local);
+            for (place, value) in self.values[first..first + 3].iter_mut().zip(values.iter()) {
+                *place += value;
+            }
+        }
+    }
+
+    /// Where the diagonal entry `n` is among the numbers of the Hessian.
+    pub fn diagonal(&self, n: usize) -> usize {
+        // The diagonal block is the last of its columns.
+        self.pattern.column_starts[n + 1] - 3 + n % 3
+    }
+
+    /// Factorises the Hessian. False where it is not positive definite, to rounding.
+    pub fn factorise(&mut self) -> bool {
+        let pattern = self.pattern;
+        let n = pattern.column_starts.len() - 1;
+        let matrix =
+            SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_starts, None, &pattern.row_indices);
+        let done = pattern.symbolic.factorize_numeric_llt(
+            &mut self.factors,
+            SparseColMatRef::new(matrix, &self.values),
+            Side::Upper,
+            LltRegularization::default(),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+            parameters(),
+        );
+        done.is_ok() && self.pivots_stand_out()
+    }
+
+    /// Whether every pivot is more than what rounding leaves of the diagonal entry it comes from.
+    fn pivots_stand_out(&self) -> bool {
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.pattern.symbolic.raw() else { return true };
+        let factors = SupernodalLltRef::new(symbolic, &self.factors);
+        (0..symbolic.n_supernodes()).all(|s| {
+            let supernode = factors.supernode(s);
+            let (start, block) = (supernode.start(), supernode.val());
+            (0..block.ncols()).all(|j| {
+                let (pivot, whole) = (block[(j, j)], self.values[self.diagonal(start + j)]);
+                pivot * pivot > SINGULAR * whole
+            })
+        })
+    }
+
+    /// Replaces `b` by the solution of `H x = b`, with the Hessian that was factorised last. Three numbers for each vertex that can
+    /// move, in the order of their elimination.
+    pub fn solve(&mut self, b: &mut [f64]) {
+        let factors = faer::sparse::linalg::cholesky::LltRef::new(&self.pattern.symbolic, &self.factors);
+        let n = b.len();
+        let b = MatMut::from_column_major_slice_mut(b, n, 1);
+        factors.solve_in_place_with_conj(Conj::No, b, Par::Seq, MemStack::new(&mut self.scratch));
+    }
+}
