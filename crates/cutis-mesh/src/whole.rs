@@ -1,6 +1,7 @@
 //! Which tets of a lattice are the body, told for the whole of it; and meshes of all or of a part of that body.
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use crate::build::NO_VERTEX;
 use crate::cells::{CellMasks, CornerBits};
@@ -70,6 +71,13 @@ impl WholeBody {
         &self.vertices
     }
 
+    /// Per lattice point: a vertex of the body at a position (world mm) that is chosen.
+    pub fn vertices_where(&self, chosen: impl Fn(Point3<f64>) -> bool + Sync) -> Vec<bool> {
+        let grid = self.lattice.grid();
+        let vertex = |(point, &vertex): (usize, &bool)| vertex && chosen(self.lattice.mm(grid.point(point)));
+        self.vertices.par_iter().enumerate().map(vertex).collect()
+    }
+
     /// Face-connected components among the tissue tets, before any was dropped; 1 where they were not told apart.
     pub fn components(&self) -> usize {
         self.components
@@ -133,6 +141,8 @@ pub struct StillSkin {
     pub triangles: Vec<[u32; 3]>,
     /// Local metres, in lattice order.
     pub positions: Vec<Point3<f32>>,
+    /// Flat index of the lattice point of each position.
+    pub lattice_index: Vec<u32>,
 }
 
 impl TetMesh {
@@ -158,10 +168,9 @@ impl TetMesh {
             vertex => vertex,
         };
         let place = |&point: &u32| self.frame.to_local(self.lattice.mm(grid.point(point as usize)));
-        let still = StillSkin {
-            triangles: still.iter().map(|triangle| triangle.map(corner)).collect(),
-            positions: points.iter().map(place).collect(),
-        };
+        let triangles = still.iter().map(|triangle| triangle.map(corner)).collect();
+        let positions = points.iter().map(place).collect();
+        let still = StillSkin { triangles, positions, lattice_index: points };
         (moving.iter().map(on_mesh).collect(), still)
     }
 }

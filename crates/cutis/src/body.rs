@@ -1,18 +1,23 @@
 //! From the CT to a body that is ready to be simulated: lattice, tissue, skin, incisions, what is fixed.
 
 use cutis_mesh::{
-    Cut, HalfSpace, Incision, Lattice, SkinMode, SkinOptions, SkinReport, TetMesh, Tissue, skin,
+    Cut, HalfSpace, Incision, SkinMode, SkinOptions, SkinReport, Slit, StillSkin, TetMesh, Tissue, WholeBody,
+    skin,
 };
-use cutis_volume::{TableKind, Volume, sample};
+use cutis_volume::{TableKind, Volume};
 
-use crate::Error;
-use crate::scene::{Keep, LoadedScene, PlaneSection, SkinChoice, StcSection};
+use crate::scene::{IncisionSection, Keep, LoadedScene, PlaneSection, SkinChoice, StcSection};
+use crate::{Error, region};
 
 /// The cut body. Vertices keep their numbers through the cut; `mesh` and `skin` hold what the incisions left.
 pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
     /// Skin triangles in mesh vertices, outward oriented; empty if nothing asks for the skin.
     pub(crate) skin: Vec<[u32; 3]>,
+    /// The skin that a region left out.
+    pub(crate) still_skin: StillSkin,
+    /// HU at its positions.
+    pub(crate) still_hu: Vec<f32>,
     pub(crate) skin_report: Option<SkinReport>,
     pub(crate) cut: Cut,
     /// Tetrahedra that the incisions took.
@@ -34,53 +39,59 @@ impl Body {
     /// Builds the body of a scene from its CT.
     pub(crate) fn build(loaded: &LoadedScene, volume: &Volume) -> Result<Self, Error> {
         let scene = &loaded.scene;
-        let grid =
-            sample::lattice_grid(volume.grid(), scene.lattice.size()).map_err(loaded.blame("lattice"))?;
-        let lattice = Lattice::new(grid, scene.lattice.split.into()).map_err(loaded.blame("lattice"))?;
-        let hu = sample::to_grid(volume, &grid);
+        let lattice = region::lattice(loaded, volume)?;
+        let hu = lattice.sample(volume);
         let air: Vec<bool> = hu.iter().map(|&hu| hu < scene.tissue.air_below_hu).collect();
         let cut_away: Vec<HalfSpace> = scene.tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = scene.tissue.keep == Keep::Largest;
         let tissue = Tissue { air: &air, cut_away: &cut_away, largest_component };
-        let mut mesh = TetMesh::build(&lattice, &hu, &tissue).map_err(loaded.blame("tissue"))?;
-        drop(hu);
+        let whole = WholeBody::find(&lattice, &tissue).map_err(loaded.blame("tissue"))?;
         let mut warnings = Vec::new();
-        if mesh.dropped_tets > 0 {
-            warnings.push(format!(
-                "{} of {} tissue tetrahedra lie apart from the largest part and were left out (tissue.keep = \"largest\")",
-                mesh.dropped_tets,
-                mesh.dropped_tets + mesh.tets.len()
-            ));
-        }
-        let density = scene.tissue.density.table(TableKind::Density, &loaded.file, "tissue.density")?;
-        let masses = mesh.masses(&|hu| density.at(hu));
-        let (mut triangles, mut report) = (Vec::new(), None);
+        let (mut skin, mut report) = (Vec::new(), None);
         if needs_skin(loaded) {
             let options = SkinOptions { cut_away, ..SkinOptions::default() };
             let found = skin::detect(&lattice, &air, scene.skin.mode.into(), &options)
                 .map_err(loaded.blame("skin"))?;
-            let (on_mesh, dropped) = found.on_mesh(&mesh);
+            let (on_body, dropped) = whole.skin(&found);
             if dropped > 0 {
                 warnings.push(format!(
                     "{dropped} skin triangles have no tissue tetrahedron behind them and were left out"
                 ));
             }
-            triangles = on_mesh;
+            skin = on_body;
             report = Some(found.report);
         }
-        let incisions: Vec<Incision> = scene
-            .incision
-            .iter()
-            .map(|i| Incision {
-                from_mm: i.from_mm,
-                to_mm: i.to_mm,
-                depth_mm: i.depth_mm,
-                width_mm: i.width_mm,
-            })
-            .collect();
-        let cut = Cut::plan(&mesh, &triangles, &incisions).map_err(loaded.blame("incision"))?;
+        let incisions: Vec<Incision> = scene.incision.iter().map(Incision::from).collect();
+        let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(loaded.blame("incision"))?;
+        let mut mesh = region::mesh(loaded, &whole, &hu, &slits)?;
+        let (mut triangles, still_skin) = mesh.divide_skin(&skin);
+        let still_hu = still_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
+        drop(hu);
+        if mesh.dropped_tets > 0 {
+            let frozen = mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets);
+            warnings.push(format!(
+                "{} of {} tissue tetrahedra lie apart from the largest part and were left out (tissue.keep = \"largest\")",
+                mesh.dropped_tets,
+                mesh.dropped_tets + mesh.tets.len() + frozen
+            ));
+        }
+        let density = scene.tissue.density.table(TableKind::Density, &loaded.file, "tissue.density")?;
+        let masses = mesh.masses(&|hu| density.at(hu));
+        region::check_handles(loaded, &mesh)?;
+        let cut = Cut::of_slits(&mesh, &triangles, slits).map_err(|e| region::name(loaded, e))?;
         let taken = cut.apply(&mut mesh, &mut triangles).tets;
-        Ok(Self { mesh, skin: triangles, skin_report: report, cut, taken, masses, air, warnings })
+        Ok(Self {
+            mesh,
+            skin: triangles,
+            still_skin,
+            still_hu,
+            skin_report: report,
+            cut,
+            taken,
+            masses,
+            air,
+            warnings,
+        })
     }
 
     /// True if an incision took the vertex out of all constraints.
@@ -106,10 +117,11 @@ impl Body {
         Ok((0..self.masses.len()).map(|v| if still(v) { 0.0 } else { 1.0 / self.masses[v] }).collect())
     }
 
-    /// Which vertices the scene fixes.
+    /// Which vertices the scene fixes, those on the border of its region included.
     pub(crate) fn fixed(&self, loaded: &LoadedScene) -> Result<Vec<bool>, Error> {
         let (mesh, section) = (&self.mesh, &loaded.scene.fixed);
-        let mut fixed = vec![false; mesh.positions.len()];
+        let beyond = mesh.frozen.as_ref().map(|frozen| frozen.border.clone());
+        let mut fixed = beyond.unwrap_or_else(|| vec![false; mesh.positions.len()]);
         let mut add =
             |which: Vec<bool>| fixed.iter_mut().zip(which).for_each(|(fixed, other)| *fixed |= other);
         if let Some(hu) = section.bone_above_hu {
@@ -158,6 +170,13 @@ pub(crate) fn needs_skin(loaded: &LoadedScene) -> bool {
 impl From<&PlaneSection> for HalfSpace {
     fn from(plane: &PlaneSection) -> Self {
         Self { point_mm: plane.point_mm, normal: plane.normal }
+    }
+}
+
+impl From<&IncisionSection> for Incision {
+    fn from(section: &IncisionSection) -> Self {
+        let IncisionSection { from_mm, to_mm, depth_mm, width_mm } = *section;
+        Self { from_mm, to_mm, depth_mm, width_mm }
     }
 }
 

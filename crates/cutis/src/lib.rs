@@ -33,6 +33,7 @@ mod output;
 mod pictures;
 mod plan;
 mod progress;
+mod region;
 pub mod report;
 mod run;
 pub mod scene;

@@ -51,12 +51,18 @@ pub(crate) fn write(
     let mut products = Products::default();
     if output.surface {
         clock.stage("write skin.vtu", 0, |_| {
-            write_mesh(&folder.skin(), body, deformed, Cells::Triangles(&body.skin))
+            // With the skin that a region left out, which lies where it was.
+            let (now, triangles) = body.whole_skin(deformed);
+            let (rest, _) = body.whole_skin(&body.mesh.positions);
+            let hu = [body.mesh.hu.as_slice(), &body.still_hu].concat();
+            write_mesh(&folder.skin(), body, [&rest, &now], &hu, Cells::Triangles(&triangles))
         })?;
     }
     if output.tissue {
         clock.stage("write tissue.vtu", 0, |_| {
-            write_mesh(&folder.tissue(), body, deformed, Cells::Tets(&body.mesh.tets))
+            let mesh = &body.mesh;
+            let positions = [mesh.positions.as_slice(), deformed];
+            write_mesh(&folder.tissue(), body, positions, &mesh.hu, Cells::Tets(&mesh.tets))
         })?;
     }
     if !(output.volume || output.pictures) {
@@ -143,15 +149,21 @@ impl<'a> BodyWarp<'a> {
     }
 }
 
-fn write_mesh(path: &Path, body: &Body, deformed: &[Point3<f32>], cells: Cells<'_>) -> Result<(), Error> {
-    let mesh = &body.mesh;
-    let displacement: Vec<[f32; 3]> =
-        mesh.positions.iter().zip(deformed).map(|(rest, now)| ((now - rest) * 1000.0).into()).collect();
+/// `positions`: at rest and now.
+fn write_mesh(
+    path: &Path,
+    body: &Body,
+    [rest, now]: [&[Point3<f32>]; 2],
+    hu: &[f32],
+    cells: Cells<'_>,
+) -> Result<(), Error> {
+    let moved = |(rest, now): (&Point3<f32>, &Point3<f32>)| ((now - rest) * 1000.0).into();
+    let displacement: Vec<[f32; 3]> = rest.iter().zip(now).map(moved).collect();
     let data = [
         PointData { name: "displacement_mm", values: PointValues::Vectors(&displacement) },
-        PointData { name: "hu", values: PointValues::Scalars(&mesh.hu) },
+        PointData { name: "hu", values: PointValues::Scalars(hu) },
     ];
-    let piece = Piece { frame: &mesh.frame, positions: deformed, cells, data: &data };
+    let piece = Piece { frame: &body.mesh.frame, positions: now, cells, data: &data };
     Ok(vtk::write_vtu(path, Space::default(), &piece)?)
 }
 

@@ -47,13 +47,15 @@ pub(crate) fn draw(
         };
         stages.raymarch(volume, &view)
     };
+    let (at_rest, triangles) = body.whole_skin(&body.mesh.positions);
+    let (deformed, _) = body.whole_skin(outcome.deformed);
     let rest = Contour {
         origin_mm: body.mesh.frame.origin_mm,
-        positions: &body.mesh.positions,
-        triangles: &body.skin,
+        positions: &at_rest,
+        triangles: &triangles,
         color: COLORS[0],
     };
-    let deformed = Contour { positions: outcome.deformed, color: COLORS[1], ..rest };
+    let deformed = Contour { positions: &deformed, color: COLORS[1], ..rest };
     let (plane, middle_mm) = match &wound {
         Some(wound) => (wound.plane_across(), wound.middle_mm),
         None => (Plane::Axial, body.mesh.frame.origin_mm.into()),

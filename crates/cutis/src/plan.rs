@@ -11,7 +11,7 @@ use crate::dynamics::{self, Dynamics};
 use crate::report::{Backend, MemoryPart, Sizes, Stage};
 use crate::scene::LoadedScene;
 use crate::source::{self, Source};
-use crate::{Error, Progress};
+use crate::{Error, Progress, region};
 
 /// The plan of a scene, as `cutis check` prints it.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -83,6 +83,7 @@ pub(crate) fn prepare(
     let mut warnings = source.warnings.clone();
     warnings.extend(body.warnings.iter().cloned());
     warnings.extend(scene_warnings(loaded, &body));
+    warnings.extend(region::idle(&body));
     warnings.extend(dynamics.skin_rate.and_then(|rate| unresolved_skin(loaded, rate)));
     let sizes = sizes(&body, &dynamics);
     let work = work(loaded, &dynamics);
@@ -94,15 +95,18 @@ pub(crate) fn prepare(
             backend.report.name
         ));
     }
+    let memory: Vec<MemoryPart> = dynamics.system.bytes().iter().map(MemoryPart::from).collect();
+    let mut left_out = left_out(loaded, &backend);
+    region::left_out(&body, &memory, &mut left_out);
     let plan = Plan {
         backend: backend.report.clone(),
         sizes,
         colors: dynamics.colors.clone(),
-        memory: dynamics.system.bytes().iter().map(MemoryPart::from).collect(),
+        memory,
         device_memory: backend.device_memory(&dynamics.system, &dynamics.settings),
         volume_bytes: 2 * source.volume.voxels().len(),
         projections: work.projections,
-        left_out: left_out(loaded, &backend),
+        left_out,
         warnings,
         stages: Vec::new(),
     };
@@ -134,6 +138,8 @@ fn sizes(body: &Body, dynamics: &Dynamics) -> Sizes {
         skin_triangles: body.skin.len(),
         removed_vertices: removed,
         fixed_vertices: still - removed,
+        frozen_vertices: body.mesh.frozen.as_ref().map_or(0, |frozen| frozen.vertices),
+        frozen_tets: body.mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets),
     }
 }
 

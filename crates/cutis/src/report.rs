@@ -55,6 +55,9 @@ pub struct Report {
     pub residuals: Vec<KindResidual>,
     /// Largest distance that a vertex moved, mm.
     pub max_displacement_mm: f64,
+    /// Largest distance that a vertex moved next to where the region ends, mm; none without a region that leaves something out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub border_displacement_mm: Option<f64>,
     /// What the scene left out, and therefore cost nothing.
     pub left_out: Vec<String>,
     /// What the user should know.
@@ -115,6 +118,12 @@ pub struct Sizes {
     pub removed_vertices: usize,
     /// Vertices that do not move.
     pub fixed_vertices: usize,
+    /// Vertices of the body beyond the region: they are in none of the other counts.
+    #[serde(default)]
+    pub frozen_vertices: usize,
+    /// Tetrahedra of the body beyond the region.
+    #[serde(default)]
+    pub frozen_tets: usize,
 }
 
 /// Quality of the detected skin, before the incisions.

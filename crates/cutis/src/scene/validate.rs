@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use cutis_mesh::Grading;
+
 use super::*;
 use crate::Error;
 
@@ -48,6 +50,35 @@ impl Check<'_> {
     fn point(&self, key: &str, value: [f64; 3]) -> Result<(), Error> {
         let finite = value.iter().all(|v| v.is_finite());
         self.require(finite, key, format!("{value:?}"), "must be three finite numbers")
+    }
+
+    /// `corners` as given and, if they make a zone, the zone.
+    fn zone(
+        &self,
+        key: &str,
+        around_mm: Option<f64>,
+        corners: [Option<[f64; 3]>; 2],
+        zone: Option<Zone>,
+        acts: bool,
+    ) -> Result<(), Error> {
+        let why = "must have `around_mm`, or `min_mm` and `max_mm`, and not both";
+        self.require(zone.is_some(), key, "", why)?;
+        if let Some(around) = around_mm {
+            self.positive(&format!("{key}.around_mm"), around)?;
+            let why = "needs an incision or a handle to be around; without them give `min_mm` and `max_mm`";
+            self.require(acts, &format!("{key}.around_mm"), around, why)?;
+        }
+        if let [Some(min), Some(max)] = corners {
+            self.corners(key, min, max)?;
+        }
+        Ok(())
+    }
+
+    fn corners(&self, key: &str, min_mm: [f64; 3], max_mm: [f64; 3]) -> Result<(), Error> {
+        self.point(&format!("{key}.min_mm"), min_mm)?;
+        self.point(&format!("{key}.max_mm"), max_mm)?;
+        let ordered = min_mm.iter().zip(&max_mm).all(|(low, high)| low <= high);
+        self.require(ordered, &format!("{key}.max_mm"), format!("{max_mm:?}"), "must not lie below min_mm")
     }
 
     fn plane(&self, key: &str, plane: &PlaneSection) -> Result<(), Error> {
@@ -140,6 +171,7 @@ impl Scene {
             let why = "must be at least 2 along each axis";
             check.require(n.iter().all(|&n| n >= 2), "lattice.vertices", format!("{n:?}"), why)?;
         }
+        self.validate_leaving_out(check)?;
         let air = self.tissue.air_below_hu;
         check.require(air.is_finite(), "tissue.air_below_hu", air, "must be a finite HU value")?;
         for (n, plane) in self.tissue.cut_planes.iter().enumerate() {
@@ -151,11 +183,26 @@ impl Scene {
             check.plane(&format!("fixed.planes[{n}]"), plane)?;
         }
         for (n, b) in self.fixed.boxes.iter().enumerate() {
-            check.point(&format!("fixed.boxes[{n}].min_mm"), b.min_mm)?;
-            check.point(&format!("fixed.boxes[{n}].max_mm"), b.max_mm)?;
-            let ordered = b.min_mm.iter().zip(&b.max_mm).all(|(low, high)| low <= high);
-            let max = format!("{:?}", b.max_mm);
-            check.require(ordered, &format!("fixed.boxes[{n}].max_mm"), max, "must not lie below min_mm")?;
+            check.corners(&format!("fixed.boxes[{n}]"), b.min_mm, b.max_mm)?;
+        }
+        Ok(())
+    }
+
+    fn validate_leaving_out(&self, check: &Check<'_>) -> Result<(), Error> {
+        let acts = !self.incision.is_empty() || !self.handle.is_empty();
+        if let Some(region) = &self.lattice.region {
+            let corners = [region.min_mm, region.max_mm];
+            check.zone("lattice.region", region.around_mm, corners, region.zone(), acts)?;
+        }
+        if let Some(grading) = &self.lattice.grading {
+            let corners = [grading.min_mm, grading.max_mm];
+            check.zone("lattice.grading", grading.around_mm, corners, grading.zone(), acts)?;
+            let (growth, coarsest) = (grading.growth, grading.coarsest);
+            let fits = |value: f64, most: f64| value > 1.0 && value <= most;
+            let why = "must be above 1 and at most 2";
+            check.require(fits(growth, Grading::MOST_GROWTH), "lattice.grading.growth", growth, why)?;
+            let why = "must be above 1 and at most 8";
+            check.require(fits(coarsest, Grading::MOST_COARSE), "lattice.grading.coarsest", coarsest, why)?;
         }
         Ok(())
     }

@@ -52,6 +52,93 @@ pub struct LatticeSection {
     /// How a cell is split into tetrahedra.
     #[serde(default)]
     pub split: SplitChoice,
+    /// Simulate a part of the body only. Left out: all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub region: Option<RegionSection>,
+    /// Make the cells larger away from a fine zone. Left out: all have the same size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grading: Option<GradingSection>,
+}
+
+/// The part of the body that is simulated: `around_mm`, or a box. What lies beyond stays where it is; it takes neither
+/// time nor memory of the solver. Skin and largest part are found on the whole body before.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegionSection {
+    /// Everything within this distance of an incision or a handle, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub around_mm: Option<f64>,
+    /// Lowest corner of the box, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_mm: Option<[f64; 3]>,
+    /// Highest corner of the box, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_mm: Option<[f64; 3]>,
+}
+
+/// A fine zone, `around_mm` or a box, in which the lattice is as it would be without grading. Beside it the planes of vertices
+/// lie further and further apart along each axis, so that the zone's steps go on along the other axes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GradingSection {
+    /// The box, along the axes of the lattice, around everything within this distance of an incision (straight down to its
+    /// depth) or a handle, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub around_mm: Option<f64>,
+    /// Lowest corner of the box, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_mm: Option<[f64; 3]>,
+    /// Highest corner of the box, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_mm: Option<[f64; 3]>,
+    /// Largest ratio of neighbouring steps along an axis: above 1, at most 2.
+    #[serde(default = "GradingSection::default_growth")]
+    pub growth: f64,
+    /// Longest step, in steps of the fine zone: above 1, at most 8.
+    #[serde(default = "GradingSection::default_coarsest")]
+    pub coarsest: f64,
+}
+
+impl GradingSection {
+    fn default_growth() -> f64 {
+        1.5
+    }
+
+    fn default_coarsest() -> f64 {
+        4.0
+    }
+}
+
+/// A part of space that a scene names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Zone {
+    /// Within this distance of an incision or a handle, mm.
+    Around(f64),
+    /// A box, mm.
+    Box([f64; 3], [f64; 3]),
+}
+
+impl Zone {
+    /// Exactly one of the two, or none.
+    fn of(around_mm: Option<f64>, min_mm: Option<[f64; 3]>, max_mm: Option<[f64; 3]>) -> Option<Self> {
+        match (around_mm, min_mm, max_mm) {
+            (Some(around), None, None) => Some(Self::Around(around)),
+            (None, Some(min), Some(max)) => Some(Self::Box(min, max)),
+            _ => None,
+        }
+    }
+}
+
+impl RegionSection {
+    pub(crate) fn zone(&self) -> Option<Zone> {
+        Zone::of(self.around_mm, self.min_mm, self.max_mm)
+    }
+}
+
+impl GradingSection {
+    pub(crate) fn zone(&self) -> Option<Zone> {
+        Zone::of(self.around_mm, self.min_mm, self.max_mm)
+    }
 }
 
 /// How a lattice cell is split.
