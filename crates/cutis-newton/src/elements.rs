@@ -75,7 +75,7 @@ impl Elements {
         let arity = self.arity();
         let mut values = vec![0.0; self.len()];
         let mut gradients = vec![Vector3::zeros(); self.len() * arity];
-        values.par_iter_mut().zip(gradients.par_chunks_mut(arity)).enumerate().for_each_init(
+        values.par_iter_mut().zip(gradients.par_chunks_mut(arity.max(1))).enumerate().for_each_init(
             || vec![Point3::origin(); arity],
             |places, (k, (value, gradients))| {
                 self.gather(k, x, places);

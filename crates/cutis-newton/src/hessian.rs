@@ -94,7 +94,7 @@ impl Workspace {
         let c = elements.evaluate_one(k, &self.places, &mut self.gradient);
         let n = 3 * self.places.len();
         let compliance = elements.compliance(k);
-        let step = f64::EPSILON.cbrt() * extent(&self.places);
+        let step = f64::EPSILON.cbrt() * extent(&self.places, c, &self.gradient);
         for column in 0..n {
             let own = self.gradient[column / 3][column % 3];
             for row in 0..n {
@@ -130,11 +130,12 @@ impl Workspace {
     }
 }
 
-/// The largest distance of a point from the first; of a single point, how far it lies from zero.
-fn extent(points: &[Point3<f64>]) -> f64 {
-    match points {
-        [] => 0.0,
-        [point] => point.coords.norm(),
-        [first, rest @ ..] => rest.iter().map(|point| (point - first).norm()).fold(0.0, f64::max),
+/// The size of an element, in m: the largest distance of a vertex from the first; for a constraint on one vertex, how far it has to
+/// go to be met. Zero where there is none.
+pub(crate) fn extent(points: &[Point3<f64>], c: f64, gradients: &[Vector3<f64>]) -> f64 {
+    match (points, gradients) {
+        ([_], [gradient]) if gradient.norm() > 0.0 => c.abs() / gradient.norm(),
+        ([first, rest @ ..], _) => rest.iter().map(|point| (point - first).norm()).fold(0.0, f64::max),
+        ([], _) => 0.0,
     }
 }

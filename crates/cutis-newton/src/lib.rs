@@ -6,6 +6,7 @@
 //! [`Problem::equilibrium`] finds where the body comes to rest. [`relative_rms`] says how far a solver is from either.
 #![forbid(unsafe_code)]
 
+mod derivatives;
 mod dissection;
 mod elements;
 mod error;
@@ -18,6 +19,7 @@ mod options;
 mod pattern;
 mod problem;
 
+pub use derivatives::Derivatives;
 pub use error::NewtonError;
 pub use options::{Minimum, Options, relative_rms};
 pub use problem::Problem;

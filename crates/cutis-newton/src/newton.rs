@@ -107,7 +107,8 @@ impl Search<'_> {
 
     /// A step along the direction that the factors give, and its length as a share of the whole.
     fn along_direction(&mut self, state: &State) -> Option<(State, f64)> {
-        let direction = self.direction(state);
+        let descent: Vec<f64> = state.gradient.iter().map(|g| -g).collect();
+        let direction = self.factors.solve(&descent);
         let slope = dot(&state.gradient, &direction);
         if !(slope < 0.0 && slope.is_finite()) {
             return None;
@@ -125,20 +126,6 @@ impl Search<'_> {
             length = if within.contains(&parabola) { parabola } else { 0.3 * length };
         }
         None
-    }
-
-    /// `−H⁻¹ g`, by vertices that can move.
-    fn direction(&mut self, state: &State) -> Vec<f64> {
-        let free = &self.objective.problem.free;
-        let place = |&v: &u32| 3 * self.pattern.places[v as usize] as usize;
-        let mut right = vec![0.0; state.gradient.len()];
-        for (v, gradient) in free.iter().zip(state.gradient.chunks_exact(3)) {
-            for (to, from) in right[place(v)..].iter_mut().zip(gradient) {
-                *to = -from;
-            }
-        }
-        self.factors.solve(&mut right);
-        free.iter().flat_map(|v| right[place(v)..place(v) + 3].to_vec()).collect()
     }
 }
 

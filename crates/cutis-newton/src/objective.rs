@@ -30,9 +30,11 @@ pub(crate) struct State {
     pub field: Field,
     /// `∂U/∂x` of each vertex that can move, three numbers in a row.
     pub gradient: Vec<f64>,
+    /// Sum of the norms of what is summed up in the gradient at each of them, in N.
+    pub parts: Vec<f64>,
     /// Norm of the gradient, in N.
     pub norm: f64,
-    /// Norm of the sizes of what is summed up in the gradient at each vertex, in N.
+    /// Norm of the parts, in N.
     pub scale: f64,
     /// Norm of what rounding alone can leave of the gradient, in N.
     pub floor: f64,
@@ -65,21 +67,23 @@ impl Objective<'_> {
     pub fn at(&self, x: Vec<Point3<f64>>) -> State {
         let field = self.problem.elastic.at(&x);
         let free = &self.problem.free;
-        let mut gradient = Vec::with_capacity(3 * free.len());
+        let (mut gradient, mut parts) = (Vec::with_capacity(3 * free.len()), Vec::with_capacity(free.len()));
         let (mut square, mut scale, mut floor, mut noise) = (0.0, 0.0, 0.0, field.energy_rounding);
         for &v in free {
             let v = v as usize;
             let (outer, rounding) = self.outer_gradient(v, &x[v]);
             let total = field.gradient[v] + outer;
+            let part = field.parts[v] + outer.norm();
             square += total.norm_squared();
-            scale += (field.parts[v] + outer.norm()).powi(2);
+            scale += part * part;
             floor += (field.rounding[v] + rounding).powi(2);
             noise += outer.norm() * x[v].coords.norm();
             gradient.extend(total.iter());
+            parts.push(part);
         }
         let noise = f64::EPSILON * noise;
         let (norm, scale, floor) = (square.sqrt(), scale.sqrt(), f64::EPSILON * floor.sqrt());
-        State { x, field, gradient, norm, scale, floor, noise }
+        State { x, field, gradient, parts, norm, scale, floor, noise }
     }
 
     /// The objective at `to` less that at `from`, to the rounding of the change.

@@ -22,6 +22,8 @@ const SINGULAR: f64 = 16.0 * f64::EPSILON;
 pub(crate) struct Pattern {
     /// The row and column of each vertex of the body; `u32::MAX` for those that do not move.
     pub places: Vec<u32>,
+    /// The row and column of each vertex that can move.
+    ranks: Vec<u32>,
     /// Start of each block column in `rows`.
     starts: Vec<usize>,
     /// The block rows of each column, ascending, up to the diagonal.
@@ -77,7 +79,21 @@ impl Pattern {
         let symbolic =
             factorize_symbolic_cholesky(matrix, Side::Upper, SymmetricOrdering::Identity, parameters)
                 .map_err(|_| NewtonError::Memory { free: free.len(), bytes: None })?;
-        Ok(Self { places, starts, rows, column_starts, row_indices, symbolic })
+        Ok(Self { places, ranks, starts, rows, column_starts, row_indices, symbolic })
+    }
+
+    /// Three numbers for each vertex that can move, brought into the order of elimination.
+    pub fn permuted(&self, by_vertex: &[f64]) -> Vec<f64> {
+        let mut by_rank = vec![0.0; by_vertex.len()];
+        for (&rank, from) in self.ranks.iter().zip(by_vertex.chunks_exact(3)) {
+            by_rank[3 * rank as usize..][..3].copy_from_slice(from);
+        }
+        by_rank
+    }
+
+    /// The inverse of [`permuted`](Self::permuted).
+    pub fn restored(&self, by_rank: &[f64]) -> Vec<f64> {
+        self.ranks.iter().flat_map(|&rank| &by_rank[3 * rank as usize..][..3]).copied().collect()
     }
 
     /// Numbers in the factors.
@@ -170,6 +186,24 @@ impl Factors<'_> {
         self.pattern.column_starts[n + 1] - 3 + n % 3
     }
 
+    /// The Hessian times `x`: three numbers for each vertex that can move, in their order.
+    pub fn product(&self, x: &[f64]) -> Vec<f64> {
+        let pattern = self.pattern;
+        let x = pattern.permuted(x);
+        let mut y = vec![0.0; x.len()];
+        for column in 0..x.len() {
+            let entries = pattern.column_starts[column]..pattern.column_starts[column + 1];
+            for (&row, value) in pattern.row_indices[entries.clone()].iter().zip(&self.values[entries]) {
+                y[row] += value * x[column];
+                // The diagonal blocks are whole, of the others only the upper ones are there.
+                if row / 3 != column / 3 {
+                    y[column] += value * x[row];
+                }
+            }
+        }
+        pattern.restored(&y)
+    }
+
     /// Factorises the Hessian. False where it is not positive definite, to rounding.
     pub fn factorise(&mut self) -> bool {
         let pattern = self.pattern;
@@ -202,12 +236,13 @@ impl Factors<'_> {
         })
     }
 
-    /// Replaces `b` by the solution of `H x = b`, with the Hessian that was factorised last. Three numbers for each vertex that can
-    /// move, in the order of their elimination.
-    pub fn solve(&mut self, b: &mut [f64]) {
+    /// The solution of `H x = b`, with the Hessian that was factorised last. Three numbers for each vertex that can move, in their
+    /// order.
+    pub fn solve(&mut self, b: &[f64]) -> Vec<f64> {
+        let mut x = self.pattern.permuted(b);
         let factors = faer::sparse::linalg::cholesky::LltRef::new(&self.pattern.symbolic, &self.factors);
-        let n = b.len();
-        let b = MatMut::from_column_major_slice_mut(b, n, 1);
-        factors.solve_in_place_with_conj(Conj::No, b, Par::Seq, MemStack::new(&mut self.scratch));
+        let column = MatMut::from_column_major_slice_mut(&mut x, b.len(), 1);
+        factors.solve_in_place_with_conj(Conj::No, column, Par::Seq, MemStack::new(&mut self.scratch));
+        self.pattern.restored(&x)
     }
 }

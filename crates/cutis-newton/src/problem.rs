@@ -24,7 +24,7 @@ pub struct Problem {
     origin: Vector3<f64>,
     positions: Vec<Point3<f64>>,
     masses: Vec<f64>,
-    gravity: Vector3<f64>,
+    pub(crate) gravity: Vector3<f64>,
     pattern: OnceLock<Result<Pattern, NewtonError>>,
 }
 
@@ -67,6 +67,14 @@ impl Problem {
     /// Mass of each vertex in kg; infinity for those that do not move.
     pub fn masses(&self) -> &[f64] {
         &self.masses
+    }
+
+    /// Bytes that the factors of the Hessian take, the most of what a minimisation needs.
+    ///
+    /// # Errors
+    /// [`NewtonError::Memory`] if they cannot be counted.
+    pub fn factor_bytes(&self) -> Result<usize, NewtonError> {
+        Ok(self.pattern()?.factor_len().saturating_mul(size_of::<f64>()))
     }
 
     /// Number of vertices that can move.
@@ -171,7 +179,7 @@ impl Problem {
         x.iter().map(|x| x - self.origin).collect()
     }
 
-    fn check(&self, what: &'static str, x: &[Point3<f64>]) -> Result<(), NewtonError> {
+    pub(crate) fn check(&self, what: &'static str, x: &[Point3<f64>]) -> Result<(), NewtonError> {
         if x.len() != self.masses.len() {
             return Err(NewtonError::Length { what, found: x.len(), expected: self.masses.len() });
         }

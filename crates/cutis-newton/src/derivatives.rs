@@ -1,0 +1,88 @@
+//! Gradients and Hessians held against differences of what they are derivatives of.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::hessian::{Form, assemble, extent};
+use crate::objective::{Objective, Outer, State};
+use crate::{NewtonError, Problem};
+
+/// The largest relative deviations that were found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Derivatives {
+    /// Slope of the energy along a direction, by the gradient and by central differences of the energy: their difference over the
+    /// sum of what each force contributes to the slope.
+    pub gradient: f64,
+    /// Change of the gradient along a direction, by the Hessian and by central differences of the gradient: the norm of their
+    /// difference over that of the change.
+    pub hessian: f64,
+}
+
+impl Problem {
+    /// Checks the derivatives of elastic energy and gravity at `x` along `samples` directions without pattern. Right derivatives
+    /// deviate by what differences leave: about 1e-9, more where elements are slivers. Where no element has a size to take a step by,
+    /// the deviations are not a number.
+    ///
+    /// # Errors
+    /// A wrong length, a position that is not finite, no memory.
+    pub fn check_derivatives(&self, x: &[Point3<f64>], samples: usize) -> Result<Derivatives, NewtonError> {
+        self.check("x", x)?;
+        let objective = Objective { problem: self, outer: Outer::Gravity(self.gravity) };
+        let state = objective.at(self.local(x));
+        let pattern = self.pattern()?;
+        let mut factors = pattern.factors()?;
+        assemble(&objective, &state, &pattern.places, Form::Exact, &mut factors);
+        let step = f64::EPSILON.cbrt() * self.smallest_extent(&state);
+        let mut found = Derivatives { gradient: 0.0, hessian: 0.0 };
+        for sample in 0..samples {
+            let direction: Vec<f64> = (0..state.gradient.len()).map(|n| noise(sample, n)).collect();
+            let ahead = objective.moved(&state, &direction, step);
+            let behind = objective.moved(&state, &direction, -step);
+            let slope: f64 = state.gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
+            let difference = objective.difference(&behind, &ahead) / (2.0 * step);
+            let lengths = direction.chunks_exact(3).map(|d| Vector3::from_column_slice(d).norm());
+            let scale: f64 = state.parts.iter().zip(lengths).map(|(part, length)| part * length).sum();
+            found.gradient = larger(found.gradient, (slope - difference).abs(), scale);
+
+            let product = factors.product(&direction);
+            let (mut error, mut whole) = (0.0, 0.0);
+            for n in 0..direction.len() {
+                let change = (ahead.gradient[n] - behind.gradient[n]) / (2.0 * step);
+                error += (product[n] - change).powi(2);
+                whole += change.powi(2);
+            }
+            found.hessian = larger(found.hessian, error.sqrt(), whole.sqrt());
+        }
+        Ok(found)
+    }
+
+    /// The size of the smallest element that has one; infinite if there is none.
+    fn smallest_extent(&self, state: &State) -> f64 {
+        let mut smallest = f64::INFINITY;
+        for (elements, evaluated) in self.elastic.kinds.iter().zip(&state.field.kinds) {
+            let mut places = vec![Point3::origin(); elements.arity()];
+            let gradients = evaluated.gradients.chunks_exact(elements.arity().max(1));
+            for (k, (&c, gradients)) in evaluated.values.iter().zip(gradients).enumerate() {
+                elements.gather(k, &state.x, &mut places);
+                let extent = extent(&places, c, gradients);
+                if extent > 0.0 {
+                    smallest = smallest.min(extent);
+                }
+            }
+        }
+        smallest
+    }
+}
+
+/// The larger one of a deviation and `error/scale`; what is not a number is larger than any.
+fn larger(deviation: f64, error: f64, scale: f64) -> f64 {
+    let ratio = if error == 0.0 { 0.0 } else { error / scale };
+    if ratio <= deviation { deviation } else { ratio }
+}
+
+/// A number from −1 to 1 without pattern.
+fn noise(sample: usize, n: usize) -> f64 {
+    let mixed = (n as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        ^ (sample as u64 + 1).wrapping_mul(0xD1B5_4A32_D192_ED03);
+    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    ((mixed ^ (mixed >> 32)) >> 11) as f64 / 2f64.powi(52) - 1.0
+}
