@@ -90,4 +90,24 @@ pub enum ColoringError {
         /// The vertex that they share.
         vertex: u32,
     },
+    /// Groups of vertices do not name each vertex that moves exactly once, and no other.
+    #[error(
+        "groups of vertices must name each vertex that moves once, and no other; vertex {vertex} is named wrongly or not at all"
+    )]
+    WrongVertex {
+        /// The vertex.
+        vertex: u32,
+    },
+    /// Two vertices of one group are in one constraint.
+    #[error("vertices {first} and {second}, both of group {group}, are in constraint {constraint}")]
+    VertexClash {
+        /// The group (colour).
+        group: usize,
+        /// A vertex of the constraint.
+        first: u32,
+        /// A later vertex of the constraint.
+        second: u32,
+        /// The constraint, counted within its kind.
+        constraint: usize,
+    },
 }

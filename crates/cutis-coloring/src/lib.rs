@@ -5,6 +5,9 @@
 //! constraints inside a colour in any order or in parallel, with the same result bit for bit. This crate knows
 //! nothing of what the constraints mean.
 //!
+//! A solver that moves vertex after vertex instead needs groups of vertices, no two of which are in one constraint:
+//! [`greedy_vertices`], from the [`Incidence`] of each kind.
+//!
 //! ```
 //! use cutis_coloring::greedy;
 //!
@@ -22,14 +25,18 @@
 mod error;
 mod greedy;
 mod groups;
+mod incidence;
 mod sort;
 mod statistics;
 mod verify;
+mod vertices;
 
 pub use error::ColoringError;
 pub use greedy::greedy;
 pub use groups::Groups;
+pub use incidence::{Incidence, Tuples};
 pub use statistics::Statistics;
+pub use vertices::greedy_vertices;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

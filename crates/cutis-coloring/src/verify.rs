@@ -57,7 +57,7 @@ impl Groups {
         Ok(())
     }
 
-    fn check_offsets(&self) -> Result<(), ColoringError> {
+    pub(crate) fn check_offsets(&self) -> Result<(), ColoringError> {
         let order_len = self.order.len();
         let broken = |position| ColoringError::BrokenOffsets { position, order_len };
         if self.offsets.first() != Some(&0) {

@@ -124,7 +124,7 @@ impl<const N: usize> Body<N> {
             Formulation::Pbd => {
                 Stiffness::Pbd(single(self.tuples.iter().map(|_| random.between(0.2, 1.0)).collect()))
             }
-            Formulation::Xpbd => {
+            Formulation::Xpbd | Formulation::Vbd => {
                 let h = plan.settings().substep_s();
                 let compliance = |k: usize| random.between(0.1, 2.0) * h * h * self.weighted_square::<C>(k);
                 Stiffness::Compliance(single((0..self.tuples.len()).map(compliance).collect()))

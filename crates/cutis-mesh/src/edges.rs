@@ -100,6 +100,23 @@ impl TetMesh {
         edges.par_iter().map(class).collect()
     }
 
+    /// Colours of the vertices in closed form: vertices of one colour are in no common tet, edge or face.
+    ///
+    /// `kuhn6`: (i + j + k) mod 4, since the corners of a tet lie on a monotonous path; 4 colours. `five`: the parities of i, j
+    /// and k; 8 colours.
+    pub fn vertex_classes(&self) -> Vec<u16> {
+        let grid = self.lattice.grid();
+        let class = |&point: &u32| {
+            let [i, j, k] = grid.point(point as usize);
+            let color = match self.lattice.split() {
+                Split::Kuhn6 => (i + j + k) % 4,
+                Split::Five => (i & 1) + 2 * (j & 1) + 4 * (k & 1),
+            };
+            color as u16
+        };
+        self.lattice_index.par_iter().map(class).collect()
+    }
+
     /// Colours of lattice tets in closed form: tets of one colour share no vertex.
     ///
     /// `kuhn6`: colour = 4 · type + (i + j + k) mod 4 of the cell, 24 colours. `five`: 8 · type + the parities of i, j and k, 40

@@ -51,6 +51,7 @@ fn sweeps(criterion: &mut Criterion) {
                 iterations: 1,
                 gravity_m_s2: [0.0, -9.81, 0.0],
                 damping_per_s: 0.0,
+                relaxation: 1.0,
             };
             let mut solver =
                 SolverCpu::new(system(&lattice), settings, Some(threads)).expect("a valid system");

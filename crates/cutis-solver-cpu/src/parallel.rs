@@ -1,7 +1,7 @@
 //! How passes are spread over threads.
 
 use cutis_constraints::Scalar;
-use cutis_solver::{Coloured, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
+use cutis_solver::{Coloured, ColouredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
 use rayon::prelude::*;
 
 /// Vertices that a thread takes at a time.
@@ -27,6 +27,10 @@ impl<T: Scalar> Execute<T> for Parallel {
     ) {
         let color = Coloured::new(vertices, set, sweep.color, step, multipliers);
         fan_out(self.threads.min(color.chunks()), &|| while color.project_next_chunk() {});
+    }
+
+    fn turn(&self, color: ColouredVertices<'_, T>) {
+        fan_out(self.threads.min(color.chunks()), &|| while color.move_next_chunk() {});
     }
 
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {

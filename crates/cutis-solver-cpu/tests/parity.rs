@@ -28,7 +28,7 @@ fn body<T: Scalar>(formulation: Formulation) -> System<T> {
             Formulation::Pbd => {
                 Stiffness::Pbd(Values::Each((0..count).map(|n| T::constant(0.3 * value(n))).collect()))
             }
-            Formulation::Xpbd => Stiffness::Compliance(Values::Each(
+            Formulation::Xpbd | Formulation::Vbd => Stiffness::Compliance(Values::Each(
                 (0..count).map(|n| T::constant(unit * value(n))).collect(),
             )),
         }
@@ -64,7 +64,15 @@ fn body<T: Scalar>(formulation: Formulation) -> System<T> {
 
 fn settings(formulation: Formulation, iterations: u32) -> Settings {
     let gravity_m_s2 = [0.0, -9.81, 0.0];
-    Settings { formulation, dt_s: 0.01, substeps: 2, iterations, gravity_m_s2, damping_per_s: 0.5 }
+    Settings {
+        formulation,
+        dt_s: 0.01,
+        substeps: 2,
+        iterations,
+        gravity_m_s2,
+        damping_per_s: 0.5,
+        relaxation: 1.0,
+    }
 }
 
 /// Positions and velocities after three frames, as bits.

@@ -122,8 +122,8 @@ impl Body {
 fn settings_of(simulation: &Simulation<f32>) -> [f32; 8] {
     let numbers = simulation.integrator();
     let inverse_h_squared = match simulation.projection_step() {
-        Step::Pbd => 0.0,
-        Step::Xpbd { inverse_h_squared } => inverse_h_squared,
+        Some(Step::Xpbd { inverse_h_squared }) => inverse_h_squared,
+        Some(Step::Pbd) | None => 0.0,
     };
     let g = numbers.gravity_h;
     [g.x, g.y, g.z, numbers.h, numbers.velocity_factor, inverse_h_squared, 0.0, 0.0]

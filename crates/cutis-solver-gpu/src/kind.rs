@@ -44,7 +44,7 @@ impl Kind {
         let (name, arity) = (set.name(), set.arity());
         let rule = match settings.formulation {
             Formulation::Pbd => Rule::Pbd,
-            Formulation::Xpbd => Rule::Xpbd,
+            Formulation::Xpbd | Formulation::Vbd => Rule::Xpbd,
         };
         let (stiffness, uniform) = match set.stiffness().values() {
             Values::Uniform(value) => (solver::Stiffness::Uniform, Some(gpu.uniform("stiffness", value)?)),

@@ -5,29 +5,47 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
-use cutis_coloring::Groups;
+use cutis_coloring::{Groups, Incidence};
 use cutis_constraints::{Constraint, Params, Scalar};
 use nalgebra::{Point3, Vector3};
-use simba::simd::SimdValue;
+use simba::simd::{SimdPartialOrd, SimdValue};
 
 use crate::coloured::SharedVertices;
 use crate::{
-    ConstraintSet, Kind, Pbd, Residual, Rule, SolverError, Step, Stiffness, Values, Vertex, Xpbd, project,
+    ConstraintSet, Kind, Pbd, Pull, Residual, Rule, SolverError, Step, Stiffness, Values, Vertex, Xpbd,
+    project,
 };
 
-/// Where a loop over constraints reads and moves vertices.
-pub trait Store<T> {
+/// Lanes that any number type has at most.
+const MOST_LANES: usize = 4;
+
+/// Where a loop over constraints reads vertices.
+pub trait Load<T> {
     /// The vertex `index`.
     fn load(&self, index: u32) -> Vertex<T>;
+}
+
+/// Where it moves them, too.
+pub trait Store<T>: Load<T> {
     /// Replaces the vertex `index`.
     fn store(&mut self, index: u32, vertex: Vertex<T>);
 }
 
-impl<T: Copy> Store<T> for &mut [Vertex<T>] {
+impl<T: Copy> Load<T> for &[Vertex<T>] {
     #[inline(always)]
     fn load(&self, index: u32) -> Vertex<T> {
         self[index as usize]
     }
+}
+
+impl<T: Copy> Load<T> for &mut [Vertex<T>] {
+    #[inline(always)]
+    fn load(&self, index: u32) -> Vertex<T> {
+        self[index as usize]
+    }
+}
+
+impl<T: Copy> Store<T> for &mut [Vertex<T>] {
     #[inline(always)]
     fn store(&mut self, index: u32, vertex: Vertex<T>) {
         self[index as usize] = vertex;
@@ -46,6 +64,17 @@ pub trait Project<T: Scalar> {
         vertices: SharedVertices<'_, T>,
         step: Step<T>,
         multipliers: &mut [T],
+    );
+    /// Adds what this kind does to each of `chosen` to its place in `pulls`. `incidence` is that of this kind.
+    fn pull(&self, incidence: &Incidence, chosen: &[u32], vertices: &[Vertex<T>], pulls: &mut [Pull<T>]);
+    /// The same, side by side, with vertices that other threads may be moving too: none that is in a constraint with one
+    /// of `chosen`.
+    fn pull_shared(
+        &self,
+        incidence: &Incidence,
+        chosen: &[u32],
+        vertices: SharedVertices<'_, T>,
+        pulls: &mut [Pull<T>],
     );
     /// Number of vertices that the indices were checked against.
     fn vertex_count(&self) -> usize;
@@ -185,6 +214,66 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     }
 }
 
+/// How constraints act on single vertices.
+impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
+    /// Adds to `pull` what the constraints at `places` do to one vertex, in ascending order.
+    #[inline(always)]
+    fn pull_one_by_one<L: Load<T>>(&self, places: &[u32], load: &L, pull: &mut Pull<T>) {
+        let stiffness = self.stiffness.values();
+        for &place in places {
+            let (k, slot) = (place as usize / N, place as usize % N);
+            let x = self.indices[k].map(|i| load.load(i).position());
+            let eval = C::eval(&x, &self.params[k]);
+            pull.add(eval.c, &eval.grad[slot], stiffness.at(k), C::rest_size(&self.params[k]));
+        }
+    }
+
+    /// The same for several vertices side by side, as long as each of them has constraints left, and the rest one by one.
+    #[inline(always)]
+    fn pull_side_by_side<L: Load<T>>(&self, places: &[&[u32]], load: &L, pulls: &mut [Pull<T>]) {
+        let stiffness = self.stiffness.values();
+        let common = places.iter().map(|places| places.len()).min().unwrap_or(0);
+        let vector = |part: fn(&Pull<T>) -> &Vector3<T>, pulls: &[Pull<T>]| {
+            Vector3::from_fn(|axis, _| T::lanes(|lane| part(&pulls[lane])[axis]))
+        };
+        let mut sum = Pull {
+            force: vector(|pull| &pull.force, pulls),
+            diagonal: vector(|pull| &pull.diagonal, pulls),
+            mixed: vector(|pull| &pull.mixed, pulls),
+        };
+        for n in 0..common {
+            let place = |lane: usize| places[lane][n] as usize;
+            let x: [Point3<T::Lanes>; N] = std::array::from_fn(|i| {
+                let column = |axis: usize| {
+                    T::lanes(|lane| load.load(self.indices[place(lane) / N][i]).component(axis))
+                };
+                Point3::new(column(0), column(1), column(2))
+            });
+            let params = Params::from_fn(|j| T::lanes(|lane| self.params[place(lane) / N].as_ref()[j]));
+            let eval = C::eval(&x, &params);
+            let slot = T::lanes(|lane| T::constant((place(lane) % N) as f64));
+            let mut gradient = eval.grad[0];
+            for i in 1..N {
+                let here = slot.simd_eq(T::Lanes::splat(T::constant(i as f64)));
+                gradient = gradient.zip_map(&eval.grad[i], |other, this| this.select(here, other));
+            }
+            let compliance = match stiffness {
+                Values::Uniform(value) => T::Lanes::splat(*value),
+                Values::Each(values) => T::lanes(|lane| values[place(lane) / N]),
+            };
+            sum.add(eval.c, &gradient, compliance, C::rest_size(&params));
+        }
+        for (lane, (pull, places)) in pulls.iter_mut().zip(places).enumerate() {
+            *pull = Pull {
+                force: sum.force.map(|component| component.extract(lane)),
+                diagonal: sum.diagonal.map(|component| component.extract(lane)),
+                mixed: sum.mixed.map(|component| component.extract(lane)),
+            };
+            self.pull_one_by_one(&places[common..], load, pull);
+        }
+    }
+}
+
 fn check_tuple(
     kind: &'static str,
     constraint: usize,
@@ -230,6 +319,35 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
             Step::Xpbd { inverse_h_squared } => {
                 let lanes = Xpbd { inverse_h_squared: T::Lanes::splat(inverse_h_squared) };
                 self.side_by_side(range, vertices, Xpbd { inverse_h_squared }, lanes, multipliers);
+            }
+        }
+    }
+
+    fn pull(&self, incidence: &Incidence, chosen: &[u32], vertices: &[Vertex<T>], pulls: &mut [Pull<T>]) {
+        for (&vertex, pull) in chosen.iter().zip(pulls) {
+            self.pull_one_by_one(incidence.of(vertex), &vertices, pull);
+        }
+    }
+
+    fn pull_shared(
+        &self,
+        incidence: &Incidence,
+        chosen: &[u32],
+        vertices: SharedVertices<'_, T>,
+        pulls: &mut [Pull<T>],
+    ) {
+        let lanes = T::Lanes::LANES;
+        let mut places: [&[u32]; MOST_LANES] = [&[]; MOST_LANES];
+        for (chosen, pulls) in chosen.chunks(lanes).zip(pulls.chunks_mut(lanes)) {
+            if chosen.len() == lanes {
+                for (places, &vertex) in places.iter_mut().zip(chosen) {
+                    *places = incidence.of(vertex);
+                }
+                self.pull_side_by_side(&places[..lanes], &vertices, pulls);
+            } else {
+                for (&vertex, pull) in chosen.iter().zip(pulls) {
+                    self.pull_one_by_one(incidence.of(vertex), &vertices, pull);
+                }
             }
         }
     }

@@ -62,8 +62,15 @@ impl<T: Scalar> SystemBuilder<T> {
         }
         let previous = vertices.iter().map(Vertex::position).collect();
         let velocities = vec![Vector3::zeros(); count];
-        let system =
-            System { origin, vertices, previous, velocities, kinds: Vec::new(), handles: Vec::new() };
+        let system = System {
+            origin,
+            vertices,
+            previous,
+            velocities,
+            kinds: Vec::new(),
+            handles: Vec::new(),
+            vertex_groups: None,
+        };
         Ok(Self { system, carried: HashSet::new() })
     }
 
@@ -128,6 +135,14 @@ impl<T: Scalar> SystemBuilder<T> {
             params.push(of_rest);
         }
         self.add::<C, N>(indices, &params, stiffness, groups)
+    }
+
+    /// Groups of the vertices for [`Formulation::Vbd`](crate::Formulation::Vbd), where the caller knows better ones than
+    /// greedy colouring finds, for example those of a lattice in closed form. Vertices that do not move may be among them. They are
+    /// checked when a solver is made; other formulations do not look at them.
+    pub fn vertex_groups(mut self, groups: Groups) -> Self {
+        self.system.vertex_groups = Some(Arc::new(groups));
+        self
     }
 
     /// Adds a handle; its vertices leave the dynamics.

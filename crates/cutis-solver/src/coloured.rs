@@ -5,6 +5,12 @@
 //! (2) [`Coloured`] borrows the vertices mutably for its whole life, so that nobody else reads or moves them.
 //! (3) A chunk is a range of one colour, taken from an atomic counter that only grows: each constraint is handed
 //! out once. So two threads never touch the same vertex or the same multiplier.
+//!
+//! For groups of vertices the same holds. (1) A `Descent` and the system that it was made from lie in one
+//! `Simulation`; its incidences are those of the system's kinds, and `Groups::verify_vertices` has checked that no two vertices of
+//! a colour are in one constraint, and that each is named once. (2) [`ColouredVertices`] borrows the system mutably for its
+//! whole life. (3) A chunk is handed out once; who has it moves its vertices, and reads those that are in constraints with
+//! them, which nobody moves meanwhile.
 #![allow(unsafe_code)]
 
 use std::marker::PhantomData;
@@ -12,9 +18,10 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use cutis_constraints::Scalar;
+use nalgebra::{Point3, Vector3};
 
-use crate::batch::Store;
-use crate::{ConstraintSet, Step, Vertex};
+use crate::batch::{Load, Store};
+use crate::{ConstraintSet, Descent, Kind, Pull, Step, System, Turn, Vertex};
 
 /// Constraints that a thread takes at a time. Fixed; results do not depend on it.
 const CHUNK: usize = 1024;
@@ -110,20 +117,108 @@ impl<'a, T: Scalar> Coloured<'a, T> {
     }
 }
 
+/// Vertices that a thread takes at a time. Fixed; results do not depend on it.
+const VERTEX_CHUNK: usize = 128;
+
+/// One colour of vertices, shared between the threads that move them.
+pub struct ColouredVertices<'a, T: Scalar> {
+    kinds: &'a [Kind<T>],
+    descent: &'a Descent<T>,
+    range: Range<usize>,
+    next: AtomicUsize,
+    previous: &'a [Point3<T>],
+    velocities: &'a [Vector3<T>],
+    vertices: *mut Vertex<T>,
+    vertex_count: usize,
+    borrow: PhantomData<&'a mut [T]>,
+}
+
+// SAFETY: sharing it only lets threads take distinct chunks, as above.
+unsafe impl<T: Scalar> Sync for ColouredVertices<'_, T> {}
+
+impl<'a, T: Scalar> ColouredVertices<'a, T> {
+    /// Prepares a colour of `descent`, which must be that of `system`.
+    pub(crate) fn new(system: &'a mut System<T>, descent: &'a Descent<T>, turn: Turn) -> Self {
+        let System { vertices, previous, velocities, kinds, .. } = system;
+        Self {
+            kinds,
+            descent,
+            range: turn.start..turn.end,
+            next: AtomicUsize::new(0),
+            previous,
+            velocities,
+            vertices: vertices.as_mut_ptr(),
+            vertex_count: vertices.len(),
+            borrow: PhantomData,
+        }
+    }
+
+    /// Takes a chunk that nobody took yet and moves its vertices; `false` when none is left.
+    pub fn move_next_chunk(&self) -> bool {
+        let Some(chosen) = self.next_chunk() else { return false };
+        let mut pulls = [Pull::none(); VERTEX_CHUNK];
+        let pulls = &mut pulls[..chosen.len()];
+        let shared = || SharedVertices { vertices: self.vertices, borrow: PhantomData };
+        for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
+            kind.pull_shared(incidence, chosen, shared(), pulls);
+        }
+        let mut vertices = shared();
+        for (&vertex, pull) in chosen.iter().zip(pulls) {
+            vertices.store(vertex, self.moved(vertex, vertices.load(vertex), pull));
+        }
+        true
+    }
+
+    /// Moves all vertices of the colour one by one, in safe scalar code.
+    pub fn move_one_by_one(self) {
+        // SAFETY: `self` is consumed, so that no thread shares it any more, and was made from this exclusive borrow.
+        let vertices = unsafe { std::slice::from_raw_parts_mut(self.vertices, self.vertex_count) };
+        while let Some(chosen) = self.next_chunk() {
+            for vertex in chosen {
+                let mut pull = Pull::none();
+                let (chosen, pulls) = (std::slice::from_ref(vertex), std::slice::from_mut(&mut pull));
+                for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
+                    kind.pull(incidence, chosen, vertices, pulls);
+                }
+                vertices[*vertex as usize] = self.moved(*vertex, vertices[*vertex as usize], &pull);
+            }
+        }
+    }
+
+    fn next_chunk(&self) -> Option<&'a [u32]> {
+        let taken = self.next.fetch_add(1, Ordering::Relaxed);
+        let start = self.range.start + taken.saturating_mul(VERTEX_CHUNK).min(self.range.len());
+        let end = self.range.end.min(start.saturating_add(VERTEX_CHUNK));
+        (start < end).then(|| &self.descent.groups().order[start..end])
+    }
+
+    fn moved(&self, index: u32, vertex: Vertex<T>, pull: &Pull<T>) -> Vertex<T> {
+        let i = index as usize;
+        self.descent.step().moved(vertex, &self.previous[i], &self.velocities[i], pull)
+    }
+
+    /// Number of chunks, an upper bound of the threads that can help.
+    pub fn chunks(&self) -> usize {
+        self.range.len().div_ceil(VERTEX_CHUNK)
+    }
+}
+
 /// The vertices as one chunk sees them. Only a batch can read or write through it, with its own checked indices.
 pub struct SharedVertices<'a, T> {
     vertices: *mut Vertex<T>,
     borrow: PhantomData<&'a mut Vertex<T>>,
 }
 
-impl<T: Copy> Store<T> for SharedVertices<'_, T> {
+impl<T: Copy> Load<T> for SharedVertices<'_, T> {
     #[inline(always)]
     fn load(&self, index: u32) -> Vertex<T> {
         // SAFETY: a batch only passes its own indices, all below the number of vertices, and no other thread moves
         // a vertex of the constraint in work (top of the file).
         unsafe { *self.vertices.add(index as usize) }
     }
+}
 
+impl<T: Copy> Store<T> for SharedVertices<'_, T> {
     #[inline(always)]
     fn store(&mut self, index: u32, vertex: Vertex<T>) {
         // SAFETY: as for `load`.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use cutis_constraints::Scalar;
 
-use crate::{ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
+use crate::{ColouredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
 
 /// Time of one part of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +29,8 @@ impl Ledger {
     pub const HANDLES: &'static str = "handles";
     /// Multipliers, set to zero at the start of a substep.
     pub const MULTIPLIERS: &'static str = "multipliers";
+    /// The steps of the vertices in vertex block descent, all kinds together.
+    pub const DESCENT: &'static str = "descent";
     /// The look at whether all positions are finite.
     pub const CHECK: &'static str = "check";
     /// The whole step, of a backend that cannot tell its parts.
@@ -94,6 +96,10 @@ impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
     ) {
         let work = || self.inner.sweep(sweep, set, vertices, step, multipliers);
         self.ledger.borrow_mut().time(set.name(), work);
+    }
+
+    fn turn(&self, color: ColouredVertices<'_, T>) {
+        self.ledger.borrow_mut().time(Ledger::DESCENT, || self.inner.turn(color));
     }
 
     fn alone(&self, part: &'static str, work: &mut dyn FnMut()) {

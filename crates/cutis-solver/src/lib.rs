@@ -9,9 +9,11 @@
 //! - [`Formulation::Pbd`] (Müller et al. 2007): `Δx_i = −s·w_i·∇_iC·C / Σ w|∇C|²`, `s` in `[0, 1]` per iteration.
 //! - [`Formulation::Xpbd`] (Macklin et al. 2016): `Δλ = (−C − α̃λ)/(Σ w|∇C|² + α̃)`, `Δx_i = w_i ∇_iC Δλ`, with
 //!   `α̃ = α/h²` and `λ = 0` at the start of every substep.
+//! - [`Formulation::Vbd`] (Chen et al. 2024): the same energies `½C²/α`; the energy of the implicit step falls vertex by vertex.
+//!   See [`Pull`] for what acts on a vertex, and `descent.rs` for what differs from the source.
 //!
 //! A note that is not legal advice: US patent 11,270,041 B2 is said to read on accumulating λ over iterations. `Pbd`
-//! has no λ, and `Xpbd` with one iteration per substep neither stores nor accumulates one; both are complete.
+//! and `Vbd` have no λ, and `Xpbd` with one iteration per substep neither stores nor accumulates one; all are complete.
 //!
 //! # Example
 //! A mass on a spring of compliance 0.01 m/N, let go at 1.1 times its rest length:
@@ -41,6 +43,7 @@ mod batch;
 mod builder;
 mod clock;
 mod coloured;
+mod descent;
 mod error;
 mod handle;
 mod kernel;
@@ -59,7 +62,8 @@ mod vertex;
 
 pub use builder::SystemBuilder;
 pub use clock::Clock;
-pub use coloured::Coloured;
+pub use coloured::{Coloured, ColouredVertices};
+pub use descent::{Descent, DescentStep, Pull};
 pub use error::SolverError;
 pub use handle::{Carried, Handle};
 pub use kernel::{Pbd, Projection, Rule, Xpbd, project};
@@ -67,10 +71,10 @@ pub use ledger::{Ledger, TimePart, Timed};
 pub use measures::{Energy, MemoryPart, Momentum, Residual};
 pub use passes::{Integrator, Motion, VertexBlock};
 pub use reference::{Serial, SolverReference};
-pub use schedule::{Schedule, Sweep};
+pub use schedule::{Schedule, Sweep, Turn};
 pub use set::{ConstraintSet, Kind, Step};
 pub use settings::{Formulation, Settings};
-pub use simulation::{Execute, Simulation};
+pub use simulation::{Execute, Method, Simulation};
 pub use solver::Solver;
 pub use stiffness::{Stiffness, Values};
 pub use system::System;

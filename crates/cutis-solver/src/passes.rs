@@ -3,7 +3,7 @@
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
-use crate::{Settings, Vertex};
+use crate::{Formulation, Settings, Vertex};
 
 /// The same range of the three vertex arrays.
 pub struct VertexBlock<'a, T: Scalar> {
@@ -59,17 +59,19 @@ pub struct Integrator<T> {
     pub h: T,
     /// `exp(−damping·h)/h` in 1/s: from a displacement to a velocity.
     pub velocity_factor: T,
-    /// Gravity times `h`, in m/s.
+    /// Gravity times `h`, in m/s; zero for vertex block descent, where gravity is in the energy of the step
+    /// ([`DescentStep::fall`](crate::DescentStep::fall)).
     pub gravity_h: Vector3<T>,
 }
 
 impl<T: Scalar> Integrator<T> {
     pub(crate) fn new(settings: &Settings) -> Self {
         let h = settings.substep_s();
+        let predicted = if settings.formulation == Formulation::Vbd { 0.0 } else { h };
         Self {
             h: T::constant(h),
             velocity_factor: T::constant((-settings.damping_per_s * h).exp() / h),
-            gravity_h: Vector3::from(settings.gravity_m_s2.map(|g| T::constant(g * h))),
+            gravity_h: Vector3::from(settings.gravity_m_s2.map(|g| T::constant(g * predicted))),
         }
     }
 

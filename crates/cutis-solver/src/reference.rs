@@ -4,8 +4,8 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    ConstraintSet, Execute, Ledger, Settings, Simulation, Solver, SolverError, Step, Sweep, System, Timed,
-    Vertex, VertexBlock,
+    ColouredVertices, ConstraintSet, Execute, Ledger, Settings, Simulation, Solver, SolverError, Step, Sweep,
+    System, Timed, Vertex, VertexBlock,
 };
 
 /// Runs every pass on the calling thread, in ascending order.
@@ -28,6 +28,10 @@ impl<T: Scalar> Execute<T> for Serial {
         let range = sweep.start..sweep.end;
         let multipliers = multipliers.get_mut(range.clone()).unwrap_or_default();
         set.project(range, vertices, step, multipliers);
+    }
+
+    fn turn(&self, color: ColouredVertices<'_, T>) {
+        color.move_one_by_one();
     }
 
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {

@@ -1,5 +1,6 @@
 //! What a frame executes, as plain data: every backend runs the same sweeps in the same order.
 
+use cutis_coloring::Groups;
 use cutis_constraints::Scalar;
 
 use crate::{Kind, Settings};
@@ -17,15 +18,29 @@ pub struct Sweep {
     pub end: usize,
 }
 
-/// A frame: `substeps` times { predict and carry handles; `iterations` times { the sweeps in order }; update velocities }.
+/// One colour of the vertices that move: they may be moved in any order, or at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turn {
+    /// Colour.
+    pub color: usize,
+    /// First vertex, in the order of the groups.
+    pub start: usize,
+    /// One past the last.
+    pub end: usize,
+}
+
+/// A frame: `substeps` times { predict and carry handles; `iterations` times { the sweeps in order, or the turns in order };
+/// update velocities }.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {
     /// Substeps of a frame.
     pub substeps: u32,
     /// Iterations of a substep.
     pub iterations: u32,
-    /// What one iteration projects, in order. Empty colours are left out.
+    /// What one iteration projects, in order. Empty colours are left out. None in vertex block descent.
     pub sweeps: Vec<Sweep>,
+    /// Which vertices one iteration moves, in order, in vertex block descent; none elsewhere.
+    pub turns: Vec<Turn>,
 }
 
 impl Schedule {
@@ -39,12 +54,24 @@ impl Schedule {
                 }
             }
         }
-        Self { substeps: settings.substeps, iterations: settings.iterations, sweeps }
+        Self { substeps: settings.substeps, iterations: settings.iterations, sweeps, turns: Vec::new() }
     }
 
-    /// Projections of one frame.
+    pub(crate) fn of_vertices(groups: &Groups, settings: &Settings) -> Self {
+        let turn = |(color, range): (usize, &[u32])| Turn {
+            color,
+            start: range[0] as usize,
+            end: range[1] as usize,
+        };
+        let turns = groups.offsets.windows(2).enumerate().map(turn).filter(|turn| turn.start < turn.end);
+        let Settings { substeps, iterations, .. } = *settings;
+        Self { substeps, iterations, sweeps: Vec::new(), turns: turns.collect() }
+    }
+
+    /// Projections of one frame; in vertex block descent, steps of a vertex.
     pub fn projections_per_frame(&self) -> u64 {
-        let sweep: u64 = self.sweeps.iter().map(|sweep| (sweep.end - sweep.start) as u64).sum();
-        sweep * u64::from(self.substeps) * u64::from(self.iterations)
+        let sweeps: u64 = self.sweeps.iter().map(|sweep| (sweep.end - sweep.start) as u64).sum();
+        let turns: u64 = self.turns.iter().map(|turn| (turn.end - turn.start) as u64).sum();
+        (sweeps + turns) * u64::from(self.substeps) * u64::from(self.iterations)
     }
 }

@@ -3,10 +3,11 @@
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
+use crate::descent::suits;
 use crate::passes::Integrator;
 use crate::{
-    Clock, ConstraintSet, Formulation, Ledger, Motion, Schedule, Settings, SolverError, Step, Sweep, System,
-    Vertex, VertexBlock,
+    Clock, ColouredVertices, ConstraintSet, Descent, Formulation, Ledger, Motion, Schedule, Settings,
+    SolverError, Step, Sweep, System, Vertex, VertexBlock,
 };
 
 /// How the passes of a substep are executed on the host: one after the other, or by several threads.
@@ -24,6 +25,9 @@ pub trait Execute<T: Scalar> {
         multipliers: &mut [T],
     );
 
+    /// Moves the vertices of one colour.
+    fn turn(&self, color: ColouredVertices<'_, T>);
+
     /// Runs what one thread does between the passes; `part` is its name in a [`Ledger`](crate::Ledger).
     fn alone(&self, _part: &'static str, work: &mut dyn FnMut()) {
         work();
@@ -39,9 +43,17 @@ pub struct Simulation<T: Scalar> {
     settings: Settings,
     schedule: Schedule,
     integrator: Integrator<T>,
-    step: Step<T>,
+    method: Method<T>,
     multipliers: Vec<Vec<T>>,
     clock: Clock,
+}
+
+/// How a substep is solved.
+pub enum Method<T: Scalar> {
+    /// Constraint by constraint.
+    Project(Step<T>),
+    /// Vertex by vertex.
+    Descend(Box<Descent<T>>),
 }
 
 impl<T: Scalar> Simulation<T> {
@@ -52,7 +64,7 @@ impl<T: Scalar> Simulation<T> {
         settings.validate()?;
         for kind in &system.kinds {
             let (found, expected) = (kind.stiffness().formulation(), settings.formulation);
-            if found != expected {
+            if !suits(found, expected) {
                 return Err(SolverError::Formulation { kind: kind.name(), found, expected });
             }
         }
@@ -64,13 +76,18 @@ impl<T: Scalar> Simulation<T> {
             let expected = "a substep whose inverse square the number type can hold";
             return Err(SolverError::Setting { key: "dt_s / substeps", value: h, expected });
         }
+        let method = match settings.formulation {
+            Formulation::Pbd => Method::Project(Step::Pbd),
+            Formulation::Xpbd => Method::Project(Step::Xpbd { inverse_h_squared }),
+            Formulation::Vbd => Method::Descend(Box::new(Descent::new(&system, &settings)?)),
+        };
         Ok(Self {
-            schedule: Schedule::new(&system.kinds, &settings),
-            integrator: Integrator::new(&settings),
-            step: match settings.formulation {
-                Formulation::Pbd => Step::Pbd,
-                Formulation::Xpbd => Step::Xpbd { inverse_h_squared },
+            schedule: match &method {
+                Method::Project(_) => Schedule::new(&system.kinds, &settings),
+                Method::Descend(descent) => Schedule::of_vertices(descent.groups(), &settings),
             },
+            integrator: Integrator::new(&settings),
+            method,
             multipliers,
             system,
             settings,
@@ -108,9 +125,17 @@ impl<T: Scalar> Simulation<T> {
         &self.integrator
     }
 
-    /// What a substep asks of every projection.
-    pub fn projection_step(&self) -> Step<T> {
-        self.step
+    /// What a substep asks of every projection; nothing in vertex block descent.
+    pub fn projection_step(&self) -> Option<Step<T>> {
+        match &self.method {
+            Method::Project(step) => Some(*step),
+            Method::Descend(_) => None,
+        }
+    }
+
+    /// How a substep is solved.
+    pub fn method(&self) -> &Method<T> {
+        &self.method
     }
 
     /// Says how far a backend has come that keeps the state elsewhere.
@@ -135,29 +160,37 @@ impl<T: Scalar> Simulation<T> {
         self.multipliers.iter().map(|kind| size_of_val(kind.as_slice())).sum()
     }
 
+    /// Bytes that vertex block descent stores about which constraints each vertex is in; 0 elsewhere.
+    pub fn incidence_bytes(&self) -> usize {
+        match &self.method {
+            Method::Project(_) => 0,
+            Method::Descend(descent) => descent.bytes(),
+        }
+    }
+
     /// Runs `frames` frames. Running them one by one gives the same bits. Nothing is allocated.
     ///
     /// # Errors
     /// [`SolverError::NotFinite`] as soon as a position is not finite after a substep. The state is then that of the
     /// start of this substep, with all velocities zero, and may be stepped on.
     pub fn run(&mut self, frames: usize, execute: &impl Execute<T>) -> Result<(), SolverError> {
-        let mut motion = Motion::Predict;
+        let mut begun = false;
         let end = self.clock.frame.saturating_add(frames as u64);
         while self.clock.frame < end {
-            self.move_vertices(motion, execute);
+            self.begin_substep(begun, execute);
             if !self.system.handles.is_empty() {
                 let time_s = self.time_s() + self.settings.substep_s();
                 execute.alone(Ledger::HANDLES, &mut || self.system.carry_handles(time_s));
             }
-            self.project(execute);
+            self.solve(execute);
             if let Some(vertex) = execute.first_not_finite(&self.system.vertices) {
                 self.move_vertices(Motion::Restore, execute);
                 return Err(SolverError::not_finite(vertex, self.clock, &self.settings));
             }
-            motion = Motion::FinishAndPredict;
+            begun = true;
             self.clock.tick(&self.settings);
         }
-        if motion == Motion::FinishAndPredict {
+        if begun {
             self.move_vertices(Motion::Finish, execute);
         }
         Ok(())
@@ -181,22 +214,43 @@ impl<T: Scalar> Simulation<T> {
         Ok(())
     }
 
+    /// Predicts, after the velocities of the substep before if there was one. Vertex block descent needs them stored.
+    fn begin_substep(&mut self, after_another: bool, execute: &impl Execute<T>) {
+        match (after_another, &self.method) {
+            (true, Method::Project(_)) => self.move_vertices(Motion::FinishAndPredict, execute),
+            (true, Method::Descend(_)) => {
+                self.move_vertices(Motion::Finish, execute);
+                self.move_vertices(Motion::Predict, execute);
+            }
+            (false, _) => self.move_vertices(Motion::Predict, execute),
+        }
+    }
+
     fn move_vertices(&mut self, motion: Motion, execute: &impl Execute<T>) {
         let integrator = self.integrator;
         execute.vertices(self.system.block(), &|block| integrator.run(motion, block));
     }
 
-    fn project(&mut self, execute: &impl Execute<T>) {
+    fn solve(&mut self, execute: &impl Execute<T>) {
         if self.settings.keeps_multipliers() {
             let multipliers = &mut self.multipliers;
             let clear = &mut || multipliers.iter_mut().for_each(|kind| kind.fill(T::zero()));
             execute.alone(Ledger::MULTIPLIERS, clear);
         }
         for _ in 0..self.schedule.iterations {
-            for &sweep in &self.schedule.sweeps {
-                let (vertices, kinds) = self.system.projection_parts();
-                let multipliers = &mut self.multipliers[sweep.kind];
-                execute.sweep(sweep, &*kinds[sweep.kind], vertices, self.step, multipliers);
+            match &self.method {
+                Method::Project(step) => {
+                    for &sweep in &self.schedule.sweeps {
+                        let (vertices, kinds) = self.system.projection_parts();
+                        let multipliers = &mut self.multipliers[sweep.kind];
+                        execute.sweep(sweep, &*kinds[sweep.kind], vertices, *step, multipliers);
+                    }
+                }
+                Method::Descend(descent) => {
+                    for &turn in &self.schedule.turns {
+                        execute.turn(ColouredVertices::new(&mut self.system, descent, turn));
+                    }
+                }
             }
         }
     }

@@ -112,6 +112,10 @@ pub trait Solver<T: Scalar>: Send {
         if bytes > 0 {
             parts.push(MemoryPart { name: "multipliers", bytes });
         }
+        let bytes = simulation.incidence_bytes();
+        if bytes > 0 {
+            parts.push(MemoryPart { name: "incidences", bytes });
+        }
         parts
     }
 }

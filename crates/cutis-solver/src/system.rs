@@ -1,5 +1,8 @@
 //! The state of a body: vertices, velocities, constraints by kind, handles.
 
+use std::sync::Arc;
+
+use cutis_coloring::Groups;
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
@@ -16,6 +19,8 @@ pub struct System<T: Scalar> {
     pub(crate) velocities: Vec<Vector3<T>>,
     pub(crate) kinds: Vec<Kind<T>>,
     pub(crate) handles: Vec<Carried<T>>,
+    /// Groups of the vertices, if the caller knows better ones than greedy colouring finds.
+    pub(crate) vertex_groups: Option<Arc<Groups>>,
 }
 
 impl<T: Scalar> System<T> {
@@ -91,6 +96,7 @@ impl<T: Scalar> System<T> {
             velocities: self.velocities.iter().map(|velocity| velocity.map(T::to_f64)).collect(),
             kinds: self.kinds.iter().map(|kind| kind.to_f64()).collect(),
             handles: self.handles.iter().map(Carried::to_f64).collect(),
+            vertex_groups: self.vertex_groups.clone(),
         }
     }
 

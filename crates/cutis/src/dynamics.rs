@@ -35,12 +35,14 @@ impl SolverSection {
             formulation: match self.formulation {
                 FormulationChoice::Pbd => Formulation::Pbd,
                 FormulationChoice::Xpbd => Formulation::Xpbd,
+                FormulationChoice::Vbd => Formulation::Vbd,
             },
             dt_s: self.dt_s,
             substeps: self.substeps,
             iterations: self.iterations,
             gravity_m_s2: self.gravity_m_s2,
             damping_per_s: self.damping_per_s,
+            relaxation: self.relaxation,
         }
     }
 }
@@ -48,7 +50,8 @@ impl SolverSection {
 /// Builds what the scene names and nothing else.
 pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error> {
     let scene = &loaded.scene;
-    let xpbd = scene.solver.formulation == FormulationChoice::Xpbd;
+    let formulation = scene.solver.formulation;
+    let compliant = formulation != FormulationChoice::Pbd;
     let mesh = &body.mesh;
     let mut colors = BTreeMap::new();
     let inverse_masses = body.inverse_masses(loaded)?;
@@ -56,14 +59,14 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
 
     if let Some(distance) = &scene.constraints.distance {
         let groups = Groups::from_colors(&mesh.edge_classes(&mesh.edges))?;
-        builder = add_distance(builder, distance, xpbd, mesh, &groups)
+        builder = add_distance(builder, distance, compliant, mesh, &groups)
             .map_err(loaded.blame("constraints.distance"))?;
         colors.insert(Distance::NAME.into(), groups.len());
     }
     if let Some(volume) = &scene.constraints.volume {
         let groups = Groups::from_colors(&mesh.tet_classes(&mesh.tets))?;
-        builder =
-            add_volume(builder, volume, xpbd, mesh, &groups).map_err(loaded.blame("constraints.volume"))?;
+        builder = add_volume(builder, volume, compliant, mesh, &groups)
+            .map_err(loaded.blame("constraints.volume"))?;
         colors.insert(Volume::NAME.into(), groups.len());
     }
     if let Some(stc) = &scene.constraints.stc {
@@ -72,8 +75,15 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
             add_skin_tension(builder, loaded, stc, body, &groups).map_err(loaded.blame("constraints.stc"))?;
         colors.insert("stc".into(), groups.len());
     }
-    let skin_rate = scene.constraints.stc.as_ref().filter(|_| xpbd && !body.skin.is_empty());
+    let skin_rate = scene
+        .constraints
+        .stc
+        .as_ref()
+        .filter(|_| formulation == FormulationChoice::Xpbd && !body.skin.is_empty());
     let skin_rate = skin_rate.map(|stc| skin_rate_of(body, stc, &inverse_masses));
+    if formulation == FormulationChoice::Vbd {
+        builder = builder.vertex_groups(Groups::from_colors(&mesh.vertex_classes())?);
+    }
     for (n, handle) in scene.handle.iter().enumerate() {
         let radius_m = handle.radius_mm / 1000.0;
         let center = mesh.frame.to_local(Point3::from(handle.at_mm)).map(f64::from);
@@ -100,11 +110,11 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
 fn add_distance(
     builder: SystemBuilder<f32>,
     distance: &DistanceSection,
-    xpbd: bool,
+    compliant: bool,
     mesh: &TetMesh,
     groups: &Groups,
 ) -> Result<SystemBuilder<f32>, Error> {
-    let stiffness = if xpbd {
+    let stiffness = if compliant {
         let volumes = mesh.edge_volumes();
         compliances(&mesh.edges, |n, [a, b]| {
             let length = nalgebra::distance(&at(mesh, a), &at(mesh, b));
@@ -121,11 +131,11 @@ fn add_distance(
 fn add_volume(
     builder: SystemBuilder<f32>,
     volume: &VolumeConstraintSection,
-    xpbd: bool,
+    compliant: bool,
     mesh: &TetMesh,
     groups: &Groups,
 ) -> Result<SystemBuilder<f32>, Error> {
-    let stiffness = if xpbd {
+    let stiffness = if compliant {
         let volumes = mesh.tet_volumes();
         compliances(&mesh.tets, |n, _| {
             cutis_constraints::volume_compliance(f64::from(volumes[n]), volume.bulk_modulus_pa)
@@ -182,7 +192,7 @@ fn add_skin_tension(
                 .collect();
             let stiffness = match loaded.scene.solver.formulation {
                 FormulationChoice::Pbd => shares(),
-                FormulationChoice::Xpbd => compliances(&body.skin, |n, _| {
+                FormulationChoice::Xpbd | FormulationChoice::Vbd => compliances(&body.skin, |n, _| {
                     cutis_constraints::skin_compliance(
                         f64::from(params[n][0]),
                         stc.area_modulus_n_per_m * factor[n],

@@ -41,7 +41,7 @@ fn deviation<T: Scalar>(
     let volumes = vec![[T::constant(scale.powi(3) / 6.0)]; lattice.tets.len()];
     let (springs, solids) = match formulation {
         Formulation::Pbd => (Stiffness::pbd(T::one()), Stiffness::pbd(T::one())),
-        Formulation::Xpbd => {
+        Formulation::Xpbd | Formulation::Vbd => {
             (Stiffness::compliance(T::one()), Stiffness::compliance(T::constant(scale.powi(4))))
         }
     };
@@ -59,6 +59,7 @@ fn deviation<T: Scalar>(
         iterations: 8,
         gravity_m_s2: [0.0; 3],
         damping_per_s: 1.5,
+        relaxation: 1.0,
     };
     let mut solver = SolverReference::new(system, settings).unwrap();
     solver.step(2).unwrap();

@@ -31,6 +31,7 @@ fn tip<T: Scalar>(size: [usize; 3], edges: &Groups, tets: &Groups, iterations: u
         iterations,
         gravity_m_s2: [0.0, -9.81, 0.0],
         damping_per_s: 0.0,
+        relaxation: 1.0,
     };
     let mut solver = SolverCpu::new(system, settings, Some(2)).unwrap();
     solver.step(21).unwrap();

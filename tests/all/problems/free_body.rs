@@ -46,14 +46,14 @@ fn run<T: Scalar>(formulation: Formulation, substeps: u32, scale: f64, pinned: b
     let skin: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(7).collect();
     let (stiffness, soft) = match formulation {
         Formulation::Pbd => (Stiffness::pbd(T::constant(0.5)), [T::constant(0.5); 2]),
-        Formulation::Xpbd => (
+        Formulation::Xpbd | Formulation::Vbd => (
             Stiffness::compliance(T::constant(0.05)),
             [T::constant(0.05 * scale.powi(4)), T::constant(0.05 * scale.powi(2))],
         ),
     };
     let same = |value| match formulation {
         Formulation::Pbd => Stiffness::pbd(value),
-        Formulation::Xpbd => Stiffness::compliance(value),
+        Formulation::Xpbd | Formulation::Vbd => Stiffness::compliance(value),
     };
     let lengths = vec![[T::constant(1.2 * scale)]; lattice.edges.len()];
     let volumes = vec![[T::constant(scale.powi(3) / 6.0)]; lattice.tets.len()];

@@ -41,6 +41,7 @@ fn sag<T: Scalar>(springs: usize, softness: f64, scale: f64) -> f64 {
         iterations: 20,
         gravity_m_s2: [0.0, -GRAVITY, 0.0],
         damping_per_s: 2.0 * slowest,
+        relaxation: 1.0,
     };
     let mut solver = SolverReference::new(system, settings).unwrap();
     solver.step(1).unwrap();

@@ -61,6 +61,7 @@ fn gape<T: Scalar>(case: &Case, scale: f64) -> f64 {
         iterations: 4,
         gravity_m_s2: [0.0; 3],
         damping_per_s: 2.0 * slowest,
+        relaxation: 1.0,
     };
     let mut solver = SolverCpu::new(system.build(), settings, None).unwrap();
     solver.step(1).unwrap();

@@ -124,7 +124,7 @@ impl Plan<'_> {
     fn stiffness(&self, count: usize, compliance: f64) -> Stiffness<f32> {
         let unit = match self.formulation {
             Formulation::Pbd => 0.3,
-            Formulation::Xpbd => compliance * self.softness,
+            Formulation::Xpbd | Formulation::Vbd => compliance * self.softness,
         };
         let value = |n: usize| (unit * (1 + n % 3) as f64) as f32;
         let values = match self.each {
@@ -133,7 +133,7 @@ impl Plan<'_> {
         };
         match self.formulation {
             Formulation::Pbd => Stiffness::Pbd(values),
-            Formulation::Xpbd => Stiffness::Compliance(values),
+            Formulation::Xpbd | Formulation::Vbd => Stiffness::Compliance(values),
         }
     }
 

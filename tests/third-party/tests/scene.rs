@@ -83,7 +83,7 @@ fn system(formulation: Formulation, with_fibres: bool, with_hinges: bool) -> Res
     let inverse_masses: Vec<f64> = positions.iter().map(|p| if fixed(p) { 0.0 } else { 1e3 }).collect();
     let stiffness = |pbd: f32, compliance: f32| match formulation {
         Formulation::Pbd => Stiffness::pbd(pbd),
-        Formulation::Xpbd => Stiffness::compliance(compliance),
+        Formulation::Xpbd | Formulation::Vbd => Stiffness::compliance(compliance),
     };
     let groups = cutis_coloring::greedy(&edges, count)?;
     let mut builder = SystemBuilder::<f32>::new(&positions, &inverse_masses)?.add_from_rest::<Distance, 2>(

@@ -47,7 +47,7 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
         let value = |n: usize| if parts.each { (1 + n % 3) as f64 } else { 1.0 };
         let unit = match parts.formulation {
             Formulation::Pbd => 0.3,
-            Formulation::Xpbd => compliance,
+            Formulation::Xpbd | Formulation::Vbd => compliance,
         };
         let values = match parts.each {
             true => Values::Each((0..count).map(|n| T::constant(unit * value(n))).collect()),
@@ -55,7 +55,7 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
         };
         match parts.formulation {
             Formulation::Pbd => Stiffness::Pbd(values),
-            Formulation::Xpbd => Stiffness::Compliance(values),
+            Formulation::Xpbd | Formulation::Vbd => Stiffness::Compliance(values),
         }
     };
     let groups = |tuples: &[[u32; 2]]| greedy(tuples, count).unwrap();
@@ -100,5 +100,5 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
 pub fn settings(parts: &Parts, iterations: u32) -> Settings {
     let gravity_m_s2 = [0.0, -9.81 * parts.step / 0.1, 0.0];
     let formulation = parts.formulation;
-    Settings { formulation, dt_s: 0.01, substeps: 2, iterations, gravity_m_s2, damping_per_s: 0.5 }
+    Settings { formulation, dt_s: 0.01, substeps: 2, iterations, gravity_m_s2, damping_per_s: 0.5, relaxation: 1.0 }
 }

@@ -134,6 +134,10 @@ impl Scene {
         check.positive("solver.dt_s", s.dt_s)?;
         check.require(s.substeps > 0, "solver.substeps", s.substeps, "must be 1 or more")?;
         check.require(s.iterations > 0, "solver.iterations", s.iterations, "must be 1 or more")?;
+        let (lowest, highest) = if s.formulation == FormulationChoice::Vbd { (0.0, 2.0) } else { (1.0, 1.0) };
+        let relaxed = s.relaxation == 1.0 || (s.relaxation > lowest && s.relaxation < highest);
+        let why = "must be above 0 and below 2 with solver.formulation = \"vbd\", and 1 otherwise";
+        check.require(relaxed, "solver.relaxation", s.relaxation, why)?;
         check.require(
             s.threads <= 1024,
             "solver.threads",
@@ -222,9 +226,9 @@ impl Scene {
         check.share("constraints.stc.stiffness", s.stiffness)?;
         check.not_negative("constraints.stc.amplification", s.amplification)?;
         check.positive("constraints.stc.rest_area_scale", s.rest_area_scale)?;
-        let paper_in_xpbd = s.form == StcForm::Paper && self.solver.formulation == FormulationChoice::Xpbd;
-        let why = "works with solver.formulation = \"pbd\" only; use \"energy\" with xpbd";
-        check.require(!paper_in_xpbd, "constraints.stc.form", "paper", why)?;
+        let paper_elsewhere = s.form == StcForm::Paper && self.solver.formulation != FormulationChoice::Pbd;
+        let why = "works with solver.formulation = \"pbd\" only; use \"energy\" with xpbd and vbd";
+        check.require(!paper_elsewhere, "constraints.stc.form", "paper", why)?;
         let positive_stiffness = s.form == StcForm::Energy || s.stiffness > 0.0;
         let why = "must be above 0 for the paper form, whose clamp is 1/stiffness";
         check.require(positive_stiffness, "constraints.stc.stiffness", s.stiffness, why)?;

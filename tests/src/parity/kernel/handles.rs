@@ -26,6 +26,7 @@ const SETTINGS: Settings = Settings {
     iterations: 1,
     gravity_m_s2: [0.0, 0.0, -9.81],
     damping_per_s: 0.0,
+    relaxation: 1.0,
 };
 
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {

@@ -124,7 +124,7 @@ impl Body {
         let (mut vertices, mut multipliers) = (self.vertices.clone(), self.multipliers());
         for _ in 0..self.iterations() {
             for &sweep in self.sweeps() {
-                let step = self.simulation.projection_step();
+                let Some(step) = self.simulation.projection_step() else { continue };
                 Serial.sweep(sweep, kind, &mut vertices, step, &mut multipliers);
             }
         }
@@ -135,8 +135,8 @@ impl Body {
         let set = &*self.simulation.system().kinds()[0];
         let vertices = gpu.buffer::<[f32; 4]>("vertices", bytemuck::cast_slice(&self.vertices))?;
         let (rule, inverse_h_squared) = match self.simulation.projection_step() {
-            Step::Pbd => (Rule::Pbd, 0.0),
-            Step::Xpbd { inverse_h_squared } => (Rule::Xpbd, inverse_h_squared),
+            Some(Step::Xpbd { inverse_h_squared }) => (Rule::Xpbd, inverse_h_squared),
+            Some(Step::Pbd) | None => (Rule::Pbd, 0.0),
         };
         let settings = gpu.uniform("settings", &[0.0, 0.0, 0.0, 0.0, 0.0, inverse_h_squared, 0.0, 0.0])?;
         let (way, uniform, each) = match set.stiffness().values() {

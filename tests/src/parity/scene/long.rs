@@ -33,6 +33,7 @@ const SETTINGS: Settings = Settings {
     iterations: 1,
     gravity_m_s2: [0.0; 3],
     damping_per_s: 0.0,
+    relaxation: 1.0,
 };
 
 /// Change of the momentum over the sum of `m|v|` at the start. Rounding makes 5e-6 in 60 frames and 3e-5 in 600; a gradient off

@@ -25,6 +25,9 @@ pub struct SolverSection {
     pub gravity_m_s2: [f64; 3],
     /// Velocities decay as exp(−damping·t), 1/s; 0 or more.
     pub damping_per_s: f64,
+    /// Over-relaxation of `vbd`, above 0 and below 2; 1 with the other formulations. About 1.3 helps where there are several
+    /// iterations.
+    pub relaxation: f64,
     /// Worker threads; 0 takes all cores. The result does not depend on it.
     pub threads: usize,
 }
@@ -40,6 +43,7 @@ impl Default for SolverSection {
             iterations: 1,
             gravity_m_s2: [0.0; 3],
             damping_per_s: 10.0,
+            relaxation: 1.0,
             threads: 0,
         }
     }
@@ -69,6 +73,9 @@ pub enum FormulationChoice {
     /// Compliance in physical units.
     #[default]
     Xpbd,
+    /// The same materials, solved vertex by vertex (vertex block descent): what comes to rest is in equilibrium, whatever the
+    /// substeps and iterations.
+    Vbd,
 }
 
 /// How long to run.

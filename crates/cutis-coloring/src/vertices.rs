@@ -1,0 +1,106 @@
+//! Groups of vertices, no two of which are in one constraint: for solvers that move vertex after vertex.
+
+use crate::sort::{self, filled};
+use crate::{ColoringError, Groups, Incidence, Tuples};
+
+const NONE: u32 = u32::MAX;
+
+/// Colours the vertices that move by greedy first-fit: in ascending order, each takes the lowest colour that no earlier
+/// vertex has which is in a constraint with it. The result names the moving vertices only; two that do not move may well be in
+/// one constraint.
+///
+/// `kinds` and `incidences` belong together, kind by kind. Cost: one look at each vertex of each constraint of each vertex; 4 bytes
+/// per vertex and colour besides the result. No vertex takes a colour above the number of its neighbours.
+///
+/// # Errors
+/// [`ColoringError::OutOfMemory`].
+///
+/// # Panics
+/// If an incidence is of fewer vertices than `moves` has, or not that of its kind.
+pub fn greedy_vertices(
+    kinds: &[Tuples<'_>],
+    incidences: &[Incidence],
+    moves: &[bool],
+) -> Result<Groups, ColoringError> {
+    let mut colors = filled(NONE, moves.len())?;
+    let mut counts: Vec<u32> = Vec::new();
+    // For each colour, one more than the last vertex that found it taken.
+    let mut taken: Vec<u32> = Vec::new();
+    let moving = || (0u32..).zip(moves).filter(|(_, moves)| **moves).map(|(v, _)| v);
+    for v in moving() {
+        for (tuples, incidence) in kinds.iter().zip(incidences) {
+            for &place in incidence.of(v) {
+                let first = place as usize / tuples.arity * tuples.arity;
+                for &other in &tuples.vertices[first..first + tuples.arity] {
+                    let color = colors[other as usize];
+                    if color != NONE {
+                        taken[color as usize] = v + 1;
+                    }
+                }
+            }
+        }
+        let color = taken.iter().position(|&last| last != v + 1).unwrap_or(taken.len());
+        if color == taken.len() {
+            taken.push(0);
+            counts.push(0);
+        }
+        colors[v as usize] = color as u32;
+        counts[color] += 1;
+    }
+    let mut groups = Groups { order: filled(0, moving().count())?, offsets: vec![0] };
+    sort::by_key(moving(), moving().map(|v| colors[v as usize] as usize), &counts, &mut groups.order);
+    groups.close_round(&counts);
+    Ok(groups)
+}
+
+impl Groups {
+    /// The same groups without the vertices that do not move; groups that become empty are left out.
+    pub fn restricted_to(&self, moves: &[bool]) -> Self {
+        let mut restricted = Groups { order: Vec::new(), offsets: vec![0] };
+        for group in self.iter() {
+            let moving = |vertex: &&u32| moves.get(**vertex as usize) != Some(&false);
+            let before = restricted.order.len();
+            restricted.order.extend(group.iter().filter(moving));
+            restricted.close_round(&[(restricted.order.len() - before) as u32]);
+        }
+        restricted
+    }
+
+    /// Checks that each vertex that moves, and no other, is in exactly one group, and that no two of a group are in one
+    /// constraint.
+    ///
+    /// # Errors
+    /// [`ColoringError::WrongVertex`], [`ColoringError::VertexClash`], [`ColoringError::BrokenOffsets`].
+    ///
+    /// # Panics
+    /// If a constraint names a vertex that `moves` does not have.
+    pub fn verify_vertices(&self, kinds: &[Tuples<'_>], moves: &[bool]) -> Result<(), ColoringError> {
+        self.check_offsets()?;
+        let mut colors = filled(NONE, moves.len())?;
+        for (color, range) in (0u32..).zip(self.offsets.windows(2)) {
+            for &vertex in &self.order[range[0] as usize..range[1] as usize] {
+                let v = vertex as usize;
+                if moves.get(v) != Some(&true) || colors[v] != NONE {
+                    return Err(ColoringError::WrongVertex { vertex });
+                }
+                colors[v] = color;
+            }
+        }
+        if let Some(v) = (0..moves.len()).find(|&v| moves[v] && colors[v] == NONE) {
+            return Err(ColoringError::WrongVertex { vertex: v as u32 });
+        }
+        for tuples in kinds {
+            for (constraint, tuple) in tuples.iter().enumerate() {
+                for (n, &second) in tuple.iter().enumerate() {
+                    let color = colors[second as usize];
+                    let same = |&&first: &&u32| color != NONE && colors[first as usize] == color;
+                    if let Some(&first) = tuple[..n].iter().find(same) {
+                        let group = color as usize;
+                        return Err(ColoringError::VertexClash { group, first, second, constraint });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
