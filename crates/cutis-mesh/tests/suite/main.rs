@@ -1,9 +1,11 @@
 //! Tests of lattices, meshes, skins, incisions and mesh files, against brute force and known answers.
 
 mod files;
+mod graded;
 mod incision;
 mod lattice;
 mod oracle;
 mod real_data;
+mod region;
 mod shell;
 mod skin;
