@@ -1,5 +1,6 @@
-//! Scenes shared by tests and benches, and the comparison of the backends.
+//! Scenes shared by tests and benches, and what is measured: the comparison of the backends, error against run time.
 
+pub mod accuracy;
 #[path = "../../crates/cutis-solver-cpu/tests/lattice/mod.rs"]
 pub mod lattice;
 pub mod parity;

@@ -28,6 +28,8 @@ usage: cargo xtask COMMAND
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
                       lists the options, and the exit code is that of the comparison
   parity-page         the same three ways, as it is, in small chunks and at full size: docs/results/parity.md
+  accuracy [OPTIONS]  error against run time, for each problem and setting, against direct solutions in f64; `accuracy --help`
+                      lists the options, --write writes docs/results/accuracy.md
   mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
                       with a text only those whose description contains it, and nothing is written
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
@@ -56,6 +58,9 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["python"] => steps::build_program(&workspace).and_then(|()| python::run(&workspace)),
         ["parity", arguments @ ..] => {
             return workspace::exit_code(&mut steps::parity_command(&workspace, arguments));
+        }
+        ["accuracy", arguments @ ..] => {
+            return workspace::exit_code(&mut steps::accuracy_command(&workspace, arguments));
         }
         ["parity-page"] => parity::run(&workspace),
         ["mutations"] => mutations::run(&workspace, ""),

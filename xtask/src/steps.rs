@@ -140,6 +140,15 @@ pub fn parity_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     command
 }
 
+/// The measurement of error against run time that `cargo xtask accuracy` runs: released, since it takes times.
+pub fn accuracy_command(workspace: &Workspace, arguments: &[&str]) -> Command {
+    let mut command = workspace.cargo("run");
+    let program = ["--quiet", "--release", "--package", "cutis-tests", "--bin", "accuracy", "--"];
+    command.args(program).args(arguments);
+    vulkan::for_gpu_tests(&mut command);
+    command
+}
+
 /// Runs the program that the step `tests` has built. `cargo run` would build it once more, since the features of shared
 /// dependencies differ from those of the whole workspace. Once as the device is, and once in small chunks within the limits
 /// that any device has.

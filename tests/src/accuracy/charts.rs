@@ -1,0 +1,35 @@
+//! Charts of a problem: error against time per frame, a line for each number of substeps, the front behind them.
+
+use std::collections::BTreeMap;
+
+use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
+
+use super::front::pareto;
+use super::row::{Measure, Row};
+
+/// The chart of one error over all rows of a problem, as SVG; none if no row has it.
+pub fn chart(problem: &str, rows: &[Row], measure: Measure) -> Option<String> {
+    let mut lines: BTreeMap<(bool, String, u32), Vec<[f64; 2]>> = BTreeMap::new();
+    let mut all = Vec::new();
+    for row in rows {
+        let Some(error) = row.error(measure) else { continue };
+        let point = [row.ms_min, error];
+        all.push(point);
+        // Beside the usual backend and method, one line each is enough.
+        let substeps = if row.is_usual() { row.substeps } else { 0 };
+        lines.entry((!row.is_usual(), row.family(), substeps)).or_default().push(point);
+    }
+    let front: Vec<[f64; 2]> = pareto(&all).into_iter().map(|n| all[n]).collect();
+    let mut named = vec![("Pareto front".to_owned(), front, Mark::Band)];
+    for ((other, family, substeps), mut points) in lines {
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let name = if other { family } else { format!("{family}, {substeps} × n") };
+        named.push((name, points, Mark::Dots));
+    }
+    let series: Vec<Series<'_>> =
+        named.iter().map(|(name, points, mark)| Series { name, points, mark: *mark }).collect();
+    let axis = |label| Axis { label, scale: Scale::Log };
+    let title = format!("{problem}: {}", measure.label());
+    (!all.is_empty())
+        .then(|| line_chart(&title, axis("shortest time of a frame / ms"), axis(measure.name()), &series))
+}

@@ -1,0 +1,155 @@
+//! Accuracy: error against run time, for each problem and configuration, measured in the same run.
+//!
+//! | error | what is compared | with |
+//! |---|---|---|
+//! | E1 | one implicit substep from a moving state | its minimiser, by Newton's method in `f64` |
+//! | E2 | the trajectory at a fixed time | an `f64` run with at least 64 times the substeps |
+//! | E3 | the settled body | the equilibrium, by Newton's method in `f64` |
+//! | E4 | residuals of the settled body | those of the equilibrium |
+//!
+//! The command prints the front of each problem, holds checks with controls, and writes page, table and charts with `--write`.
+
+pub mod cases;
+mod charts;
+mod checks;
+mod config;
+mod errors;
+mod front;
+mod grid;
+mod options;
+mod page;
+mod row;
+mod running;
+mod sweep;
+mod words;
+mod yardstick;
+
+use std::error::Error;
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use cutis_gpu::Gpu;
+
+pub use options::Options;
+
+use cases::Case;
+use checks::Check;
+use page::{Origin, Section};
+use row::{Measure, Row};
+use yardstick::Yardstick;
+
+/// Whatever keeps a measurement from being made.
+pub type Failure = Box<dyn Error>;
+
+/// Measures, prints to `out`, and writes the results if that is asked for; whether all checks hold.
+///
+/// # Errors
+/// A problem that cannot be built, a search that does not converge, a file that cannot be written.
+pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    let (start, load_before) = (Instant::now(), load());
+    let gpu = if options.no_gpu { None } else { config::first_gpu()? };
+    let (mut sections, mut checks) = (Vec::new(), Vec::new());
+    let wanted = |name: &&str| match &options.problem {
+        Some(only) => only == name,
+        None => !options.quick || cases::QUICK.contains(name),
+    };
+    for name in cases::NAMES.into_iter().filter(wanted) {
+        let Some(case) = cases::named(name, options.quick)? else { continue };
+        let (section, held) = problem(&case, options.quick, gpu.as_ref(), out)?;
+        writeln!(out, "\n{}", page::front_table(&section.rows))?;
+        sections.push(section);
+        checks.extend(held);
+    }
+    for check in &checks {
+        writeln!(out, "{} {}", if check.holds { "holds: " } else { "FAILS: " }, check.what)?;
+    }
+    let good = !checks.is_empty() && checks.iter().all(|check| check.holds);
+    writeln!(
+        out,
+        "\n{} s; {}",
+        start.elapsed().as_secs(),
+        if good { "all checks hold" } else { "CHECKS FAIL" }
+    )?;
+    let results = options.write.then(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/results").into());
+    if let Some(folder) = results.or(options.out.clone()) {
+        let origin = Origin {
+            command: options.command(),
+            commit: commit(),
+            load: [load_before, load()],
+            gpu: gpu.as_ref().map_or_else(|| "none".into(), |gpu| gpu.adapter().name.clone()),
+            took_s: start.elapsed().as_secs_f64(),
+        };
+        write(&origin, &sections, &folder)?;
+    }
+    Ok(good)
+}
+
+/// Measures one problem.
+fn problem(
+    case: &Case,
+    quick: bool,
+    gpu: Option<&Gpu>,
+    out: &mut dyn Write,
+) -> Result<(Section, Vec<Check>), Failure> {
+    let start = Instant::now();
+    let tell = |what: &str| eprintln!("  {:5.1} s  {}: {what}", start.elapsed().as_secs_f64(), case.name);
+    let configs = grid::configs(case, quick, gpu);
+    let mut substeps: Vec<u32> = configs.iter().map(|config| config.substeps).collect();
+    substeps.sort_unstable();
+    substeps.dedup();
+    let constraints: usize = case.xpbd.kinds().iter().map(|kind| kind.len()).sum();
+    writeln!(out, "\n{}: {}; {} configurations", case.name, case.what, configs.len())?;
+    let mut yardstick = Yardstick::new(case, &substeps, &tell)?;
+    tell("minimisers of implicit steps by Newton's method");
+    for &substeps in &substeps {
+        yardstick.minimise(substeps)?;
+    }
+    let rows: Vec<Row> = sweep::run(case, &configs, &yardstick, &tell)?;
+    let checks = checks::of_problem(case, &yardstick, &rows)?;
+    let opening = case
+        .opening
+        .as_ref()
+        .map(|(opening, unit)| (opening(yardstick.equilibrium()) - opening(yardstick.rest()), *unit));
+    let section = Section {
+        name: case.name,
+        what: case.what.clone(),
+        sizes: [yardstick.free() as u64, constraints as u64, yardstick.fine_substeps.into()],
+        frames: (case.instants.clone(), case.compared_at, case.most_frames),
+        opening,
+        rows,
+    };
+    Ok((section, checks))
+}
+
+/// Writes page, table and charts.
+fn write(origin: &Origin, sections: &[Section], folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder)?;
+    let rows: Vec<Row> = sections.iter().flat_map(|section| section.rows.iter().cloned()).collect();
+    fs::write(folder.join("accuracy.csv"), row::csv(&rows))?;
+    for section in sections {
+        for measure in Measure::ALL {
+            if let Some(svg) = charts::chart(section.name, &section.rows, measure) {
+                let file = format!("accuracy-{}-{}.svg", section.name, measure.name().to_lowercase());
+                fs::write(folder.join(file), svg)?;
+            }
+        }
+    }
+    fs::write(folder.join("accuracy.md"), page::page(origin, sections))?;
+    Ok(())
+}
+
+/// Average number of processes at work in the last minute, where the system says so.
+fn load() -> Option<String> {
+    fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next().map(str::to_owned)
+}
+
+/// The commit of the checkout, marked if there are changes since.
+fn commit() -> Option<String> {
+    let words = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"];
+    let output = Command::new("git").current_dir(env!("CARGO_MANIFEST_DIR")).args(words).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then(|| text.trim().to_owned())
+}

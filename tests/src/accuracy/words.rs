@@ -1,0 +1,235 @@
+//! What the rows say, in words: every sentence is made of figures of the rows, so that it can be read off the CSV.
+
+use super::config::{Backend, PBD, XPBD};
+use super::row::{Measure, Row};
+
+/// Errors for which the cheapest setting is named.
+pub const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
+/// An error that falls by less when the iterations are doubled has stalled.
+const STALLED: f64 = 0.9;
+
+/// The fastest of `rows` with an error of at most `level`.
+pub fn cheapest<'a>(rows: &[&'a Row], measure: Measure, level: f64) -> Option<&'a Row> {
+    let good = rows.iter().filter(|row| row.error(measure).is_some_and(|error| error <= level));
+    good.min_by(|a, b| a.ms_min.total_cmp(&b.ms_min)).copied()
+}
+
+/// The row with the least error.
+pub fn best<'a>(rows: &[&'a Row], measure: Measure) -> Option<&'a Row> {
+    let error = |row: &Row| row.error(measure).filter(|error| error.is_finite());
+    let known = rows.iter().filter(|row| error(row).is_some());
+    known.min_by(|a, b| error(a).unwrap_or(f64::MAX).total_cmp(&error(b).unwrap_or(f64::MAX))).copied()
+}
+
+/// What to choose for one error, level by level.
+pub fn choice(rows: &[&Row], measure: Measure) -> String {
+    let level = |level: f64| match cheapest(rows, measure, level) {
+        Some(row) => {
+            format!("{} at most: {}", percent(level), row.setting())
+        }
+        None => format!("{} at most: none", percent(level)),
+    };
+    LEVELS.map(level).join("; ")
+}
+
+/// Where iterating stalls: for each number of substeps the error with the fewest and the most iterations, and whether the last
+/// doubling still helped.
+pub fn stalls(rows: &[&Row], measure: Measure) -> Vec<String> {
+    let mut substeps: Vec<u32> = rows.iter().map(|row| row.substeps).collect();
+    substeps.sort_unstable();
+    substeps.dedup();
+    let mut lines = Vec::new();
+    for s in substeps {
+        let mut line: Vec<(u32, f64)> = rows
+            .iter()
+            .filter(|row| row.substeps == s)
+            .filter_map(|row| Some((row.iterations, row.error(measure)?)))
+            .collect();
+        line.sort_by_key(|(iterations, _)| *iterations);
+        let (Some(&(few, first)), Some(&(most, last))) = (line.first(), line.last()) else { continue };
+        if few == most {
+            continue;
+        }
+        let before = line[line.len() - 2].1;
+        let stalled = line.windows(2).find(|pair| pair[1].1 > STALLED * pair[0].1);
+        let verdict = match stalled {
+            Some(pair) if last > STALLED * before => {
+                format!("stalls from {} iterations on", pair[0].0)
+            }
+            _ => format!("still falls, by {:.1} with the last doubling", before / last),
+        };
+        lines.push(format!(
+            "{s} substep{}: {} with {few}, {} with {most} iterations; {verdict}",
+            if s == 1 { "" } else { "s" },
+            percent(first),
+            percent(last)
+        ));
+    }
+    lines
+}
+
+/// Plain XPBD with its iterations raised, in one substep and in any number of them, against everything else at an E1 of `level`.
+pub fn against_iterating(rows: &[&Row], level: f64) -> String {
+    let aim = percent(level);
+    let Some(fastest) = cheapest(rows, Measure::E1, level) else {
+        return format!("No setting has an E1 of {aim} or less.");
+    };
+    let alone: Vec<&Row> =
+        rows.iter().copied().filter(|row| row.substeps == 1 && row.method() == XPBD.formulation).collect();
+    let e1 = |row: &Row| percent(row.e1.unwrap_or(f64::NAN));
+    let winner = format!(
+        "The fastest setting with an E1 of {aim} or less is {} with {}",
+        fastest.setting(),
+        e1(fastest)
+    );
+    match (cheapest(&alone, Measure::E1, level), best(&alone, Measure::E1)) {
+        (Some(row), _) => format!(
+            "{winner}; plain XPBD with one substep has that with {} iterations and takes {:.1} times as long ({} ms).",
+            row.iterations,
+            row.ms_min / fastest.ms_min,
+            ms(row.ms_min)
+        ),
+        (None, Some(row)) => format!(
+            "{winner}; plain XPBD with one substep does not come there: at its best, with {} iterations, its E1 is {} and it \
+             takes {:.1} times as long ({} ms).",
+            row.iterations,
+            e1(row),
+            row.ms_min / fastest.ms_min,
+            ms(row.ms_min)
+        ),
+        (None, None) => format!("{winner}."),
+    }
+}
+
+/// Substeps against iterations with the same number of sweeps.
+pub fn same_sweeps(rows: &[&Row], sweeps: u32) -> Option<String> {
+    let mut same: Vec<&Row> =
+        rows.iter().copied().filter(|row| row.sweeps() == sweeps && row.e3.is_some()).collect();
+    same.sort_by_key(|row| row.substeps);
+    if same.len() < 2 {
+        return None;
+    }
+    let entry = |row: &&Row| {
+        format!(
+            "{} × {}: E2 {}, E3 {}",
+            row.substeps,
+            row.iterations,
+            row.e2.map_or_else(|| "none".into(), percent),
+            row.e3.map_or_else(|| "none".into(), percent)
+        )
+    };
+    Some(format!("With {sweeps} sweeps a frame: {}.", same.iter().map(entry).collect::<Vec<_>>().join("; ")))
+}
+
+/// What single precision costs: the least errors of both precisions.
+pub fn precision(rows: &[Row], measure: Measure) -> Option<String> {
+    let of = |backend: Backend| {
+        rows.iter()
+            .filter(|row| row.backend == backend.name() && row.method() == XPBD.formulation)
+            .collect::<Vec<&Row>>()
+    };
+    let (single, double) = (of(Backend::Cpu), of(Backend::CpuDouble));
+    // Only where both ran.
+    let ran = |row: &&&Row| {
+        double.iter().any(|other| (other.substeps, other.iterations) == (row.substeps, row.iterations))
+    };
+    let single: Vec<&Row> = single.iter().filter(ran).copied().collect();
+    let (a, b) = (best(&single, measure)?, best(&double, measure)?);
+    Some(format!(
+        "Least {} of the same settings: {} in `f32` ({} × {}), {} in `f64` ({} × {}).",
+        measure.name(),
+        percent(a.error(measure)?),
+        a.substeps,
+        a.iterations,
+        percent(b.error(measure)?),
+        b.substeps,
+        b.iterations
+    ))
+}
+
+/// What PBD ends up with.
+pub fn pbd(rows: &[Row]) -> Option<String> {
+    let mut settled: Vec<&Row> =
+        rows.iter().filter(|row| row.formulation == PBD.formulation && row.e3.is_some()).collect();
+    settled.sort_by_key(|row| row.sweeps());
+    let entry = |row: &&Row| {
+        let opening =
+            row.opening.map_or_else(String::new, |ratio| format!(", opening {ratio:.2} times as wide"));
+        format!("{} × {}: E3 {}{opening}", row.substeps, row.iterations, percent(row.e3.unwrap_or(f64::NAN)))
+    };
+    let entries: Vec<String> = settled.iter().map(entry).collect();
+    (!entries.is_empty()).then(|| {
+        format!(
+            "PBD has stiffness per iteration and no material: E1 and E2 have no meaning for it, and E3 says how far from the \
+             material's equilibrium it ends. {}.",
+            entries.join("; ")
+        )
+    })
+}
+
+/// A share in percent with two digits that count.
+pub fn percent(share: f64) -> String {
+    let value = 100.0 * share;
+    match value.abs() {
+        _ if !value.is_finite() => "beyond numbers".into(),
+        size if size >= 9.95 => format!("{value:.0} %"),
+        size if size >= 0.995 => format!("{value:.1} %"),
+        size if size >= 0.0995 => format!("{value:.2} %"),
+        size if size >= 0.00995 => format!("{value:.3} %"),
+        _ => format!("{value:.1e} %"),
+    }
+}
+
+/// Milliseconds with two or three digits.
+pub fn ms(ms: f64) -> String {
+    match ms {
+        ms if ms >= 99.5 => format!("{ms:.0}"),
+        ms if ms >= 9.95 => format!("{ms:.1}"),
+        ms if ms >= 0.995 => format!("{ms:.2}"),
+        ms => format!("{ms:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(substeps: u32, iterations: u32, ms_min: f64, e1: f64) -> Row {
+        let (backend, formulation) = ("cpu f32", "xpbd");
+        Row { backend, formulation, substeps, iterations, ms_min, e1: Some(e1), ..Row::default() }
+    }
+
+    #[test]
+    fn sentences_name_the_rows_that_they_are_made_of() {
+        let rows = [
+            row(1, 1, 1.0, 0.5),
+            row(1, 2, 2.0, 0.2),
+            row(1, 4, 4.0, 0.19),
+            row(8, 1, 3.0, 0.004),
+            row(8, 2, 9.0, 0.002),
+        ];
+        let rows: Vec<&Row> = rows.iter().collect();
+        let choice = choice(&rows, Measure::E1);
+        assert!(
+            choice.contains("10 % at most: xpbd 8 × 1 (3.00 ms)") && choice.contains("0.10 % at most: none"),
+            "{choice}"
+        );
+        let stalls = stalls(&rows, Measure::E1);
+        assert_eq!(stalls[0], "1 substep: 50 % with 1, 19 % with 4 iterations; stalls from 2 iterations on");
+        assert_eq!(
+            stalls[1],
+            "8 substeps: 0.40 % with 1, 0.20 % with 2 iterations; still falls, by 2.0 with the last doubling"
+        );
+        let against = against_iterating(&rows, 0.01);
+        assert!(
+            against.contains(
+                "is xpbd 8 × 1 (3.00 ms) with 0.40 %; plain XPBD with one substep does not come there"
+            ),
+            "{against}"
+        );
+        assert!(
+            against.contains("with 4 iterations, its E1 is 19 % and it takes 1.3 times as long (4.00 ms)"),
+            "{against}"
+        );
+    }
+}
