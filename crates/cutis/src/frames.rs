@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use cutis_mesh::{Gape, WoundGape};
-use cutis_solver::{Residual, Solver, SolverError};
+use cutis_solver::{Ledger, Residual, Solver, SolverError};
 use nalgebra::Point3;
 
 use crate::checkpoint::Checkpoint;
 use crate::files::{self, RunFolder};
 use crate::report::Frames;
 use crate::scene::RunSection;
-use crate::{Error, Progress};
+use crate::{CostLedger, Error, Progress};
 
 /// One line of `frames.csv`.
 #[derive(Clone, Debug)]
@@ -31,6 +31,44 @@ pub(crate) struct Course<'a> {
     pub(crate) gapes: &'a [Gape],
     /// Frame of the checkpoint that the run goes on from.
     pub(crate) resumed: Option<u32>,
+    pub(crate) timing: Timing,
+}
+
+/// How the time of the solver's parts is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Timing {
+    No,
+    /// In every frame: on the host that costs nothing to speak of.
+    Throughout,
+    /// In one more frame, of which nothing is kept: on a device the parts are waited for, which a frame is not.
+    OneMore,
+}
+
+/// Times of the solver's parts.
+pub(crate) struct Times {
+    ledger: Ledger,
+    frames: u32,
+    timing: Timing,
+}
+
+impl Times {
+    /// Enters the times where there are any.
+    pub(crate) fn enter(&self, costs: CostLedger) -> CostLedger {
+        let how = match (self.timing, self.frames) {
+            (Timing::No, _) => {
+                return CostLedger { time: "not measured: no report was asked for".into(), ..costs };
+            }
+            (_, 0) => {
+                return CostLedger { time: "not measured: there was no frame to measure".into(), ..costs };
+            }
+            (Timing::Throughout, frames) => format!("mean of the {frames} frames of this run"),
+            (Timing::OneMore, _) => {
+                "one frame more than the run has, part by part, each waited for: together longer than a frame"
+                    .into()
+            }
+        };
+        costs.with_times(&self.ledger, self.frames.into(), &how)
+    }
 }
 
 /// What the frames leave.
@@ -40,6 +78,7 @@ pub(crate) struct Finish {
     /// Local metres, one per vertex.
     pub(crate) positions: Vec<Point3<f32>>,
     pub(crate) residuals: Vec<Residual>,
+    pub(crate) times: Times,
 }
 
 impl Course<'_> {
@@ -68,10 +107,16 @@ impl Course<'_> {
             Ok::<_, Error>(FrameRow { frame, time_s: solver.time_s(), ms, gapes: lips.measure(solver)? })
         };
         let mut rows = vec![row(solver, self.done(), 0.0)?];
+        let mut times = Times { ledger: Ledger::default(), frames: 0, timing: self.timing };
         for frame in self.done() + 1..=frames {
             at.frame = frame;
             let start = Instant::now();
-            solver.step(1)?;
+            if self.timing == Timing::Throughout {
+                solver.step_timed(1, &mut times.ledger)?;
+                times.frames += 1;
+            } else {
+                solver.step(1)?;
+            }
             let ms = start.elapsed().as_secs_f64() * 1e3;
             rows.push(row(solver, frame, ms)?);
             if every > 0 && (frame % every == 0 || frame == frames) {
@@ -83,7 +128,13 @@ impl Course<'_> {
         // The whole body comes to the host for its positions: measured there, residuals cost a device nothing, and a lack of
         // room on it cannot take a finished run.
         let system = solver.system()?;
-        Ok(Finish { rows, positions: system.positions(), residuals: system.residuals() })
+        let (positions, residuals) = (system.positions(), system.residuals());
+        // What happens to the body from here on is nobody's business, and a failure no reason to lose the run.
+        if self.timing == Timing::OneMore && rows.len() > 1 && solver.step_timed(1, &mut times.ledger).is_ok()
+        {
+            times.frames = 1;
+        }
+        Ok(Finish { rows, positions, residuals, times })
     }
 
     fn save(&self, solver: &mut dyn Solver<f32>, frame: u32) -> Result<(), Error> {

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use base64::Engine;
 
+use crate::CostLedger;
 use crate::report::{Report, Wound};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
@@ -102,17 +103,8 @@ fn tables(report: &Report) -> String {
             r.max
         );
     }
-    out.push_str("</table><h2>Memory of the solver</h2><table>");
-    let parts = report.memory.iter().map(|part| (part, ""));
-    for (part, place) in parts.chain(report.device_memory.iter().map(|part| (part, "on the GPU"))) {
-        let _ = write!(
-            out,
-            "<tr><td>{}</td><td class=\"n\">{:.1} MB</td><td>{place}</td></tr>",
-            escape(&part.part),
-            part.bytes as f64 / 1e6
-        );
-    }
     out.push_str("</table>");
+    out.push_str(&costs(&report.ledger));
     if let Some(r) = &report.resample {
         let _ = write!(
             out,
@@ -120,6 +112,27 @@ fn tables(report: &Report) -> String {
             r.covered_voxels, r.vacated_voxels, r.folds
         );
     }
+    out
+}
+
+/// The cost ledger.
+fn costs(ledger: &CostLedger) -> String {
+    let mut out = String::from(
+        "<h2>What the solver costs</h2><table><tr><th>part</th><th>memory</th><th>on the GPU</th><th>per frame</th></tr>",
+    );
+    let megabytes =
+        |bytes: usize| if bytes == 0 { String::new() } else { format!("{:.1} MB", bytes as f64 / 1e6) };
+    for part in &ledger.parts {
+        let time = part.ms_per_frame.map(|ms| format!("{ms:.2} ms")).unwrap_or_default();
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{time}</td></tr>",
+            escape(&part.part),
+            megabytes(part.host_bytes),
+            megabytes(part.device_bytes),
+        );
+    }
+    let _ = write!(out, "</table><p>Time: {}.</p>", escape(&ledger.time));
     out
 }
 

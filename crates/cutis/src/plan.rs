@@ -1,5 +1,6 @@
 //! What a scene will do, before it does it: sizes, colours, memory, what is left out, and which backend.
 
+use cutis_solver::Ledger;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -11,7 +12,10 @@ use crate::dynamics::{self, Dynamics};
 use crate::report::{Backend, MemoryPart, Sizes, Stage};
 use crate::scene::LoadedScene;
 use crate::source::{self, Source};
-use crate::{Error, Progress, region};
+use crate::{CostLedger, Error, Progress, ledger, region};
+
+/// Why a plan has no times.
+const NO_DEVICE: &str = "not measured: no device is opened for a plan; `cutis tune` measures on the GPU";
 
 /// The plan of a scene, as `cutis check` prints it.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -27,6 +31,8 @@ pub struct Plan {
     /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend. Each part has kernels of its own, and what has
     /// no part here has none.
     pub device_memory: Vec<MemoryPart>,
+    /// Bytes and time of the solver by part.
+    pub ledger: CostLedger,
     /// Bytes of the volume's voxels.
     pub volume_bytes: usize,
     /// Constraints × iterations × substeps × frames; the largest 64-bit number where it is more.
@@ -48,13 +54,20 @@ pub(crate) struct Prepared {
     pub(crate) plan: Plan,
 }
 
-/// Plans a scene: reads the CT, builds the body and the system, opens no device, steps nothing and writes nothing.
+/// Plans a scene: reads the CT, builds the body and the system, opens no device and writes nothing. On a CPU backend it steps
+/// the body for a moment, to tell what a frame would take.
 ///
 /// # Errors
 /// [`Error`] as a run of the scene would give it before its first frame.
 pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Error> {
     let mut clock = Clock::new(progress);
-    let mut plan = prepare(loaded, Request::of(loaded)?, &mut clock)?.plan;
+    let Prepared { dynamics, backend, mut plan, .. } = prepare(loaded, Request::of(loaded)?, &mut clock)?;
+    if !backend.on_gpu() {
+        let Dynamics { system, settings, .. } = dynamics;
+        plan.ledger = clock
+            .stage("time a substep", 0, |_| ledger::of_substeps(&backend, system, settings, plan.ledger))
+            .map_err(loaded.blame("solver"))?;
+    }
     plan.stages = clock.stages;
     Ok(plan)
 }
@@ -95,15 +108,17 @@ pub(crate) fn prepare(
             backend.report.name
         ));
     }
-    let memory: Vec<MemoryPart> = dynamics.system.bytes().iter().map(MemoryPart::from).collect();
+    let memory = memory(&dynamics);
+    let device_memory = backend.device_memory(&dynamics.system, &dynamics.settings);
     let mut left_out = left_out(loaded, &backend);
     region::left_out(&body, &memory, &mut left_out);
     let plan = Plan {
         backend: backend.report.clone(),
         sizes,
         colors: dynamics.colors.clone(),
+        ledger: CostLedger::of_memory(&memory, &device_memory, NO_DEVICE),
         memory,
-        device_memory: backend.device_memory(&dynamics.system, &dynamics.settings),
+        device_memory,
         volume_bytes: 2 * source.volume.voxels().len(),
         projections: work.projections,
         left_out,
@@ -111,6 +126,16 @@ pub(crate) fn prepare(
         stages: Vec::new(),
     };
     Ok(Prepared { source, body, dynamics, backend, plan })
+}
+
+/// What the solver will store on the host.
+fn memory(dynamics: &Dynamics) -> Vec<MemoryPart> {
+    let mut parts: Vec<MemoryPart> = dynamics.system.bytes().iter().map(MemoryPart::from).collect();
+    if dynamics.settings.keeps_multipliers() {
+        let count: usize = dynamics.system.kinds().iter().map(|kind| kind.len()).sum();
+        parts.push(MemoryPart { part: Ledger::MULTIPLIERS.into(), bytes: count * size_of::<f32>() });
+    }
+    parts
 }
 
 /// How much the solver will have to do.

@@ -5,7 +5,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Scene, files};
+use crate::{CostLedger, Error, Scene, files};
 
 /// Version of the report's layout; the number grows when a key changes its meaning or goes.
 pub const SCHEMA: &str = "cutis-report/1";
@@ -36,6 +36,8 @@ pub struct Report {
     pub memory: Vec<MemoryPart>,
     /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend.
     pub device_memory: Vec<MemoryPart>,
+    /// Bytes and time of the solver by part; a run without a report measures no times.
+    pub ledger: CostLedger,
     /// What the GPU did; none on a CPU backend.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<DeviceWork>,

@@ -8,7 +8,7 @@ use crate::backend::{Metered, Request, Stages};
 use crate::checkpoint::{self, Checkpoint};
 use crate::clock::Clock;
 use crate::files::RunFolder;
-use crate::frames::{Course, Finish, earlier_frames, frame_times, frames_csv};
+use crate::frames::{Course, Finish, Timing, earlier_frames, frame_times, frames_csv};
 use crate::output::{self, Outcome};
 use crate::plan::{self, Prepared};
 use crate::report::{KindResidual, Machine, Report, SCHEMA, Wound};
@@ -89,10 +89,21 @@ fn run_with(
         running.solver.restore(&saved.positions, &saved.velocities, u64::from(saved.frame))?;
         resumed = Some(saved.frame);
     }
-    let course =
-        Course { run: &loaded.scene.run, folder: &folder, fingerprint, gapes: &body.cut.gapes, resumed };
+    let timing = match (loaded.scene.output.report, running.place()) {
+        (false, _) => Timing::No,
+        (true, "gpu") => Timing::OneMore,
+        (true, _) => Timing::Throughout,
+    };
+    let course = Course {
+        run: &loaded.scene.run,
+        folder: &folder,
+        fingerprint,
+        gapes: &body.cut.gapes,
+        resumed,
+        timing,
+    };
     let todo = u64::from(frames.saturating_sub(course.done()));
-    let Finish { rows, positions: deformed, residuals } =
+    let Finish { rows, positions: deformed, residuals, times } =
         clock.stage_on(running.place(), "simulate", todo, |progress| {
             course.run(&mut *running.solver, progress)
         })?;
@@ -129,6 +140,7 @@ fn run_with(
         colors: plan.colors,
         memory: plan.memory,
         device_memory: plan.device_memory,
+        ledger: times.enter(plan.ledger),
         device: device.as_ref().map(Metered::work),
         stages: clock.stages.clone(),
         frames: frame_times(&rows),

@@ -107,13 +107,7 @@ fn table(plan: &Plan) -> String {
         format!("projections      {}", plan.projections),
         format!("memory, CT       {:.1} MB", plan.volume_bytes as f64 / 1e6),
     ];
-    for part in &plan.memory {
-        let colors = plan.colors.get(&part.part).map(|n| format!(", {n} colours")).unwrap_or_default();
-        lines.push(format!("memory, {:8} {:.1} MB{colors}", part.part, part.bytes as f64 / 1e6));
-    }
-    for part in &plan.device_memory {
-        lines.push(format!("GPU, {:11} {:.1} MB", part.part, part.bytes as f64 / 1e6));
-    }
+    lines.extend(ledger(plan));
     if !plan.device_memory.is_empty() {
         let parts: Vec<&str> = plan.device_memory.iter().map(|part| part.part.as_str()).collect();
         lines.push(format!("GPU, kernels     for {}", parts.join(", ")));
@@ -122,6 +116,30 @@ fn table(plan: &Plan) -> String {
     lines.extend(plan.left_out.iter().map(|line| format!("  {line}")));
     lines.extend(plan.warnings.iter().map(|line| format!("note: {line}")));
     lines.join("\n")
+}
+
+/// The cost ledger: bytes exactly, times as measured.
+fn ledger(plan: &Plan) -> Vec<String> {
+    let on_device = !plan.device_memory.is_empty();
+    let row = |part: &str, colors: &str, host: &str, device: &str, time: &str| {
+        let device = if on_device { format!("  {device:>12}") } else { String::new() };
+        format!("  {part:12} {colors:>8}  {host:>12}{device}  {time:>12}").trim_end().to_owned()
+    };
+    let bytes = |bytes: usize| if bytes == 0 { String::new() } else { bytes.to_string() };
+    let mut lines = vec![
+        "cost of the solver:".to_owned(),
+        row("part", "colours", "host, bytes", "GPU, bytes", "ms per frame"),
+    ];
+    lines.extend(plan.ledger.parts.iter().map(|part| {
+        let colors = plan.colors.get(&part.part).map(usize::to_string).unwrap_or_default();
+        let time = part.ms_per_frame.map(|ms| format!("{ms:.3}")).unwrap_or_default();
+        row(&part.part, &colors, &bytes(part.host_bytes), &bytes(part.device_bytes), &time)
+    }));
+    let sum = |of: fn(&cutis::CostPart) -> usize| bytes(plan.ledger.parts.iter().map(of).sum());
+    let time = plan.ledger.ms_per_frame().map(|ms| format!("{ms:.3}")).unwrap_or_default();
+    lines.push(row("all", "", &sum(|part| part.host_bytes), &sum(|part| part.device_bytes), &time));
+    lines.push(format!("  time: {}", plan.ledger.time));
+    lines
 }
 
 pub(crate) fn resample(scene: &Path, change: &Change, request: ResampleRequest) -> Result<(), Error> {

@@ -112,17 +112,19 @@ fn a_run_on_a_gpu_says_where_it_ran() {
 
     let check = desk.cutis(&["check", "scene.toml", "--backend", "gpu", "--adapter", "0"]).expect_success();
     assert!(check.stdout.contains(&format!("gpu: {name}")), "{}", check.stdout);
-    assert!(
-        check.stdout.contains("GPU, stc") && check.stdout.contains("kernels     for vertices, distance"),
-        "{}",
-        check.stdout
-    );
+    for words in ["GPU, bytes", "kernels     for vertices, distance", "time: not measured", "cutis tune"] {
+        assert!(check.stdout.contains(words), "no {words:?} in {}", check.stdout);
+    }
     assert!(!check.stdout.contains("gpu: no device"), "{}", check.stdout);
 
     let plan = parsed(desk.cutis(&["check", "scene.toml", "--backend", "gpu", "--json"]));
     let parts: Vec<&Value> = plan["device_memory"].as_array().unwrap().iter().map(|p| &p["part"]).collect();
     assert_eq!(parts, ["vertices", "distance", "volume", "stc"]);
     assert!(plan["device_memory"].as_array().unwrap().iter().all(|p| p["bytes"].as_u64() > Some(0)));
+    let costs = plan["ledger"]["parts"].as_array().unwrap();
+    assert!(
+        costs.iter().all(|part| part["device_bytes"].as_u64() > Some(0) && part["ms_per_frame"].is_null())
+    );
 
     let call = "run scene.toml --backend gpu --out run --json --set output={report=true} --adapter";
     let report = parsed(desk.cutis(&[&words(call)[..], &[&part]].concat()));

@@ -98,6 +98,18 @@ fn check() {
         &found,
         &["backend.name", "sizes.vertices", "sizes.tets", "memory[].part", "memory[].bytes", "left_out[]"],
     );
+    expect_keys(
+        &found,
+        &["ledger.parts[].part", "ledger.parts[].host_bytes", "ledger.parts[].device_bytes", "ledger.time"],
+    );
+    expect_keys(&found, &["ledger.parts[].ms_per_frame"]);
+    let parts: Vec<&str> =
+        found["ledger"]["parts"].as_array().unwrap().iter().map(|p| p["part"].as_str().unwrap()).collect();
+    assert_eq!(parts, ["vertices", "distance", "volume", "check"], "what is left out has no part");
+    assert!(
+        found["ledger"]["parts"][1]["host_bytes"].as_u64() == found["memory"][1]["bytes"].as_u64(),
+        "{found}"
+    );
     let colors: Vec<&String> = found["colors"].as_object().unwrap().keys().collect();
     assert_eq!(colors, ["distance", "volume"]);
     assert!(
@@ -107,7 +119,7 @@ fn check() {
     assert_eq!(desk.names("."), ["scene.toml"]);
 }
 
-const REPORT_KEYS: [&str; 27] = [
+const REPORT_KEYS: [&str; 32] = [
     "schema",
     "cutis_version",
     "inputs[].path",
@@ -126,6 +138,11 @@ const REPORT_KEYS: [&str; 27] = [
     "stages[].ms",
     "stages[].on",
     "device_memory",
+    "ledger.parts[].part",
+    "ledger.parts[].host_bytes",
+    "ledger.parts[].device_bytes",
+    "ledger.parts[].ms_per_frame",
+    "ledger.time",
     "frames.count",
     "frames.ms_mean",
     "frames.ms_min",
