@@ -7,6 +7,9 @@ use rayon::prelude::*;
 
 use crate::NewtonError;
 
+/// Constraints that a thread takes at least, so that sharing out costs less than the work.
+const MIN_LEN: usize = 256;
+
 /// The constraints of one kind and their compliances.
 pub(crate) struct Elements {
     kind: Kind<f64>,
@@ -75,13 +78,18 @@ impl Elements {
         let arity = self.arity();
         let mut values = vec![0.0; self.len()];
         let mut gradients = vec![Vector3::zeros(); self.len() * arity];
-        values.par_iter_mut().zip(gradients.par_chunks_mut(arity.max(1))).enumerate().for_each_init(
-            || vec![Point3::origin(); arity],
-            |places, (k, (value, gradients))| {
-                self.gather(k, x, places);
-                *value = self.evaluate_one(k, places, gradients);
-            },
-        );
+        values
+            .par_iter_mut()
+            .zip(gradients.par_chunks_mut(arity.max(1)))
+            .enumerate()
+            .with_min_len(MIN_LEN)
+            .for_each_init(
+                || vec![Point3::origin(); arity],
+                |places, (k, (value, gradients))| {
+                    self.gather(k, x, places);
+                    *value = self.evaluate_one(k, places, gradients);
+                },
+            );
         Evaluated { values, gradients }
     }
 }

@@ -3,6 +3,7 @@
 mod blocks;
 mod closed_forms;
 mod derivatives;
+mod extremes;
 mod hard;
 mod refusals;
 mod solver;
