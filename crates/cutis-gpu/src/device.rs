@@ -138,6 +138,15 @@ impl Gpu {
         usize::try_from(fits).unwrap_or(usize::MAX).min(chunk_cap.unwrap_or(usize::MAX)).max(1)
     }
 
+    /// The largest number of items of `bytes` bytes each that one buffer and one binding can take, whatever the number of threads
+    /// that read them; no more than the cap of the options, and at least 1.
+    pub fn binding_len(&self, bytes: usize) -> usize {
+        let Shared { limits, chunk_cap, .. } = &*self.shared;
+        let room = limits.max_binding_bytes.min(limits.max_buffer_bytes);
+        let fits = room.checked_div(bytes as u64).unwrap_or(u64::MAX);
+        usize::try_from(fits).unwrap_or(usize::MAX).min(chunk_cap.unwrap_or(usize::MAX)).max(1)
+    }
+
     /// What was done with this device since it was opened.
     pub fn counters(&self) -> Counters {
         self.shared.tally.snapshot()

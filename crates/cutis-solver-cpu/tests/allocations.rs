@@ -81,6 +81,11 @@ fn a_scene_pays_only_for_what_it_names() {
             assert_eq!(allocations(&mut solver, 3), 0, "{threads} threads");
         }
     }
+    let descent = Settings { formulation: Formulation::Vbd, ..settings(2) };
+    for threads in [1, 8] {
+        let mut solver = SolverCpu::new(body(true), descent, Some(threads)).unwrap();
+        assert_eq!(allocations(&mut solver, 3), 0, "descent, {threads} threads");
+    }
     // The control: the counter counts.
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     drop(std::hint::black_box(vec![1u8]));
@@ -93,6 +98,8 @@ fn a_scene_pays_only_for_what_it_names() {
     assert_eq!(names(false, 1), ["vertices", "distance"]);
     assert_eq!(names(true, 1), ["vertices", "distance", "volume"]);
     assert_eq!(names(true, 2), ["vertices", "distance", "volume", "multipliers"]);
+    let descending = SolverReference::new(body(true), descent).unwrap();
+    assert_eq!(descending.bytes().last().map(|part| part.name), Some("incidences"));
 
     // Four numbers, three and three of a vertex; indices, length and colour offsets of a spring.
     let lattice = Kuhn::new([30, 20, 20], 0.1);

@@ -2,7 +2,7 @@
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
-use cutis_solver::{Simulation, Step};
+use cutis_solver::{Formulation, Simulation, Step};
 use nalgebra::Vector3;
 
 /// A binding may begin at every sixteenth element of 16 bytes: 256 bytes.
@@ -14,11 +14,14 @@ const NONE: u32 = u32::MAX;
 /// The state of the body: positions with inverse masses, positions before the substep, velocities.
 pub(crate) struct Body {
     pub(crate) vertices: Buffer<[f32; 4]>,
+    pub(crate) previous: Buffer<[f32; 4]>,
     pub(crate) velocities: Buffer<[f32; 4]>,
     pub(crate) settings: Buffer<[f32; 8]>,
     /// First vertex that is not finite, substeps that ended finite, whether one began after one that did not.
     pub(crate) status: Buffer<u32>,
     pub(crate) predict: VertexPass,
+    /// After `finish`; in vertex block descent only, which needs the velocities stored.
+    pub(crate) predict_next: Option<VertexPass>,
     pub(crate) finish_and_predict: VertexPass,
     pub(crate) finish: VertexPass,
     pub(crate) check: VertexPass,
@@ -87,17 +90,32 @@ impl Body {
             }
             Ok(VertexPass { kernel, parts: groups })
         };
+        let descends = simulation.settings().formulation == Formulation::Vbd;
         Ok(Self {
             predict: pass("predict", &[0, 1, 2, 3])?,
+            predict_next: descends.then(|| pass("predict_next", &[0, 1, 2, 3, 5])).transpose()?,
             finish_and_predict: pass("finish_and_predict", &[0, 1, 3, 4, 5])?,
             finish: pass("finish", &[0, 1, 2, 3, 4, 5])?,
             check: pass("check", &[0, 4, 5])?,
             restore: pass("restore", &[0, 1, 2])?,
             vertices,
+            previous,
             velocities,
             settings,
             status,
         })
+    }
+
+    /// Predicts, after the velocities of the substep before if there was one.
+    pub(crate) fn begin_substep(&self, pass: &mut Pass<'_>, after_another: bool) {
+        match (after_another, &self.predict_next) {
+            (false, _) => self.predict.run(pass),
+            (true, None) => self.finish_and_predict.run(pass),
+            (true, Some(predict_next)) => {
+                self.finish.run(pass);
+                predict_next.run(pass);
+            }
+        }
     }
 
     /// Writes the host's positions and velocities.

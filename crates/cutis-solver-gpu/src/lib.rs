@@ -39,6 +39,7 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod descent;
 mod error;
 mod gather;
 mod handles;

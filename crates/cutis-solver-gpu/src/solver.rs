@@ -1,12 +1,13 @@
 //! The solver of this backend: the schedule, encoded.
 
-use cutis_gpu::{Buffer, Gpu, GpuError};
+use cutis_gpu::{Buffer, Gpu, GpuError, Pass};
 use cutis_solver::{
-    Clock, MemoryPart, Residual, Schedule, Settings, Simulation, Solver, SolverError, System,
+    Clock, MemoryPart, Method, Residual, Schedule, Settings, Simulation, Solver, SolverError, System,
 };
 use nalgebra::{Point3, Vector3};
 
 use crate::body::Body;
+use crate::descent::DescentOnDevice;
 use crate::gather::Gather;
 use crate::handles::Handles;
 use crate::kind::Kind;
@@ -34,11 +35,61 @@ pub struct SolverGpu {
     /// Whether the device's is not: a step failed on it half-way, and the host's is the one to go on from.
     stale_device: bool,
     body: Body,
-    kinds: Vec<Kind>,
+    constraints: Constraints,
     handles: Option<Handles>,
     gather: Option<Gather>,
     reductions: Vec<Reduction>,
     substep: Load,
+}
+
+/// The constraints, stored as the formulation takes them.
+enum Constraints {
+    /// Colour by colour of each kind.
+    Projected(Vec<Kind>),
+    /// By the vertices that they act on.
+    Pulling(DescentOnDevice),
+}
+
+impl Constraints {
+    fn new(gpu: &Gpu, body: &Body, simulation: &Simulation<f32>) -> Result<Self, GpuError> {
+        let kind = |set: &cutis_solver::Kind<f32>| Kind::new(gpu, body, &**set, simulation.settings());
+        Ok(match simulation.method() {
+            Method::Project(_) => {
+                Self::Projected(simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?)
+            }
+            Method::Descend(descent) => Self::Pulling(DescentOnDevice::new(gpu, body, simulation, descent)?),
+        })
+    }
+
+    /// What one iteration asks of the device.
+    fn load(&self, simulation: &Simulation<f32>) -> Load {
+        match self {
+            Self::Projected(kinds) => Load {
+                dispatches: kinds.iter().flat_map(|kind| &kind.colors).map(Vec::len).sum(),
+                threads: simulation.system().kinds().iter().map(|kind| kind.len()).sum(),
+            },
+            Self::Pulling(descent) => {
+                let [dispatches, threads] = descent.load();
+                Load { dispatches, threads }
+            }
+        }
+    }
+
+    /// Encodes one iteration.
+    fn encode(&self, pass: &mut Pass<'_>, schedule: &Schedule, iteration: u32) {
+        match self {
+            Self::Projected(kinds) => {
+                for sweep in &schedule.sweeps {
+                    kinds[sweep.kind].project(pass, sweep, iteration);
+                }
+            }
+            Self::Pulling(descent) => {
+                for turn in &schedule.turns {
+                    descent.turn(pass, turn);
+                }
+            }
+        }
+    }
 }
 
 /// What a substep asks of the device.
@@ -70,17 +121,15 @@ impl SolverGpu {
     pub fn new(gpu: &Gpu, system: System<f32>, settings: Settings) -> Result<Self, GpuSolverError> {
         let simulation = Simulation::new(system, settings)?;
         let body = Body::new(gpu, &simulation)?;
-        let kind = |set: &cutis_solver::Kind<f32>| Kind::new(gpu, &body, &**set, &settings);
-        let kinds: Vec<Kind> = simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?;
+        let constraints = Constraints::new(gpu, &body, &simulation)?;
         let handles = Handles::new(gpu, &body, simulation.system(), &settings)?;
         // Prediction, handles and the look at finiteness; then the colours.
         let passes = 3;
         let iterations = settings.iterations as usize;
-        let chunks: usize = kinds.iter().flat_map(|kind| &kind.colors).map(Vec::len).sum();
-        let constraints: usize = simulation.system().kinds().iter().map(|kind| kind.len()).sum();
+        let iteration = constraints.load(&simulation);
         let substep = Load {
-            dispatches: passes * body.check.dispatches() + chunks.saturating_mul(iterations),
-            threads: passes * body.vertices.len() + constraints.saturating_mul(iterations),
+            dispatches: passes * body.check.dispatches() + iteration.dispatches.saturating_mul(iterations),
+            threads: passes * body.vertices.len() + iteration.threads.saturating_mul(iterations),
         };
         Ok(Self {
             gpu: gpu.clone(),
@@ -89,7 +138,7 @@ impl SolverGpu {
             fresh: true,
             stale_device: false,
             body,
-            kinds,
+            constraints,
             handles,
             gather: None,
             reductions: Vec::new(),
@@ -130,7 +179,7 @@ impl SolverGpu {
         self.bring_device_up_to_date()?;
         self.body.clear_status(&self.gpu)?;
         self.fresh = false;
-        let mut predict = &self.body.predict;
+        let mut begun = false;
         let mut done = 0;
         while clock.frame < end {
             let frame = clock.frame;
@@ -147,16 +196,14 @@ impl SolverGpu {
                 }
                 encoded.dispatches += self.substep.dispatches;
                 encoded.threads = encoded.threads.saturating_add(self.substep.threads);
-                predict.run(&mut pass);
-                predict = &self.body.finish_and_predict;
+                self.body.begin_substep(&mut pass, begun);
+                begun = true;
                 if let Some(handles) = &self.handles {
                     handles.carry(&mut pass);
                 }
-                let Schedule { iterations, sweeps, .. } = self.simulation.schedule();
-                for iteration in 0..*iterations {
-                    for sweep in sweeps {
-                        self.kinds[sweep.kind].project(&mut pass, sweep, iteration);
-                    }
+                let schedule = self.simulation.schedule();
+                for iteration in 0..schedule.iterations {
+                    self.constraints.encode(&mut pass, schedule, iteration);
                 }
                 self.body.check.run(&mut pass);
                 clock.tick(&settings);
@@ -220,13 +267,15 @@ impl SolverGpu {
         Ok([vertices, self.gpu.read(&self.body.velocities, all)?])
     }
 
-    fn reduce(&mut self) -> Result<Vec<Residual>, GpuError> {
+    /// Residuals by reduction; none where constraints are not stored by colour.
+    fn reduce(&mut self) -> Result<Option<Vec<Residual>>, GpuError> {
         self.bring_device_up_to_date()?;
-        for n in self.reductions.len()..self.kinds.len() {
+        let Constraints::Projected(kinds) = &self.constraints else { return Ok(None) };
+        for n in self.reductions.len()..kinds.len() {
             let set = &*self.simulation.system().kinds()[n];
-            self.reductions.push(Reduction::new(&self.gpu, &self.body, &self.kinds[n], set)?);
+            self.reductions.push(Reduction::new(&self.gpu, &self.body, &kinds[n], set)?);
         }
-        self.reductions.iter().map(|reduction| reduction.run(&self.gpu)).collect()
+        self.reductions.iter().map(|reduction| reduction.run(&self.gpu)).collect::<Result<_, _>>().map(Some)
     }
 }
 
@@ -283,8 +332,11 @@ impl Solver<f32> for SolverGpu {
     }
 
     /// By reduction on the device. Sums of squares over 64 constraints are `f32`, so that it differs from the CPU's by some
-    /// 1e-7, relative.
+    /// 1e-7, relative. In vertex block descent the body is read and measured on the host.
     fn residuals(&mut self) -> Result<Vec<Residual>, SolverError> {
-        self.reduce().map_err(|error| self.unseen(&error))
+        match self.reduce().map_err(|error| self.unseen(&error))? {
+            Some(residuals) => Ok(residuals),
+            None => Ok(self.system()?.residuals()),
+        }
     }
 }

@@ -120,24 +120,20 @@ pub struct Descent<T: Scalar> {
 }
 
 impl<T: Scalar> Descent<T> {
-    /// Checks that every constraint has a compliance to divide by, and the groups; greedy ones where none were given.
-    pub(crate) fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
+    /// For `system`, with its groups of vertices, or greedy ones if it was given none.
+    ///
+    /// # Errors
+    /// A kind with a constraint that has no compliance to divide by, or groups that do not fit.
+    pub fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
         for kind in system.kinds() {
             check_compliances(kind)?;
         }
-        let groups_error =
-            |error: ColoringError| SolverError::Groups { kind: "vertices", reason: error.to_string() };
         let tuples = tuples_of(system.kinds());
         let count = system.vertices().len();
         let incidences =
             tuples.iter().map(|&kind| Incidence::new(kind, count)).collect::<Result<Vec<_>, _>>();
         let incidences = incidences.map_err(groups_error)?;
-        let moves: Vec<bool> = system.vertices().iter().map(|v| v.inverse_mass() > T::zero()).collect();
-        let groups = match &system.vertex_groups {
-            Some(groups) => groups.restricted_to(&moves),
-            None => greedy_vertices(&tuples, &incidences, &moves).map_err(groups_error)?,
-        };
-        groups.verify_vertices(&tuples, &moves).map_err(groups_error)?;
+        let groups = groups_of(system, &tuples, &incidences)?;
         Ok(Self { groups, incidences, step: DescentStep::new(settings) })
     }
 
@@ -161,6 +157,25 @@ impl<T: Scalar> Descent<T> {
         let groups = size_of_val(self.groups.order.as_slice()) + size_of_val(self.groups.offsets.as_slice());
         groups + self.incidences.iter().map(Incidence::bytes).sum::<usize>()
     }
+}
+
+/// Those that the system was given, or greedy ones, without the vertices that do not move; checked.
+fn groups_of<T: Scalar>(
+    system: &System<T>,
+    tuples: &[Tuples<'_>],
+    incidences: &[Incidence],
+) -> Result<Groups, SolverError> {
+    let moves: Vec<bool> = system.vertices().iter().map(|v| v.inverse_mass() > T::zero()).collect();
+    let groups = match &system.vertex_groups {
+        Some(groups) => groups.restricted_to(&moves),
+        None => greedy_vertices(tuples, incidences, &moves).map_err(groups_error)?,
+    };
+    groups.verify_vertices(tuples, &moves).map_err(groups_error)?;
+    Ok(groups)
+}
+
+fn groups_error(error: ColoringError) -> SolverError {
+    SolverError::Groups { kind: "vertices", reason: error.to_string() }
 }
 
 fn tuples_of<T: Scalar>(kinds: &[Kind<T>]) -> Vec<Tuples<'_>> {

@@ -55,6 +55,15 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
+// After `finish` of the substep before.
+@compute @workgroup_size(64)
+fn predict_next(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.x;
+    if (i < arrayLength(&vertices) && status.failed == 0u) {
+        predict_from(i, velocities[i].xyz);
+    }
+}
+
 @compute @workgroup_size(64)
 fn finish_and_predict(@builtin(global_invocation_id) id: vec3u) {
     let i = id.x;

@@ -43,10 +43,10 @@ fn assert_parity(gpu: &Gpu, parts: Parts, iterations: u32) {
 }
 
 #[test]
-fn all_kinds_together_in_both_formulations() {
+fn all_kinds_together_in_every_formulation() {
     on_each_adapter(GpuOptions::default(), |gpu| {
         for (formulation, iterations) in
-            [(Formulation::Pbd, 2), (Formulation::Xpbd, 1), (Formulation::Xpbd, 3)]
+            [(Formulation::Pbd, 2), (Formulation::Xpbd, 1), (Formulation::Xpbd, 3), (Formulation::Vbd, 2)]
         {
             for step in [1e-4, 0.1, 100.0] {
                 for each in [true, false] {
@@ -60,7 +60,7 @@ fn all_kinds_together_in_both_formulations() {
 #[test]
 fn every_kind_alone() {
     on_each_adapter(GpuOptions::default(), |gpu| {
-        for formulation in [Formulation::Pbd, Formulation::Xpbd] {
+        for formulation in [Formulation::Pbd, Formulation::Xpbd, Formulation::Vbd] {
             let none = Parts::none(formulation);
             let paper = formulation == Formulation::Pbd;
             for parts in [
@@ -84,6 +84,7 @@ fn split_colours_and_baseline_limits() {
         on_each_adapter(GpuOptions { chunk_cap, baseline_limits: true, ..GpuOptions::default() }, |gpu| {
             for iterations in [1, 2] {
                 assert_parity(gpu, Parts::all(Formulation::Xpbd), iterations);
+                assert_parity(gpu, Parts::all(Formulation::Vbd), iterations);
             }
         });
     }

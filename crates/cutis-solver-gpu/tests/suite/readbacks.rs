@@ -104,6 +104,9 @@ fn a_body_pays_only_for_what_it_has() {
         assert_eq!(kernels(Parts { distance: true, ..none }, 2), 7, "the first iteration and later ones");
         assert_eq!(kernels(Parts { distance: true, handle: true, ..none }, 1), 7);
         assert_eq!(kernels(Parts::all(Formulation::Xpbd), 1), 9);
+        // Descent: five passes and another prediction, the steps of the vertices, a kernel per kind.
+        assert_eq!(kernels(Parts::none(Formulation::Vbd), 1), 7);
+        assert_eq!(kernels(Parts { handle: false, ..Parts::all(Formulation::Vbd) }, 2), 10);
         assert_eq!(gpu.counters().buffer_bytes, 0, "all of it goes with the solver");
     });
 }

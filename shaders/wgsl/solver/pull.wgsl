@@ -1,0 +1,63 @@
+// What the constraints of one kind do to the vertices of a chunk: force, and the matrix of its quadratic model. The twin of
+// `Pull::add`.
+struct Pull {
+    force: vec4f,
+    // Entries xx, yy, zz.
+    diagonal: vec4f,
+    // Entries xy, xz, yz.
+    mixed: vec4f,
+}
+
+// A vertex of the chunk, and its part of `places`.
+struct Share {
+    vertex: u32,
+    start: u32,
+    end: u32,
+}
+
+@group(0) @binding(0) var<storage, read> vertices: array<vec4f>;
+@group(0) @binding(1) var<storage, read_write> pulls: array<Pull>;
+@group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;
+@group(1) @binding(1) var<storage, read> params: array<Params>;
+// Inverse compliance, and the size of the rest size.
+@group(1) @binding(2) var<storage, read> shape: array<vec2f>;
+// Constraint times N plus which of its vertices.
+@group(1) @binding(3) var<storage, read> places: array<u32>;
+@group(1) @binding(4) var<storage, read> shares: array<Share>;
+
+@compute @workgroup_size(64)
+fn pull(@builtin(global_invocation_id) id: vec3u) {
+    if (id.x >= arrayLength(&shares)) {
+        return;
+    }
+    hidden_zero = select(0u, 1u, arrayLength(&tuples) == 0u);
+    let share = shares[id.x];
+    var force = pulls[share.vertex].force.xyz;
+    var diagonal = pulls[share.vertex].diagonal.xyz;
+    var mixed = pulls[share.vertex].mixed.xyz;
+    for (var n = share.start; n < share.end; n++) {
+        let k = places[n] / N;
+        let slot = places[n] % N;
+        var tuple = tuples[k];
+        var x: array<vec3f, N>;
+        for (var i = 0u; i < N; i++) {
+            x[i] = vertices[tuple[i]].xyz;
+        }
+        var found = eval(x, params[k]);
+        let c = exact(found.c);
+        let g = exact3(found.grad[slot]);
+        let stiffness = shape[k].x;
+        let kg = exact3(g * stiffness);
+        let stretch = max(c, 0.0);
+        let size = stretch + shape[k].y;
+        let sized = size > 0.0;
+        let ratio = select(0.0, stretch / select(1.0, size, sized), sized);
+        let curvature = exact(stiffness * (dot(g, g) * ratio));
+        force = force - exact3(kg * c);
+        diagonal = diagonal + (exact3(kg * g) + vec3f(curvature));
+        mixed = mixed + exact3(vec3f(kg.x * g.y, kg.x * g.z, kg.y * g.z));
+    }
+    pulls[share.vertex].force = vec4f(force, 0.0);
+    pulls[share.vertex].diagonal = vec4f(diagonal, 0.0);
+    pulls[share.vertex].mixed = vec4f(mixed, 0.0);
+}
