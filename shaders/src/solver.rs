@@ -1,10 +1,10 @@
 //! The passes of the solver: joined for a constraint, a formulation and a way of storing.
 //!
 //! A constraint brings `struct Params` (scalars only) and `fn eval(x: array<vec3f, N>, p: Params) -> Eval`. What a joined
-//! source declares beside it, and a constraint therefore may not: `N`, `Eval`, `hidden_zero`, `exact` and `exact3` (both of
-//! which it may call), `Settings`, `is_finite`,
+//! source declares beside it, and a constraint therefore may not: `N`, `Eval`, `hidden_zero`, `inverse_reach_squared` (which it may
+//! set), `exact` and `exact3` (both of which it may call), `Settings`, `is_finite`,
 //! `quotient_or_zero`, `multiplier_change`, `multiplier_of`, `keep_multiplier`, `stiffness_of`, `vertices`, `settings`,
-//! `tuples`, `params`, `stiffness`, `multipliers`, `points`, `found`, `inverse_rest_size`, `partial`, `sums` and the
+//! `Pull`, `Share`, `pulls`, `shape`, `places`, `shares`, `tuples`, `params`, `stiffness`, `multipliers`, `points`, `found`, `inverse_rest_size`, `partial`, `sums` and the
 //! entry points.
 
 use crate::link;
@@ -45,6 +45,10 @@ pub enum Multiplier {
 
 /// The name of the entry point of [`project`].
 pub const PROJECT: &str = "project";
+/// The name of the entry point of [`pull`].
+pub const PULL: &str = "pull";
+/// The name of the entry point of [`descend`].
+pub const DESCEND: &str = "descend";
 /// The name of the entry point of [`residual`].
 pub const RESIDUAL: &str = "residual";
 /// The name of the entry point of [`evaluate`].
@@ -84,6 +88,16 @@ pub fn project(
     link(&[&head(arity), constraint, SETTINGS, FINITE, QUOTIENT, rule, stiffness, multiplier, project])
 }
 
+/// What the constraints of a kind do to the vertices of a chunk.
+pub fn pull(arity: usize, constraint: &str) -> String {
+    link(&[&head(arity), constraint, include_str!("../wgsl/solver/pull.wgsl")])
+}
+
+/// The steps of the vertices of a chunk of one colour.
+pub fn descend() -> String {
+    link(&[FINITE, include_str!("../wgsl/solver/descend.wgsl")])
+}
+
 /// Sum of squares and largest value over rest size, per workgroup.
 pub fn residual(arity: usize, constraint: &str) -> String {
     link(&[&head(arity), constraint, include_str!("../wgsl/solver/residual.wgsl")])
@@ -94,7 +108,7 @@ pub fn evaluate(arity: usize, constraint: &str) -> String {
     link(&[&head(arity), constraint, include_str!("../wgsl/solver/evaluate.wgsl")])
 }
 
-/// The passes over vertices: `predict`, `finish_and_predict`, `finish`, `check`, `restore`.
+/// The passes over vertices: `predict`, `predict_next`, `finish_and_predict`, `finish`, `check`, `restore`.
 pub fn vertices() -> String {
     link(&[SETTINGS, FINITE, include_str!("../wgsl/solver/vertices.wgsl")])
 }
