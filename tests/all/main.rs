@@ -8,6 +8,7 @@ mod identity;
 mod left_out;
 mod problems;
 mod random_scenes;
+mod region;
 mod resume;
 mod scene_files;
 mod scenes;

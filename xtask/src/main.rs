@@ -1,6 +1,7 @@
 //! Developer commands of the workspace, started by `cargo xtask`: the tests, the checks they consist of, and nothing else.
 
 mod deny;
+mod leaving_out;
 mod mutations;
 mod parity;
 mod publish;
@@ -33,6 +34,7 @@ usage: cargo xtask COMMAND
   mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
                       with a text only those whose description contains it, and nothing is written
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
+  leaving-out         what a region or a graded lattice saves and costs, against the whole body: docs/results/
   publish --dry-run   packages every crate as for crates.io and builds it from the package";
 
 fn main() -> ExitCode {
@@ -66,6 +68,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["mutations"] => mutations::run(&workspace, ""),
         ["mutations", filter] => mutations::run(&workspace, filter),
         ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
+        ["leaving-out"] => steps::build_program(&workspace).and_then(|()| leaving_out::run(&workspace)),
         ["publish", "--dry-run"] => publish::dry_run(&workspace),
         ["publish"] => bail!(
             "only `cargo xtask publish --dry-run` is offered; a release is made by `cargo publish --workspace`"

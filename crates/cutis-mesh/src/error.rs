@@ -134,7 +134,7 @@ pub enum MeshError {
     },
     /// The slit touches vertices of the body that a region froze, or that lie where a graded lattice is coarse.
     #[error(
-        "incision {incision} is not all inside: a vertex of the body at {at_mm:.1?} mm, {distance_mm:.1} mm from the middle of the slit, could be cut by it and lies {}",
+        "incision {incision} is not all inside: a vertex of the body at {at_mm:.1?} mm, {distance_mm:.1} mm from the middle of the slit, is touched by it and lies {}",
         if *coarse { "where the lattice is coarse" } else { "outside the region" }
     )]
     IncisionBeyond {

@@ -6,8 +6,9 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use crate::gape::Gape;
+use crate::neighbors::Neighbors;
 use crate::slit::{Facet, Slit, check_indices};
-use crate::{MeshError, TetMesh};
+use crate::{MeshError, NO_VERTEX, TetMesh};
 
 /// A straight cut along a segment on or near the skin. World millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -181,15 +182,35 @@ impl Cut {
     }
 }
 
-/// Refuses slits that come within `margin` of a vertex of the body that a region froze, or that lies where a lattice is coarse.
+/// Refuses slits that touch a vertex of the body that a region froze, or that lies where a lattice is coarse: a slit touches what
+/// lies in it, what an edge joins with that, and both ends of an edge that it crosses. `margin`: how far from it that can be.
 fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshError> {
     let (lattice, grid) = (&mesh.lattice, mesh.lattice.grid());
-    let refuse = |positions: &mut dyn Iterator<Item = Point3<f32>>, coarse: bool| {
-        let near = positions.flat_map(|position| {
-            let touching = slits.iter().enumerate().filter(move |(_, slit)| slit.near(position, margin));
-            touching.map(move |(incision, slit)| (incision, slit.distance(position), position))
+    let (planes, frozen) = (lattice.planes(), mesh.frozen.as_ref());
+    if slits.is_empty() || (planes.is_none() && frozen.is_none()) {
+        return Ok(());
+    }
+    let around = Neighbors::new(lattice);
+    let (vertex_of, place) =
+        (mesh.vertex_of_point(), |point: usize| mesh.frame.to_local(lattice.mm(grid.point(point))));
+    let is_frozen = |point: usize| frozen.is_some_and(|frozen| frozen.points[point]);
+    let touches = |slit: &Slit, point: usize, position: Point3<f32>| {
+        let mut touched = slit.holds(position);
+        around.of(point, |other| {
+            if vertex_of[other] != NO_VERTEX || is_frozen(other) {
+                touched |= slit.holds(place(other)) || slit.crosses(position, place(other));
+            }
         });
-        match near.max_by(|(_, a, _), (_, b, _)| a.total_cmp(b)) {
+        touched
+    };
+    let refuse = |points: &mut dyn Iterator<Item = usize>, coarse: bool| {
+        let touched = points.flat_map(|point| {
+            let position = place(point);
+            let near = slits.iter().enumerate().filter(move |(_, slit)| slit.near(position, margin));
+            near.filter(move |(_, slit)| touches(slit, point, position))
+                .map(move |(incision, slit)| (incision, slit.distance(position), position))
+        });
+        match touched.max_by(|(_, a, _), (_, b, _)| a.total_cmp(b)) {
             None => Ok(()),
             Some((incision, distance, position)) => Err(MeshError::IncisionBeyond {
                 incision,
@@ -199,15 +220,13 @@ fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshE
             }),
         }
     };
-    if let Some(frozen) = &mesh.frozen {
-        let border = mesh.positions.iter().zip(&frozen.border).filter(|(_, border)| **border);
-        let beyond = frozen.points.iter().enumerate().filter(|(_, frozen)| **frozen);
-        let beyond = beyond.map(|(point, _)| mesh.frame.to_local(lattice.mm(grid.point(point))));
-        refuse(&mut border.map(|(position, _)| *position).chain(beyond), false)?;
+    let vertices = || mesh.lattice_index.iter().map(|&point| point as usize);
+    if let Some(frozen) = frozen {
+        let border = vertices().zip(&frozen.border).filter(|(_, border)| **border).map(|(point, _)| point);
+        refuse(&mut border.chain((0..grid.len()).filter(|&point| frozen.points[point])), false)?;
     }
-    if let Some(planes) = lattice.planes() {
-        let coarse = |vertex: &usize| !planes.is_fine(mesh.point(*vertex as u32));
-        refuse(&mut (0..mesh.positions.len()).filter(coarse).map(|vertex| mesh.positions[vertex]), true)?;
+    if let Some(planes) = planes {
+        refuse(&mut vertices().filter(|&point| !planes.is_fine(grid.point(point))), true)?;
     }
     Ok(())
 }

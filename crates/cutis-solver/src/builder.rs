@@ -31,6 +31,26 @@ impl<T: Scalar> SystemBuilder<T> {
         positions: &[Point3<S>],
         inverse_masses: &[M],
     ) -> Result<Self, SolverError> {
+        Self::about(origin_of(positions), positions, inverse_masses)
+    }
+
+    /// As [`new`](Self::new), but the body stays where it is, however far that may be. For a part of a body: it is
+    /// stepped with the same bits as in the whole one, and a saved state can be gone on from with the same bits.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn in_place<S: Scalar, M: Scalar>(
+        positions: &[Point3<S>],
+        inverse_masses: &[M],
+    ) -> Result<Self, SolverError> {
+        Self::about(Vector3::zeros(), positions, inverse_masses)
+    }
+
+    fn about<S: Scalar, M: Scalar>(
+        origin: Vector3<f64>,
+        positions: &[Point3<S>],
+        inverse_masses: &[M],
+    ) -> Result<Self, SolverError> {
         let count = positions.len();
         if u32::try_from(count).is_err() {
             return Err(SolverError::TooMany { what: "vertices", count });
@@ -48,7 +68,7 @@ impl<T: Scalar> SystemBuilder<T> {
                 }
             }
         }
-        let origin: Vector3<T> = origin_of(positions).map(T::constant);
+        let origin: Vector3<T> = origin.map(T::constant);
         let shift = origin.map(T::to_f64);
         let mut vertices = Vec::with_capacity(count);
         for (vertex, (position, inverse_mass)) in positions.iter().zip(inverse_masses).enumerate() {

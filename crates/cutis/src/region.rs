@@ -9,9 +9,6 @@ use crate::body::Body;
 use crate::report::MemoryPart;
 use crate::scene::{HandleSection, LoadedScene, Scene, Zone};
 
-/// Share of the largest displacement that may arrive where a region ends before a run says so.
-const MOST_AT_BORDER: f64 = 0.1;
-
 /// The lattice of a scene, even or graded.
 pub(crate) fn lattice(loaded: &LoadedScene, volume: &Volume) -> Result<Lattice, Error> {
     let section = &loaded.scene.lattice;
@@ -212,15 +209,6 @@ pub(crate) fn left_out(body: &Body, memory: &[MemoryPart], lines: &mut Vec<Strin
 pub(crate) fn idle(body: &Body) -> Option<String> {
     let frozen = body.mesh.frozen.as_ref()?;
     (frozen.tets == 0).then(|| "lattice.region holds the whole body: it leaves nothing out".to_owned())
-}
-
-/// Says so if so much of the motion arrives at the border that a larger region would move otherwise.
-pub(crate) fn too_small(border_mm: Option<f64>, largest_mm: f64) -> Option<String> {
-    let border = border_mm.filter(|&border| border > MOST_AT_BORDER * largest_mm)?;
-    Some(format!(
-        "lattice.region is small: where it ends, tissue moves by up to {border:.2} mm (of {largest_mm:.2} mm at most anywhere); \
-         a larger region would let it move further"
-    ))
 }
 
 fn key(loaded: &LoadedScene, key: &str, value: &str, why: &str) -> Error {

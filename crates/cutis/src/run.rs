@@ -13,7 +13,7 @@ use crate::output::{self, Outcome};
 use crate::plan::{self, Prepared};
 use crate::report::{KindResidual, Machine, Report, SCHEMA, Wound};
 use crate::scene::LoadedScene;
-use crate::{Error, Progress, files, region};
+use crate::{Error, Progress, files};
 
 /// How to run a scene.
 #[derive(Clone, Debug)]
@@ -127,7 +127,6 @@ fn run_with(
     let moved = rest.iter().zip(&deformed).map(|(a, b)| f64::from((b - a).norm()) * 1e3);
     let max_displacement_mm = moved.fold(0.0, f64::max);
     let border_displacement_mm = body.border_displacement_mm(&deformed);
-    plan.warnings.extend(region::too_small(border_displacement_mm, max_displacement_mm));
     let report = Report {
         schema: SCHEMA.into(),
         cutis_version: env!("CARGO_PKG_VERSION").into(),
