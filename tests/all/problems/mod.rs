@@ -3,14 +3,17 @@
 
 mod affine_patch;
 mod beam;
+mod energy_decay;
 mod free_body;
 mod hanging_bar;
 mod incompressible_block;
 mod oscillator;
 mod sheet_moduli;
+mod wound_equilibrium;
 mod wound_gape;
 
 use cutis_constraints::Scalar;
+use cutis_gpu::{Gpu, GpuOptions, Select};
 use cutis_solver::Solver;
 use nalgebra::Point3;
 
@@ -36,4 +39,18 @@ fn within(found: f64, expected: f64, tolerance: f64) -> Result<(), String> {
 /// Fails unless `found` is at most `bound`.
 fn at_most(what: &str, found: f64, bound: f64) -> Result<(), String> {
     if found <= bound { Ok(()) } else { Err(format!("{what} is {found:e}, above {bound:e}")) }
+}
+
+/// Runs `test` on each GPU adapter of the machine. Without one the test is left out with a word, or fails where one is required.
+fn on_each_adapter(mut test: impl FnMut(&Gpu)) {
+    let adapters = cutis_gpu::adapters();
+    if adapters.is_empty() {
+        let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
+        assert!(!required, "this test needs a GPU adapter; a software one is enough");
+        eprintln!("left out: there is no GPU adapter");
+    }
+    for adapter in adapters {
+        let options = GpuOptions { select: Select::Index(adapter.index), ..GpuOptions::default() };
+        test(&Gpu::open(&options).unwrap());
+    }
 }
