@@ -1,6 +1,7 @@
 //! Scenes shared by tests and benches, and what is measured: the comparison of the backends, error against run time.
 
 pub mod accuracy;
+pub mod cantilever;
 #[path = "../../crates/cutis-solver-cpu/tests/lattice/mod.rs"]
 pub mod lattice;
 pub mod parity;

@@ -3,6 +3,7 @@
 
 mod affine_patch;
 mod beam;
+mod cantilever;
 mod energy_decay;
 mod free_body;
 mod hanging_bar;

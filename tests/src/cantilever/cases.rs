@@ -1,0 +1,79 @@
+//! Which beams bend how far, and the settings of real time that are tried on them.
+
+use cutis_solver::Formulation;
+use serde::Serialize;
+
+use super::{Material, Way};
+
+/// Density of soft tissue, kg/m³.
+const DENSITY_KG_M3: f64 = 1000.0;
+
+/// A beam and its material.
+#[derive(Clone, Debug, Serialize)]
+pub struct Case {
+    /// Name in tables.
+    pub name: String,
+    /// Cells in 10 mm.
+    pub refinement: usize,
+    /// What it is made of.
+    pub material: Material,
+    /// Whether it stands for its mesh in the controls.
+    pub with_controls: bool,
+}
+
+/// Sag aimed at in percent of the length, `E` for it at `K = E`, and at `K = 10 E`.
+const SAGS: [(u32, [f64; 2]); 3] = [(1, [1.5e7, 7e6]), (10, [1.5e6, 7.5e5]), (30, [5e5, 2.7e5])];
+
+impl Case {
+    fn new(refinement: usize, sag: u32, youngs_pa: f64, ratio: f64) -> Self {
+        Self {
+            name: format!("{} cells, K = {ratio} E, {sag} %", 20 * refinement),
+            refinement,
+            material: Material { youngs_pa, bulk_pa: ratio * youngs_pa, density_kg_m3: DENSITY_KG_M3 },
+            with_controls: refinement == 1 && sag == 10 && ratio == 1.0,
+        }
+    }
+
+    /// All cases; a few for every day with `quick`.
+    pub fn all(quick: bool) -> Vec<Self> {
+        let mut cases = Vec::new();
+        for refinement in [1, 2] {
+            for (sag, moduli) in SAGS {
+                for (youngs_pa, ratio) in moduli.into_iter().zip([1.0, 10.0]) {
+                    // Of the fine mesh one sag will do, of every day's also of the coarse one.
+                    if sag == 10 || (refinement == 1 && !quick) {
+                        cases.push(Self::new(refinement, sag, youngs_pa, ratio));
+                    }
+                }
+            }
+        }
+        cases.retain(|case| !quick || case.refinement == 1);
+        cases
+    }
+
+    /// Cells of the beam.
+    pub fn cells(&self) -> [usize; 3] {
+        [20, 5, 5].map(|n| n * self.refinement)
+    }
+
+    /// The time in which a wave crosses a cell.
+    pub fn crossing_s(&self, length_m: f64) -> f64 {
+        let Material { youngs_pa, bulk_pa, density_kg_m3 } = self.material;
+        length_m / self.cells()[0] as f64 * (density_kg_m3 / youngs_pa.max(bulk_pa)).sqrt()
+    }
+}
+
+/// Frames of 1/60 s: XPBD with 1 to 50 substeps of 1 to 5 iterations, vertex block descent, PBD with stiffness 1.
+pub fn real_time(damping_per_s: f64) -> Vec<Way> {
+    let way = |formulation, substeps, iterations| Way {
+        formulation,
+        dt_s: 1.0 / 60.0,
+        substeps,
+        iterations,
+        damping_per_s,
+    };
+    let xpbd = [1, 5, 10, 20, 50].into_iter().flat_map(|s| [1, 2, 5].map(|i| way(Formulation::Xpbd, s, i)));
+    let vbd = [(1, 5), (1, 20), (5, 5), (10, 2)].map(|(s, i)| way(Formulation::Vbd, s, i));
+    let pbd = [1, 10].map(|substeps| way(Formulation::Pbd, substeps, 5));
+    xpbd.chain(vbd).chain(pbd).collect()
+}
