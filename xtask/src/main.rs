@@ -25,7 +25,8 @@ usage: cargo xtask COMMAND
   ci                  the same with CI=true: nothing may be skipped, the lock files must be up to date
   tidy                layers, file headers, unsafe, shaders, paths named in the docs, links, manifests
   licences            licences, bans and sources of every dependency, by deny.toml
-  python              outputs and awkward inputs compared with nibabel and SimpleITK
+  python              outputs and awkward inputs compared with nibabel and SimpleITK, a bent beam with scikit-fem
+  cantilever          a bent beam at rest and in real time compared with scikit-fem: docs/results/cantilever.md
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
                       lists the options, and the exit code is that of the comparison
   parity-page         the same three ways, as it is, in small chunks and at full size: docs/results/parity.md
@@ -57,7 +58,8 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["ci"] => steps::run_all(&workspace.in_ci(), false),
         ["tidy"] => tidy::run(&workspace),
         ["licences"] => deny::run(&workspace),
-        ["python"] => steps::build_program(&workspace).and_then(|()| python::run(&workspace)),
+        ["python"] => steps::build_for_python(&workspace).and_then(|()| python::run(&workspace)),
+        ["cantilever"] => steps::cantilever(&workspace),
         ["parity", arguments @ ..] => {
             return workspace::exit_code(&mut steps::parity_command(&workspace, arguments));
         }

@@ -1,21 +1,26 @@
 //! `cargo xtask python`: runs the checks of `tests/python` in a private environment with pinned packages.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
 use crate::workspace::{Workspace, execute};
 
-/// Prepares the environment (again only if its requirements changed) and runs every check.
+/// Runs every check.
 pub fn run(workspace: &Workspace) -> Result<()> {
-    let target = workspace.target_dir()?;
-    let python = environment(workspace, &target.join("venv"))?;
-    let program = workspace.program()?;
     for script in scripts(&workspace.root.join("tests/python"))? {
-        let mut command = workspace.command(&python);
-        execute(command.arg(&script).env("CUTIS_PROGRAM", &program).env("PYTHONDONTWRITEBYTECODE", "1"))?;
+        execute(check(workspace, &script)?.env("CUTIS_PROGRAM", workspace.program()?))?;
     }
     Ok(())
+}
+
+/// One check, in the environment, which is made again only if its requirements changed.
+pub fn check(workspace: &Workspace, script: &Path) -> Result<Command> {
+    let python = environment(workspace, &workspace.target_dir()?.join("venv"))?;
+    let mut command = workspace.command(&python);
+    command.arg(script).env("CUTIS_CANTILEVER", workspace.cantilever()?).env("PYTHONDONTWRITEBYTECODE", "1");
+    Ok(command)
 }
 
 /// The checks: every `*.py` in order of name, but for `_*.py`, which the checks share.
@@ -99,7 +104,7 @@ mod tests {
             .iter()
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
-        assert_eq!(names, ["awkward.py", "outputs.py"]);
+        assert_eq!(names, ["awkward.py", "cantilever.py", "outputs.py"]);
     }
 
     #[test]

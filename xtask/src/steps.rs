@@ -165,7 +165,24 @@ fn documentation(workspace: &Workspace) -> Result<()> {
     execute(command.args(["--workspace", "--lib", "--no-deps", "--quiet"]).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Builds the release program, which the Python checks run.
+/// Builds what the Python checks run: the release program, and the one that bends beams.
+pub fn build_for_python(workspace: &Workspace) -> Result<()> {
+    build_program(workspace)?;
+    build_cantilever(workspace)
+}
+
+fn build_cantilever(workspace: &Workspace) -> Result<()> {
+    execute(workspace.cargo("build").args(["--package", "cutis-tests", "--bin", "cantilever"]))
+}
+
+/// Beams bent by the solver and by an independent FEM, all of them: writes `docs/results/cantilever.md` and its table.
+pub fn cantilever(workspace: &Workspace) -> Result<()> {
+    build_cantilever(workspace)?;
+    let mut command = python::check(workspace, &workspace.root.join("tests/python/cantilever.py"))?;
+    execute(vulkan::for_gpu_tests(command.args(["--page", "docs/results"])))
+}
+
+/// Builds the release program.
 pub fn build_program(workspace: &Workspace) -> Result<()> {
     execute(workspace.cargo("build").args(["--release", "--package", "cutis-cli"]))
 }

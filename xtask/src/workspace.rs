@@ -105,6 +105,11 @@ impl Workspace {
         self.built("debug/parity", "cargo test --workspace --no-run")
     }
 
+    /// The program that bends beams for the independent FEM, as the tests of the workspace leave it behind.
+    pub fn cantilever(&self) -> Result<PathBuf> {
+        self.built("debug/cantilever", "cargo build -p cutis-tests --bin cantilever")
+    }
+
     /// A program in the folder of builds; if it is missing, the error names the command that builds it.
     fn built(&self, path: &str, build: &str) -> Result<PathBuf> {
         let program = self.target_dir()?.join(format!("{path}{}", std::env::consts::EXE_SUFFIX));

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Parser;
 use cutis::report::Machine;
@@ -74,7 +73,6 @@ struct Newton {
     gradient: f64,
     iterations: usize,
     energy_j: f64,
-    wall_s: f64,
 }
 
 /// A run of the solver.
@@ -86,8 +84,6 @@ struct Run {
     /// Where it ended, or none if its numbers exploded.
     rest: Option<Rest>,
     error: Option<String>,
-    /// Of the whole run.
-    wall_s: f64,
 }
 
 impl Document {
@@ -128,9 +124,7 @@ fn device() -> Result<Option<Gpu>, GpuError> {
 
 impl Answers {
     fn of(case: Case, beam: &Beam, gpu: Option<&Gpu>, quick: bool) -> Result<Self, Failure> {
-        let start = Instant::now();
         let minimum = beam.equilibrium(&case.material, GRAVITY_M_S2)?;
-        let wall_s = start.elapsed().as_secs_f64();
         let displacement = beam.end_displacement(&minimum.positions);
         let sag_m = -displacement.y * beam.length_m;
         let crossing_s = case.crossing_s(beam.length_m);
@@ -154,7 +148,6 @@ impl Answers {
                 gradient: minimum.gradient,
                 iterations: minimum.iterations,
                 energy_j: minimum.energy_j,
-                wall_s,
             },
             converged: runs,
             real_time: real_time.collect::<Result<_, _>>()?,
@@ -208,9 +201,7 @@ fn run<T: cutis_constraints::Scalar>(
     way: Way,
     still: f64,
 ) -> Run {
-    let start = Instant::now();
     let found = settle(&mut solver, beam, still, MOST_S);
-    let wall_s = start.elapsed().as_secs_f64();
     let error = found.as_ref().err().map(ToString::to_string);
-    Run { backend, precision, way, rest: found.ok(), error, wall_s }
+    Run { backend, precision, way, rest: found.ok(), error }
 }
