@@ -1,6 +1,9 @@
 //! Starts from which plain Newton would not come home: compressed, turned inside out, balanced, loose.
 
+use cutis_coloring::greedy;
+use cutis_constraints::{Constraint, Distance, Eval, Real};
 use cutis_newton::{NewtonError, Options, Problem};
+use cutis_solver::{Stiffness, SystemBuilder};
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::blocks::{hanging, shaken, skinned};
@@ -78,6 +81,46 @@ fn a_body_on_a_hinge_has_no_definite_minimum() {
     let problem = Problem::of(&system, [0.0; 3]).unwrap();
     let floating = problem.equilibrium(&corners, &Options::default()).unwrap_err();
     assert_eq!(floating, NewtonError::Floating { vertex: 0, vertices: 3 });
+}
+
+/// A vertex keeps its distance from a point of space: the part of a spring whose other end is no vertex.
+struct Tether;
+
+impl Constraint<1> for Tether {
+    const NAME: &'static str = "tether";
+    const WGSL: &'static str = "";
+    type Params<T: Real> = [T; 4];
+    type Material = ();
+    fn from_rest<T: Real>(_: &[Point3<T>; 1], _: &()) -> [T; 4] {
+        [T::zero(); 4]
+    }
+    fn eval<T: Real>([x]: &[Point3<T>; 1], &[px, py, pz, length]: &[T; 4]) -> Eval<T, 1> {
+        let way = x - Point3::new(px, py, pz);
+        let norm = way.dot(&way).simd_sqrt();
+        Eval { c: norm - length, grad: [way * (T::one() / norm)] }
+    }
+    fn rest_size<T: Real>(&[_, _, _, length]: &[T; 4]) -> T {
+        length
+    }
+}
+
+/// No vertex is held, but a constraint ties the body to a place: it hangs there, and is not called floating.
+#[test]
+fn what_a_constraint_ties_to_a_place_has_an_equilibrium() {
+    let start = [Point3::new(0.8, 0.0, 0.1), Point3::new(1.5, 0.0, -0.5)];
+    let one = greedy(&[[0]], 2).unwrap();
+    let system = SystemBuilder::<f64>::new(&start, &[1.0, 1.0])
+        .unwrap()
+        .add::<Tether, 1>(&[[0]], &[[0.0, 0.0, 0.0, 1.0]], Stiffness::compliance(0.1), &one)
+        .unwrap()
+        .add::<Distance, 2>(&[[0, 1]], &[[1.0]], Stiffness::compliance(0.1), &greedy(&[[0, 1]], 2).unwrap())
+        .unwrap()
+        .build();
+    let problem = Problem::of(&system, [0.0, 0.0, -1.0]).unwrap();
+    let rest = problem.equilibrium(&start, &Options::default()).unwrap();
+    near("upper", rest.positions[0].z, -1.2, 1.0, 1e-12).unwrap();
+    near("lower", rest.positions[1].z, -2.3, 1.0, 1e-12).unwrap();
+    assert!(rest.definite && problem.check_derivatives(&start, 5).unwrap().hessian < 1e-7);
 }
 
 /// Turning and moving a problem as a whole turns and moves its answer; a million body sizes from the origin costs six digits.
