@@ -117,7 +117,7 @@ def convergence(found):
 
 
 def real_time(found):
-    text = "## The solver in real time\n\nFrames of 1/60 s on the CPU in `f32`, damped until the beam hangs still (or 10 s are over: *no* " \
+    text = "## The solver in real time\n\nFrames of 1/60 s on the CPU in `f32`, damped until the beam hangs still (or 5 s are over: *no* " \
            "in the last column).\n"
     best, few = [], []
     for case in found["cases"]:
