@@ -16,7 +16,9 @@ fn growth(run: &Run) -> f64 {
 }
 
 fn small(set: &[(&str, &str)]) -> Run {
-    let common = [FINER, ("run.frames", "20"), ("output", "{ report = true }")];
+    // Of a tension that the substeps can follow: a graded lattice changes how fast the skin swings, and so what is lost of more.
+    let modulus = ("constraints.stc.area_modulus_n_per_m", "5");
+    let common = [FINER, modulus, ("run.frames", "20"), ("output", "{ report = true }")];
     Run::of(&scene(SMALL, &[&common, set].concat()))
 }
 
@@ -97,7 +99,7 @@ fn the_opening_tends_to_that_of_the_whole_body() {
     assert!(at_border.iter().zip(largest).all(|(&at_border, most)| at_border > 0.0 && at_border <= most));
 
     let graded = small(&[(GRADING, "{ around_mm = 30 }")]);
-    assert!((growth(&graded) / growth(&whole) - 1.0).abs() < 0.15, "{} {}", growth(&graded), growth(&whole));
+    assert!((growth(&graded) / growth(&whole) - 1.0).abs() < 0.1, "{} {}", growth(&graded), growth(&whole));
     assert_ne!(gapes(&graded), gapes(&whole));
 }
 

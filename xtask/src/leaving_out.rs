@@ -76,7 +76,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
 fn simulate(workspace: &Workspace, scene: &str, set: &[String], out: &Path) -> Result<Value> {
     let mut command = workspace.command(workspace.program()?);
     command.arg("run").arg(format!("fixtures/scenes/{scene}.toml")).arg("--out").arg(out);
-    set.iter().for_each(|change| drop(command.arg("--set").arg(change)));
+    command.args(set.iter().flat_map(|change| ["--set", change]));
     let output = command.output().context("cannot start the program")?;
     if !output.status.success() {
         bail!("{scene} failed: {}", String::from_utf8_lossy(&output.stderr).trim());

@@ -51,7 +51,9 @@ fn fine_zone(scene: &Scene, zone: Zone, even: &Grid) -> [[f64; 2]; 3] {
         }
         Zone::Around(around) => {
             for incision in &scene.incision {
-                [incision.from_mm, incision.to_mm].map(|end| add(end, around + incision.depth_mm));
+                for end in [incision.from_mm, incision.to_mm] {
+                    add(end, around + incision.depth_mm);
+                }
             }
             scene.handle.iter().for_each(|handle| add(handle.at_mm, around + handle.radius_mm));
         }

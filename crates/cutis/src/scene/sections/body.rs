@@ -52,16 +52,17 @@ pub struct LatticeSection {
     /// How a cell is split into tetrahedra.
     #[serde(default)]
     pub split: SplitChoice,
-    /// Simulate a part of the body only. Left out: all of it.
+    /// The part of the body that is simulated: `around_mm`, or a box. What lies beyond stays where it is and takes neither time
+    /// nor memory of the solver. Skin and largest part are found on the whole body before. Left out: the whole body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<RegionSection>,
-    /// Make the cells larger away from a fine zone. Left out: all have the same size.
+    /// A fine zone, `around_mm` or a box, in which the lattice is as it would be without this section. Beside it the planes of
+    /// vertices lie further and further apart along each axis. Left out: all cells have the same size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grading: Option<GradingSection>,
 }
 
-/// The part of the body that is simulated: `around_mm`, or a box. What lies beyond stays where it is; it takes neither
-/// time nor memory of the solver. Skin and largest part are found on the whole body before.
+/// The part of the body that is simulated: `around_mm`, or a box.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionSection {
@@ -76,8 +77,7 @@ pub struct RegionSection {
     pub max_mm: Option<[f64; 3]>,
 }
 
-/// A fine zone, `around_mm` or a box, in which the lattice is as it would be without grading. Beside it the planes of vertices
-/// lie further and further apart along each axis, so that the zone's steps go on along the other axes.
+/// A fine zone, `around_mm` or a box, and how the lattice gets coarser beside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GradingSection {
