@@ -138,6 +138,11 @@ impl<C: Constraint<N>, A: Choice, const N: usize> Constraint<N> for Altered<C, A
         A::ALTERATION.apply(C::eval(x, params))
     }
 
+    #[inline(always)]
+    fn inverse_reach_squared<T: Real>(x: &[Point3<T>; N], params: &C::Params<T>) -> Option<T> {
+        C::inverse_reach_squared(x, params)
+    }
+
     fn rest_size<T: Real>(params: &C::Params<T>) -> T {
         C::rest_size(params)
     }

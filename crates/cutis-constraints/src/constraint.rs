@@ -84,6 +84,8 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 /// in both languages, or put the terms through `exact` (a scalar) or `exact3` (a vector), which return what they are given and
 /// which no optimiser sees through. The battery of the crate `cutis-conformance` holds one against the other.
 ///
+/// A constraint with an [`inverse_reach_squared`](Constraint::inverse_reach_squared) sets the private variable of that name in `eval`.
+///
 /// # Example
 /// A constraint of one's own: a point that should stay on the plane `z = height`.
 /// ```
@@ -128,6 +130,16 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;
     /// `C` and `∇C` at `x` (positions in metres).
     fn eval<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Eval<T, N>;
+    /// `1/r²` in 1/m², where `r` is the longest way on which a projection follows the gradient at `x`; none for no limit.
+    ///
+    /// A projection goes where the tangent of `C` meets zero. If the gradient of a collapsed element is tiny, that is far
+    /// outside of the element, where the tangent says nothing. `r` is some times the larger of the element's present and rest
+    /// size: it never acts on an element that has not lost its shape, and where it acts, steps get as small as the gradient.
+    /// A constraint that is linear along its gradient, such as a length, needs none.
+    fn inverse_reach_squared<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Option<T> {
+        let _ = (x, params);
+        None
+    }
     /// The size that `C` is compared with in residuals: rest length (m), rest area (m²), rest volume (m³). Zero stands for a
     /// rest shape without size, from which `SystemBuilder` takes no parameters.
     fn rest_size<T: Real>(params: &Self::Params<T>) -> T;

@@ -89,6 +89,11 @@ impl Constraint<3> for SkinTension {
         Eval { c: c * q, grad: grad.map(|g| g * slope) }
     }
 
+    #[inline(always)]
+    fn inverse_reach_squared<T: Real>(x: &[Point3<T>; 3], &[rest_area, _]: &[T; 2]) -> Option<T> {
+        Some(triangle::inverse_reach_squared(x, rest_area))
+    }
+
     fn rest_size<T: Real>(&[rest_area, _]: &[T; 2]) -> T {
         rest_area
     }

@@ -89,6 +89,12 @@ impl Constraint<3> for SkinTensionPaper {
         Eval { c: c * amplified.select(amplified.simd_lt(most), most), grad }
     }
 
+    /// As in [`SkinTension`](crate::SkinTension), longer by the largest amplification, which is in the value that is returned.
+    #[inline(always)]
+    fn inverse_reach_squared<T: Real>(x: &[Point3<T>; 3], &[rest_area, _, most]: &[T; 3]) -> Option<T> {
+        Some(triangle::inverse_reach_squared(x, rest_area) / (most * most).simd_max(T::one()))
+    }
+
     fn rest_size<T: Real>(&[rest_area, _, _]: &[T; 3]) -> T {
         rest_area
     }

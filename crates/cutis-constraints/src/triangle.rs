@@ -33,3 +33,12 @@ pub(crate) fn area_and_gradient<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> (T, [
     let grad3 = half_normal.cross(&e2);
     (n_length * half, [-(grad2 + grad3), grad2, grad3])
 }
+
+/// `1/r²` with `r² = 16 max(e², A0)` and `e` the longer edge at the first vertex: four times the present or the rest size.
+#[inline(always)]
+pub(crate) fn inverse_reach_squared<T: Real>([x1, x2, x3]: &[Point3<T>; 3], rest_area: T) -> T {
+    let (e2, e3) = (x2 - x1, x3 - x1);
+    let size_squared = e2.dot(&e2).simd_max(e3.dot(&e3)).simd_max(rest_area);
+    let inverse = T::constant(1.0 / 16.0) / size_squared;
+    inverse.select(size_squared.simd_gt(T::zero()), T::zero())
+}

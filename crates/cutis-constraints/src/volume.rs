@@ -75,6 +75,21 @@ impl Constraint<4> for Volume {
         Eval { c: volume - rest_volume, grad }
     }
 
+    /// `r² = 16 max(e², √(V0 e))` with `e` the longest edge at the first vertex: four times the present size, or the rest size
+    /// (taken nearer to the present one, which spares a third root).
+    #[inline(always)]
+    fn inverse_reach_squared<T: Real>(
+        [x1, x2, x3, x4]: &[Point3<T>; 4],
+        &[rest_volume]: &[T; 1],
+    ) -> Option<T> {
+        let (a, b, c) = (x2 - x1, x3 - x1, x4 - x1);
+        let edge_squared = a.dot(&a).simd_max(b.dot(&b)).simd_max(c.dot(&c));
+        let rest_squared = (rest_volume.simd_abs() * edge_squared.simd_sqrt()).simd_sqrt();
+        let size_squared = edge_squared.simd_max(rest_squared);
+        let inverse = T::constant(1.0 / 16.0) / size_squared;
+        Some(inverse.select(size_squared.simd_gt(T::zero()), T::zero()))
+    }
+
     fn rest_size<T: Real>(&[rest_volume]: &[T; 1]) -> T {
         rest_volume.simd_abs()
     }

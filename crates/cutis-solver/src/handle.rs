@@ -39,8 +39,9 @@ impl<T: Scalar> Carried<T> {
         taken: &mut HashSet<u32>,
     ) -> Result<Self, SolverError> {
         for value in handle.move_m {
-            if !value.is_finite() {
-                let (key, expected) = ("handle move_m", "three finite numbers");
+            if !T::constant(value).is_finite() {
+                let (key, expected) =
+                    ("handle move_m", "three numbers that are finite in the solver's precision");
                 return Err(SolverError::Setting { key, value, expected });
             }
         }

@@ -46,6 +46,15 @@ fn quotient_or_zero<T: Real>(numerator: T, denominator: T) -> T {
     quotient.select(finite, T::zero())
 }
 
+/// The least `Σ w|∇C|²` with which no vertex is moved farther than the reach `r`: `w C²/r²`, with the lightest vertex's `w`.
+///
+/// For with any larger `D ≥ Σ w|∇C|²` a vertex moves by `w_i|∇_iC||C|/D ≤ √w_i·|C|/√D ≤ r`.
+#[inline(always)]
+fn least_square<T: Real, const N: usize>(w: &[T; N], c: T, inverse_reach_squared: T) -> T {
+    let lightest = w.iter().fold(convert(0.0), |most: T, &w| most.simd_max(w));
+    lightest * (c * inverse_reach_squared * c)
+}
+
 /// What one projection does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection<T, const N: usize> {
@@ -71,6 +80,9 @@ pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
     let mut weighted_square: T = convert(0.0);
     for i in 0..N {
         weighted_square += w[i] * eval.grad[i].dot(&eval.grad[i]);
+    }
+    if let Some(inverse_reach_squared) = C::inverse_reach_squared(x, params) {
+        weighted_square = weighted_square.simd_max(least_square(w, eval.c, inverse_reach_squared));
     }
     let multiplier = rule.multiplier(eval.c, weighted_square, stiffness, multiplier);
     Projection { corrections: std::array::from_fn(|i| eval.grad[i] * (w[i] * multiplier)), multiplier }

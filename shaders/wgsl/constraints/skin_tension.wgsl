@@ -5,6 +5,7 @@ struct Params {
 }
 
 fn eval(x: array<vec3f, N>, p: Params) -> Eval {
+    inverse_reach_squared = inverse_reach_squared_of(x, p.rest_area);
     var triangle = area_and_gradient(x);
     let c = triangle.area - p.rest_area;
     let q = sqrt(1.0 + ((2.0 / 3.0) * p.amplification) * stretch(c, p.rest_area));

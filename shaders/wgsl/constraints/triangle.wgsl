@@ -25,3 +25,12 @@ fn stretch(c: f32, rest_area: f32) -> f32 {
     let stretched = c > 0.0 && rest_area > 0.0;
     return select(0.0, c / select(1.0, rest_area, stretched), stretched);
 }
+
+// 1/r², as far as a projection follows the gradient. The twin of `triangle::inverse_reach_squared`.
+fn inverse_reach_squared_of(x: array<vec3f, N>, rest_area: f32) -> f32 {
+    let e2 = x[1] - x[0];
+    let e3 = x[2] - x[0];
+    let size_squared = max(max(dot(e2, e2), dot(e3, e3)), rest_area);
+    let has_size = size_squared > 0.0;
+    return select(0.0, (1.0 / 16.0) / select(1.0, size_squared, has_size), has_size);
+}

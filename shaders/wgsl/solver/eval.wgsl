@@ -4,6 +4,9 @@ struct Eval {
     grad: array<vec3f, N>,
 }
 
+// 1/r² with the longest way r on which a projection follows the gradient; an `eval` may set it. Zero: no limit.
+var<private> inverse_reach_squared: f32;
+
 // Zero, and no compiler can know: entry points set it to whether there are no constraints at all.
 var<private> hidden_zero: u32;
 

@@ -27,6 +27,11 @@ fn project(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < N; i++) {
         weighted_square = weighted_square + w[i] * dot(found.grad[i], found.grad[i]);
     }
+    var lightest = 0.0;
+    for (var i = 0u; i < N; i++) {
+        lightest = max(lightest, w[i]);
+    }
+    weighted_square = max(weighted_square, lightest * (found.c * inverse_reach_squared * found.c));
     let multiplier = multiplier_of(k);
     let change = multiplier_change(found.c, weighted_square, stiffness_of(k), multiplier);
     keep_multiplier(k, multiplier + change);
