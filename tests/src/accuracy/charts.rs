@@ -24,7 +24,7 @@ pub fn chart(problem: &str, rows: &[Row], measure: Measure) -> Option<String> {
     for ((other, family, substeps), mut points) in lines {
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let name = if other { family } else { format!("{family}, {substeps} × n") };
-        named.push((name, points, Mark::Dots));
+        named.push((name, points, if other { Mark::Rings } else { Mark::Dots }));
     }
     let series: Vec<Series<'_>> =
         named.iter().map(|(name, points, mark)| Series { name, points, mark: *mark }).collect();

@@ -58,7 +58,8 @@ pub fn of_problem(case: &Case, yardstick: &Yardstick, rows: &[Row]) -> Result<Ve
     );
 
     // Controls: the measures must see a wrong answer.
-    let fine = Config { backend: Backend::CpuDouble, method: XPBD, substeps: 10, iterations: 64 };
+    let fine =
+        Config { backend: Backend::CpuDouble, method: XPBD, substeps: 10, iterations: 64, settles: false };
     let found = substep(case, &fine, &yardstick.states[0])?;
     let [start, wrong] = yardstick.step_of(0, fine.substeps, 1.1)?;
     let error = yardstick.error(&found, &wrong, &start);

@@ -75,20 +75,35 @@ pub struct Method {
     pub variant: &'static str,
     /// Chooses it.
     pub apply: fn(&mut Settings),
+    /// So many times fewer sweeps are tried, because one takes longer or brings more.
+    pub weight: u32,
 }
 
 /// What the others have to beat.
-pub const XPBD: Method =
-    Method { formulation: "xpbd", variant: "", apply: |settings| settings.formulation = Formulation::Xpbd };
+pub const XPBD: Method = Method {
+    formulation: "xpbd",
+    variant: "",
+    apply: |settings| settings.formulation = Formulation::Xpbd,
+    weight: 1,
+};
 
 /// Without a material.
-pub const PBD: Method =
-    Method { formulation: "pbd", variant: "", apply: |settings| settings.formulation = Formulation::Pbd };
+pub const PBD: Method = Method {
+    formulation: "pbd",
+    variant: "",
+    apply: |settings| settings.formulation = Formulation::Pbd,
+    weight: 1,
+};
 
 /// The methods that solve for the material's answer.
 pub const METHODS: &[Method] = &[
     XPBD,
-    Method { formulation: "vbd", variant: "", apply: |settings| settings.formulation = Formulation::Vbd },
+    Method {
+        formulation: "vbd",
+        variant: "",
+        apply: |settings| settings.formulation = Formulation::Vbd,
+        weight: 2,
+    },
     Method {
         formulation: "vbd",
         variant: "ω 1.7",
@@ -96,6 +111,7 @@ pub const METHODS: &[Method] = &[
             settings.formulation = Formulation::Vbd;
             settings.relaxation = 1.7;
         },
+        weight: 2,
     },
 ];
 
@@ -110,6 +126,8 @@ pub struct Config {
     pub substeps: u32,
     /// Of one substep.
     pub iterations: u32,
+    /// Whether it is run until the body has settled; else as far as the trajectory is compared.
+    pub settles: bool,
 }
 
 impl Config {
@@ -135,10 +153,5 @@ impl Config {
             true => Ok(&case.xpbd),
             false => Ok(case.pbd.as_ref().ok_or("this problem has no PBD stiffness")?),
         }
-    }
-
-    /// Sweeps over the body in a frame.
-    pub fn sweeps(&self) -> u32 {
-        self.substeps * self.iterations
     }
 }

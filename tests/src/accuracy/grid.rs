@@ -5,66 +5,69 @@ use cutis_gpu::Gpu;
 use super::cases::Case;
 use super::config::{Backend, Config, METHODS, Method, PBD, XPBD, is_software};
 
-/// Substeps of a frame.
-const SUBSTEPS: [u32; 8] = [1, 2, 5, 10, 20, 40, 80, 160];
-/// The same for `--quick`.
-const FEW_SUBSTEPS: [u32; 4] = [1, 5, 10, 40];
-/// Most sweeps of a frame that are run until the body has settled.
-pub const SETTLED_SWEEPS: u32 = 160;
-/// Numbers of substeps whose iterations are raised further, for E1 and E2 only: where does iterating alone lead?
-const RAISED: [u32; 2] = [1, 10];
-
 /// Which pairs of substeps and iterations there are.
+#[derive(Clone, Copy)]
 struct Limits {
+    /// Substeps of a frame.
     substeps: &'static [u32],
-    /// Most sweeps of a frame.
+    /// Most sweeps of a frame. With a single iteration there may be more.
     sweeps: u32,
-    /// Most iterations with one of [`RAISED`].
-    raised: u32,
+    /// Most iterations with one or ten substeps, for E1 and E2 only: where does iterating alone lead?
+    raised: [(u32, u32); 2],
 }
 
-const FULL: Limits = Limits { substeps: &SUBSTEPS, sweeps: SETTLED_SWEEPS, raised: 1024 };
-const QUICK: Limits = Limits { substeps: &FEW_SUBSTEPS, sweeps: 80, raised: 64 };
+const FULL: Limits =
+    Limits { substeps: &[1, 2, 5, 10, 20, 40, 80, 160], sweeps: 80, raised: [(1, 1024), (10, 64)] };
+const QUICK: Limits = Limits { substeps: &[1, 10, 40], sweeps: 20, raised: [(1, 16), (10, 16)] };
+
+impl Limits {
+    /// For what takes `times` as long.
+    fn shared_by(self, times: u32) -> Self {
+        let Self { substeps, sweeps, raised } = self;
+        Self { substeps, sweeps: sweeps / times, raised: raised.map(|(s, n)| (s, n / times)) }
+    }
+
+    /// Substeps and iterations, and whether they are few enough to wait until the body has settled.
+    fn pairs(self) -> Vec<([u32; 2], bool)> {
+        let of = |&s: &u32| {
+            let most = (self.sweeps / s).max(1);
+            let raised =
+                self.raised.iter().find(|(raised, _)| *raised == s).map_or(most, |(_, n)| most.max(*n));
+            let powers = (0..).map(|power| 1u32 << power).take_while(move |n| *n <= raised);
+            powers.map(move |n| ([s, n], n <= most))
+        };
+        self.substeps.iter().flat_map(of).collect()
+    }
+}
 
 /// All configurations of `case`.
 pub fn configs(case: &Case, quick: bool, gpu: Option<&Gpu>) -> Vec<Config> {
     let limits = if quick { QUICK } else { FULL };
-    let few = Limits { sweeps: limits.sweeps / 4, raised: 1, ..limits };
-    let with = |backend: Backend, method: Method| {
-        move |[substeps, iterations]: [u32; 2]| Config {
+    let mut configs = Vec::new();
+    let mut add = |backend: Backend, method: Method, limits: Limits, all: bool| {
+        let chosen = limits.pairs().into_iter().filter(|([s, n], _)| all || *n == 1 || [1, 10].contains(s));
+        configs.extend(chosen.map(|([substeps, iterations], settles)| Config {
             backend: backend.clone(),
             method,
             substeps,
             iterations,
-        }
+            settles,
+        }));
     };
-    let mut configs = Vec::new();
     for &method in METHODS {
-        configs.extend(pairs(&limits).into_iter().map(with(Backend::Cpu, method)));
+        add(Backend::Cpu, method, limits.shared_by(method.weight), true);
     }
-    let cross = |limits: &Limits| pairs(limits).into_iter().filter(|[s, n]| *n == 1 || RAISED.contains(s));
-    configs.extend(cross(&limits).map(with(Backend::CpuDouble, XPBD)));
-    configs.extend(cross(&few).map(with(Backend::Reference, XPBD)));
-    if let Some(gpu) = gpu {
-        let on_gpu = with(Backend::Gpu(gpu.clone()), XPBD);
-        let chosen = if is_software(gpu) { cross(&few).collect() } else { pairs(&limits) };
-        configs.extend(chosen.into_iter().map(on_gpu));
+    add(Backend::CpuDouble, XPBD, limits, false);
+    add(Backend::Reference, XPBD, limits.shared_by(8), false);
+    match gpu {
+        None => (),
+        Some(gpu) if is_software(gpu) => add(Backend::Gpu(gpu.clone()), XPBD, limits.shared_by(8), false),
+        Some(gpu) => add(Backend::Gpu(gpu.clone()), XPBD, limits, true),
     }
     if case.pbd.is_some() {
-        let chosen = [1, 5, 20].into_iter().flat_map(|s| [1, 5, 20].map(|n| [s, n]));
-        configs.extend(chosen.filter(|[s, n]| s * n <= limits.sweeps).map(with(Backend::Cpu, PBD)));
+        add(Backend::Cpu, PBD, limits.shared_by(4), true);
     }
     configs
-}
-
-/// Substeps and iterations within `limits`.
-fn pairs(limits: &Limits) -> Vec<[u32; 2]> {
-    let iterations = |&s: &u32| {
-        let raised = if RAISED.contains(&s) { limits.raised } else { 1 };
-        let most = (limits.sweeps / s).max(raised);
-        (0..).map(|power| 1u32 << power).take_while(move |n| *n <= most).map(move |n| [s, n])
-    };
-    limits.substeps.iter().filter(|s| **s <= limits.sweeps).flat_map(iterations).collect()
 }
 
 #[cfg(test)]
@@ -73,9 +76,19 @@ mod tests {
 
     #[test]
     fn pairs_stay_within_the_limits() {
-        let pairs = pairs(&Limits { substeps: &SUBSTEPS, sweeps: 20, raised: 64 });
-        assert!(pairs.iter().all(|[s, n]| s * n <= 20 || RAISED.contains(s) && *n <= 64));
-        assert!(pairs.contains(&[1, 64]) && pairs.contains(&[10, 1]) && pairs.contains(&[20, 1]));
-        assert!(!pairs.contains(&[40, 1]) && !pairs.contains(&[2, 16]));
+        let limits = Limits { substeps: &[1, 2, 10, 40], sweeps: 20, raised: [(1, 64), (10, 4)] };
+        let pairs = limits.pairs();
+        assert!(pairs.iter().all(|([s, n], settles)| !settles || s * n <= 20 || *n == 1));
+        for pair in [
+            ([1, 16], true),
+            ([1, 64], false),
+            ([2, 8], true),
+            ([10, 2], true),
+            ([10, 4], false),
+            ([40, 1], true),
+        ] {
+            assert!(pairs.contains(&pair), "{pair:?}");
+        }
+        assert_eq!(limits.shared_by(2).pairs().len(), pairs.len() - 4);
     }
 }

@@ -7,7 +7,8 @@ use cutis::report::Machine;
 use super::front::pareto;
 use super::row::{Measure, Row};
 use super::words::{
-    LEVELS, against_iterating, cheapest, choice, ms, pbd, percent, precision, same_sweeps, stalls,
+    LEVELS, against_iterating, cheapest, choice, method_by_method, methods, ms, pbd, percent, precision,
+    same_sweeps, stalls,
 };
 
 /// A problem that was run.
@@ -140,11 +141,15 @@ fn of_problem(section: &Section) -> String {
     for measure in Measure::ALL {
         let _ = writeln!(text, "- {}: {}.", measure.name(), choice(&usual, measure));
     }
-    let _ = writeln!(text, "\n{}\n\nWhere iterating stalls:\n", against_iterating(&usual, 0.01));
-    let mut methods: Vec<String> = usual.iter().map(|row| row.method()).collect();
-    methods.dedup();
+    let _ = writeln!(text, "\n{}\n", against_iterating(&usual, 0.01));
+    let lines = method_by_method(&usual, 0.01);
+    let _ = writeln!(
+        text,
+        "An E1 of 1 %, by the number of substeps, with how many iterations: {}.\n\nWhere iterating stalls:\n",
+        lines.join("; ")
+    );
     let mut sentences = Vec::new();
-    for method in &methods {
+    for method in &methods(&usual) {
         let rows: Vec<&Row> = usual.iter().copied().filter(|row| row.method() == *method).collect();
         for measure in [Measure::E1, Measure::E2, Measure::E3] {
             let lines = stalls(&rows, measure);

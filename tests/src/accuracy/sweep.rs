@@ -6,7 +6,6 @@ use nalgebra::Point3;
 use super::Failure;
 use super::cases::Case;
 use super::config::Config;
-use super::grid::SETTLED_SWEEPS;
 use super::row::Row;
 use super::running::{Running, State};
 use super::yardstick::Yardstick;
@@ -30,15 +29,13 @@ struct Entry<'a> {
 
 impl<'a> Entry<'a> {
     fn new(case: &Case, config: &'a Config) -> Result<Self, Failure> {
-        // With too many sweeps to wait for rest: as far as the trajectory is compared.
-        let settles = config.sweeps() <= SETTLED_SWEEPS;
         Ok(Self {
             running: config.backend.start(config.system(case)?, config.settings(&case.settings))?,
             row: Row::of(case.name, config),
             config,
             times: Vec::new(),
             frame: 0,
-            last_frame: if settles { case.most_frames } else { case.compared_at },
+            last_frame: if config.settles { case.most_frames } else { case.compared_at },
             before: Vec::new(),
             unrest: f64::INFINITY,
         })
@@ -78,7 +75,7 @@ impl<'a> Entry<'a> {
         self.row.frames = self.times.len();
         self.row.ms_min = self.times.first().copied().unwrap_or(f64::NAN);
         self.row.ms_median = self.times.get(self.times.len() / 2).copied().unwrap_or(f64::NAN);
-        if self.row.failure.is_none() && self.config.sweeps() <= SETTLED_SWEEPS {
+        if self.row.failure.is_none() && self.config.settles {
             let x = &self.before;
             self.row.e3 = Some(yardstick.e3(x));
             self.row.unrest = Some(self.unrest);

@@ -35,11 +35,8 @@ pub fn choice(rows: &[&Row], measure: Measure) -> String {
 /// Where iterating stalls: for each number of substeps the error with the fewest and the most iterations, and whether the last
 /// doubling still helped.
 pub fn stalls(rows: &[&Row], measure: Measure) -> Vec<String> {
-    let mut substeps: Vec<u32> = rows.iter().map(|row| row.substeps).collect();
-    substeps.sort_unstable();
-    substeps.dedup();
     let mut lines = Vec::new();
-    for s in substeps {
+    for s in substeps(rows) {
         let mut line: Vec<(u32, f64)> = rows
             .iter()
             .filter(|row| row.substeps == s)
@@ -90,15 +87,54 @@ pub fn against_iterating(rows: &[&Row], level: f64) -> String {
             ms(row.ms_min)
         ),
         (None, Some(row)) => format!(
-            "{winner}; plain XPBD with one substep does not come there: at its best, with {} iterations, its E1 is {} and it \
-             takes {:.1} times as long ({} ms).",
+            "{winner}; plain XPBD with one substep does not come there: at its best, {} iterations in {} ms, its E1 is {}.",
             row.iterations,
-            e1(row),
-            row.ms_min / fastest.ms_min,
-            ms(row.ms_min)
+            ms(row.ms_min),
+            e1(row)
         ),
         (None, None) => format!("{winner}."),
     }
+}
+
+/// For each number of substeps, the fastest setting of each method with an E1 of at most `level`: the same problem for all, since a
+/// shorter step is easier.
+pub fn method_by_method(rows: &[&Row], level: f64) -> Vec<String> {
+    let of_substeps = |s: u32| {
+        let with: Vec<&Row> = rows.iter().copied().filter(|row| row.substeps == s).collect();
+        let entry = |method: &String| {
+            let rows: Vec<&Row> = with.iter().copied().filter(|row| row.method() == *method).collect();
+            match (cheapest(&rows, Measure::E1, level), best(&rows, Measure::E1)) {
+                (Some(row), _) => Some(format!("{method} × {} ({} ms)", row.iterations, ms(row.ms_min))),
+                (None, Some(row)) => {
+                    let error = percent(row.e1.unwrap_or(f64::NAN));
+                    Some(format!("{method} not ({error} with × {})", row.iterations))
+                }
+                (None, None) => None,
+            }
+        };
+        let entries: Vec<String> = methods(&with).iter().filter_map(entry).collect();
+        format!("{s}: {}", entries.join(", "))
+    };
+    substeps(rows).into_iter().map(of_substeps).collect()
+}
+
+/// The methods of `rows`, in order of appearance.
+pub fn methods(rows: &[&Row]) -> Vec<String> {
+    let mut methods: Vec<String> = Vec::new();
+    for method in rows.iter().map(|row| row.method()) {
+        if !methods.contains(&method) {
+            methods.push(method);
+        }
+    }
+    methods
+}
+
+/// The numbers of substeps of `rows`, ascending.
+fn substeps(rows: &[&Row]) -> Vec<u32> {
+    let mut substeps: Vec<u32> = rows.iter().map(|row| row.substeps).collect();
+    substeps.sort_unstable();
+    substeps.dedup();
+    substeps
 }
 
 /// Substeps against iterations with the same number of sweeps.
@@ -227,9 +263,8 @@ mod tests {
             ),
             "{against}"
         );
-        assert!(
-            against.contains("with 4 iterations, its E1 is 19 % and it takes 1.3 times as long (4.00 ms)"),
-            "{against}"
-        );
+        assert!(against.contains("at its best, 4 iterations in 4.00 ms, its E1 is 19 %"), "{against}");
+        let methods = method_by_method(&rows, 0.01);
+        assert_eq!(methods, ["1: xpbd not (19 % with × 4)", "8: xpbd × 1 (3.00 ms)"]);
     }
 }

@@ -42,6 +42,8 @@ pub enum Mark {
     Line,
     /// A thin line through them and a dot at each.
     Dots,
+    /// A small ring at each and no line.
+    Rings,
     /// A wide pale band behind everything else, with a ring around each: what stands out among the others, such as a Pareto
     /// front.
     Band,
@@ -137,6 +139,7 @@ fn style(mark: Mark, number: usize) -> String {
     };
     match mark {
         Mark::Line => format!("stroke=\"{color}\" stroke-width=\"2\"{dash}"),
+        Mark::Rings => "stroke=\"none\"".to_owned(),
         Mark::Dots => format!("stroke=\"{color}\" stroke-width=\"1.2\"{dash}"),
         Mark::Band => {
             "stroke=\"#bbb\" stroke-width=\"9\" stroke-linejoin=\"round\" opacity=\"0.6\"".to_owned()
@@ -148,6 +151,10 @@ fn style(mark: Mark, number: usize) -> String {
 fn dot(mark: Mark, number: usize) -> String {
     match mark {
         Mark::Line => String::new(),
+        Mark::Rings => {
+            let color = COLORS[number % COLORS.len()];
+            format!("r=\"3.5\" fill=\"white\" stroke=\"{color}\" stroke-width=\"1.3\"")
+        }
         Mark::Dots => format!("r=\"3\" fill=\"{}\"", COLORS[number % COLORS.len()]),
         Mark::Band => "r=\"6.5\" fill=\"none\" stroke=\"#777\" stroke-width=\"1.5\"".to_owned(),
     }
@@ -231,8 +238,8 @@ mod tests {
             |mark| line_chart("", axis("x"), axis("y"), &[Series { name: "name", points: &points, mark }]);
         let dots = |mark| chart(mark).matches("<circle").count();
         assert_eq!(
-            [dots(Mark::Line), dots(Mark::Dots), dots(Mark::Band)],
-            [0, 3, 3],
+            [dots(Mark::Line), dots(Mark::Dots), dots(Mark::Rings), dots(Mark::Band)],
+            [0, 3, 3, 3],
             "two and one in the legend"
         );
     }

@@ -48,11 +48,11 @@ pub fn named(name: &str, quick: bool) -> Result<Option<Case>, Failure> {
     let block_size = if quick { [9, 4, 4] } else { [25, 9, 9] };
     match name {
         "sheet" => sheet::wound(if quick { 20 } else { 60 }).map(Some),
-        "incision" => scene::incision(if quick { 18.0 } else { 9.0 }).map(Some),
-        "abdomen" => scene::abdomen(if quick { 20.0 } else { 12.0 }),
+        "incision" => scene::incision(if quick { 25.0 } else { 12.0 }).map(Some),
+        "abdomen" => scene::abdomen(if quick { 25.0 } else { 14.0 }),
         "block" => block::pulled(block_size).map(Some),
         "hanging" => block::hanging(block_size).map(Some),
-        "drag" => scene::drag(if quick { 18.0 } else { 9.0 }).map(Some),
+        "drag" => scene::drag(if quick { 25.0 } else { 12.0 }).map(Some),
         other => Err(format!("no problem is called `{other}`; there are {}", NAMES.join(", ")).into()),
     }
 }
