@@ -1,5 +1,6 @@
 //! The one integration test binary: the whole pipeline end to end, and problems whose answers are known.
 
+mod accuracy;
 mod bad_scenes;
 mod bad_values;
 mod determinism;
@@ -13,5 +14,6 @@ mod resume;
 mod scene_files;
 mod scenes;
 mod skin_counts;
+mod stability;
 mod warnings;
 mod wound;

@@ -6,3 +6,4 @@ pub mod cantilever;
 pub mod lattice;
 pub mod parity;
 pub mod sheet;
+pub mod stability;

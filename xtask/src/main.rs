@@ -30,6 +30,8 @@ usage: cargo xtask COMMAND
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
                       lists the options, and the exit code is that of the comparison
   parity-page         the same three ways, as it is, in small chunks and at full size: docs/results/parity.md
+  stability [OPTIONS] stiff and extreme cases on every backend at three length scales; `stability --help` lists the options, with
+                      --write: docs/results/stability.md; the exit code says whether every case ended as it must
   accuracy [OPTIONS]  error against run time, for each problem and setting, against direct solutions in f64; `accuracy --help`
                       lists the options, --write writes docs/results/accuracy.md
   mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
@@ -62,6 +64,9 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["cantilever"] => steps::cantilever(&workspace),
         ["parity", arguments @ ..] => {
             return workspace::exit_code(&mut steps::parity_command(&workspace, arguments));
+        }
+        ["stability", arguments @ ..] => {
+            return workspace::exit_code(&mut steps::stability_command(&workspace, arguments));
         }
         ["accuracy", arguments @ ..] => {
             return workspace::exit_code(&mut steps::accuracy_command(&workspace, arguments));

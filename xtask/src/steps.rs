@@ -140,6 +140,14 @@ pub fn parity_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     command
 }
 
+/// `cargo run` of the stability suite; its last words are `arguments`.
+pub fn stability_command(workspace: &Workspace, arguments: &[&str]) -> Command {
+    let mut command = workspace.cargo("run");
+    command.args(["--quiet", "--package", "cutis-tests", "--bin", "stability", "--"]).args(arguments);
+    vulkan::for_gpu_tests(&mut command);
+    command
+}
+
 /// The measurement of error against run time that `cargo xtask accuracy` runs: released, since it takes times.
 pub fn accuracy_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     let mut command = workspace.cargo("run");

@@ -25,10 +25,13 @@ pub enum Suite {
     Resample,
     /// Problems with known answers, on the CPU.
     Problems,
+    /// The quick part of the stability suite, on the CPU and on a GPU.
+    Stability,
 }
 
 impl Suite {
-    pub const ALL: [Self; 4] = [Self::Conformance, Self::Solver, Self::Resample, Self::Problems];
+    pub const ALL: [Self; 5] =
+        [Self::Conformance, Self::Solver, Self::Resample, Self::Problems, Self::Stability];
 
     /// Arguments of `cargo test`.
     pub fn arguments(self) -> &'static [&'static str] {
@@ -37,11 +40,12 @@ impl Suite {
             Self::Solver => &["-p", "cutis-solver-gpu", "--test", "suite"],
             Self::Resample => &["-p", "cutis-resample", "--features", "gpu", "--test", "gpu"],
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],
+            Self::Stability => &["-p", "cutis-tests", "--test", "all", "stability::"],
         }
     }
 }
 
-const fn mutation(
+pub const fn mutation(
     suite: Suite,
     fault: &'static str,
     file: &'static str,

@@ -2,6 +2,7 @@
 //! Writes which test saw which fault to `docs/results/mutations.md`.
 
 mod list;
+mod stability;
 
 use std::fmt::Write as _;
 use std::fs;
@@ -10,18 +11,23 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 
 use self::list::{MUTATIONS, Mutation, Suite};
+use self::stability::STABILITY;
 use crate::vulkan;
 use crate::workspace::{Workspace, execute};
 
 /// Names of tests that stand in the table for one fault; the others are counted.
 const NAMED: usize = 2;
 
+/// Every fault.
+fn all() -> impl Iterator<Item = &'static Mutation> {
+    MUTATIONS.iter().chain(STABILITY)
+}
+
 /// Tries every fault whose description contains `filter`; writes the page only when all were tried.
 pub fn run(workspace: &Workspace, filter: &str) -> Result<()> {
     let adapters = vulkan::require(workspace)?;
     let copy = Copy::new(workspace)?;
-    let chosen: Vec<&Mutation> =
-        MUTATIONS.iter().filter(|mutation| mutation.fault.contains(filter)).collect();
+    let chosen: Vec<&Mutation> = all().filter(|mutation| mutation.fault.contains(filter)).collect();
     ensure!(!chosen.is_empty(), "no fault's description contains `{filter}`");
     for suite in Suite::ALL.into_iter().filter(|suite| chosen.iter().any(|m| m.suite == *suite)) {
         let failed = copy.failing_tests(suite)?;
@@ -66,8 +72,8 @@ fn page(rows: &str, count: usize, commit: &str, adapters: &str) -> String {
     format!(
         "# Mutations\n\n\
          {count} faults, put in one at a time; each made at least one test fail. Without a fault all of these tests passed in the same\n\
-         run. Written by `cargo xtask mutations` at commit {commit}; adapters: {adapters}. The list is in\n\
-         `xtask/src/mutations/list.rs`.\n\n\
+         run. Written by `cargo xtask mutations` at commit {commit}; adapters: {adapters}. The lists are\n\
+         in `xtask/src/mutations/`.\n\n\
          | | fault | change | seen by |\n|---|---|---|---|\n{rows}"
     )
 }
@@ -161,7 +167,7 @@ mod tests {
     #[test]
     fn every_fault_has_its_place() {
         let workspace = Workspace::find().unwrap();
-        for mutation in MUTATIONS {
+        for mutation in all() {
             let text = fs::read_to_string(workspace.root.join(mutation.file)).expect(mutation.file);
             assert_eq!(text.matches(mutation.from).count(), 1, "{}: {}", mutation.file, mutation.from);
             assert_ne!(mutation.from, mutation.to, "{}", mutation.fault);

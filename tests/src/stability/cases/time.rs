@@ -1,0 +1,67 @@
+//! Substeps from 1e-5 s to 1 s, a thousand times the weight, handles that tear, a million steps.
+
+use cutis_solver::Handle;
+
+use super::{Random, deformed};
+use crate::stability::body::{Body, Law};
+use crate::stability::case::{Case, End, Run};
+use crate::stability::options::Effort;
+
+const BLOCK: [usize; 3] = [3, 3, 3];
+const LAWS: [Law; 3] = [Law::SOFT, Law::RIGID, Law::PBD];
+
+pub fn cases(effort: Effort) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for law in LAWS {
+        steps(&mut cases, law);
+        forces(&mut cases, law);
+        many_steps(&mut cases, law, effort);
+    }
+    cases
+}
+
+fn steps(cases: &mut Vec<Case>, law: Law) {
+    for h in [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0] {
+        let body = Body::block(BLOCK, law).placed(deformed());
+        // Within a simulated second; the shortest ones would take too many substeps for that.
+        let substeps = if h < 1e-3 { 40 } else { 4 };
+        let end = if h < 1e-3 { End::Bounded } else { End::Recovers(0.02) };
+        let looks = (2.0 / (h * f64::from(substeps))).clamp(50.0, 500.0) as usize;
+        let run = Run { h, substeps, looks, ..Run::default() };
+        let case = Case::new(format!("substeps of {h:e} s, {}", law.name()), body, end).run(run);
+        let case = Case { quick: h == 1.0, ..case };
+        // In single precision what a spring does within 1e-5 s is less than the last place of a position.
+        cases.push(if h < 1e-4 { case.unresolved() } else { case });
+    }
+}
+
+fn forces(cases: &mut Vec<Case>, law: Law) {
+    let of = law.name();
+    let mut body = Body::block(BLOCK, law);
+    for (w, x) in body.inverse_masses.iter_mut().zip(&body.rest) {
+        *w = if x.y == 2.0 { 0.0 } else { 1.0 };
+    }
+    let run = Run { gravity: [0.0, -9810.0, 0.0], ..Run::default() };
+    cases.push(Case::new(format!("1000 g, {of}"), body, End::Rests).run(run).quick());
+    let mut body = Body::block(BLOCK, law);
+    let last = body.rest.len() as u32 - 1;
+    body.handles.push(Handle { vertices: vec![last], move_m: [20.0, 15.0, 10.0], over_s: 0.0 });
+    cases.push(
+        Case::new(format!("a corner torn off by ten body sizes at once, {of}"), body, End::Recovers(0.05))
+            .quick(),
+    );
+}
+
+fn many_steps(cases: &mut Vec<Case>, law: Law, effort: Effort) {
+    let frames = match effort {
+        Effort::Quick => 100,
+        Effort::Normal => 1_000,
+        Effort::Full => 10_000,
+    };
+    let mut body = Body::tetrahedron(law).placed(deformed());
+    let mut random = Random(8);
+    body.velocities.iter_mut().for_each(|v| *v = random.vector());
+    let run = Run { damping_per_s: 0.0, substeps: 4, looks: 25, frames, ..Run::default() };
+    let name = format!("{} steps undamped, {}", 25 * 4 * frames, law.name());
+    cases.push(Case::new(name, body, End::Bounded).run(run).quick());
+}
