@@ -35,6 +35,22 @@ fn tets(lattice: &Kuhn) -> System<f32> {
         .build()
 }
 
+fn both(lattice: &Kuhn) -> System<f32> {
+    let edges = Groups::from_colors(&lattice.edge_colors).expect("few constraints");
+    let tets = Groups::from_colors(&lattice.tet_colors).expect("few constraints");
+    builder(lattice)
+        .add_from_rest::<Distance, 2>(
+            &lattice.edges,
+            &Default::default(),
+            Stiffness::compliance(1e-4),
+            &edges,
+        )
+        .expect("valid edges")
+        .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), Stiffness::compliance(1e-7), &tets)
+        .expect("valid tetrahedra")
+        .build()
+}
+
 fn sweeps(criterion: &mut Criterion) {
     let large = std::env::var_os("CUTIS_BENCH_LARGE").is_some();
     let lattice = Kuhn::new(if large { [129, 129, 76] } else { [65, 65, 38] }, 0.1);
@@ -63,5 +79,27 @@ fn sweeps(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, sweeps);
+/// One iteration of vertex block descent over a body of edges and tetrahedra; per vertex.
+fn descent(criterion: &mut Criterion) {
+    let large = std::env::var_os("CUTIS_BENCH_LARGE").is_some();
+    let lattice = Kuhn::new(if large { [129, 129, 76] } else { [65, 65, 38] }, 0.1);
+    let mut group = criterion.benchmark_group("descent");
+    group.throughput(Throughput::Elements(lattice.positions.len() as u64)).sample_size(20);
+    for threads in [1, 2] {
+        let settings = Settings {
+            formulation: Formulation::Vbd,
+            dt_s: 0.005,
+            substeps: 1,
+            gravity_m_s2: [0.0, -9.81, 0.0],
+            ..Settings::default()
+        };
+        let mut solver = SolverCpu::new(both(&lattice), settings, Some(threads)).expect("a valid system");
+        group.bench_function(BenchmarkId::new("threads", threads), |bencher| {
+            bencher.iter(|| solver.step(1).expect("finite"));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, sweeps, descent);
 criterion_main!(benches);

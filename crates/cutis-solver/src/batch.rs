@@ -242,16 +242,19 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             mixed: vector(|pull| &pull.mixed, pulls),
         };
         for n in 0..common {
-            let place = |lane: usize| places[lane][n] as usize;
+            // Every lane is looked up once; lanes that there are not repeat the last one.
+            let place: [usize; MOST_LANES] =
+                std::array::from_fn(|lane| places[lane.min(places.len() - 1)][n] as usize);
+            let constraint = place.map(|place| place / N);
+            let corners = constraint.map(|k| self.indices[k].map(|i| load.load(i)));
             let x: [Point3<T::Lanes>; N] = std::array::from_fn(|i| {
-                let column = |axis: usize| {
-                    T::lanes(|lane| load.load(self.indices[place(lane) / N][i]).component(axis))
-                };
+                let column = |axis: usize| T::lanes(|lane| corners[lane][i].component(axis));
                 Point3::new(column(0), column(1), column(2))
             });
-            let params = Params::from_fn(|j| T::lanes(|lane| self.params[place(lane) / N].as_ref()[j]));
+            let numbers = constraint.map(|k| &self.params[k]);
+            let params = Params::from_fn(|j| T::lanes(|lane| numbers[lane].as_ref()[j]));
             let eval = C::eval(&x, &params);
-            let slot = T::lanes(|lane| T::constant((place(lane) % N) as f64));
+            let slot = T::lanes(|lane| T::constant((place[lane] % N) as f64));
             let mut gradient = eval.grad[0];
             for i in 1..N {
                 let here = slot.simd_eq(T::Lanes::splat(T::constant(i as f64)));
@@ -259,7 +262,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             }
             let compliance = match stiffness {
                 Values::Uniform(value) => T::Lanes::splat(*value),
-                Values::Each(values) => T::lanes(|lane| values[place(lane) / N]),
+                Values::Each(values) => T::lanes(|lane| values[constraint[lane]]),
             };
             sum.add(eval.c, &gradient, compliance, C::rest_size(&params));
         }
