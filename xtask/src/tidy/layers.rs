@@ -37,7 +37,13 @@ const LAYERS: &[Layer] = &[
     Layer {
         name: "cutis-solver-gpu",
         level: 3,
-        may_use: These(&["cutis-solver", "cutis-constraints", "cutis-coloring", "cutis-gpu", "cutis-shaders"]),
+        may_use: These(&[
+            "cutis-solver",
+            "cutis-constraints",
+            "cutis-coloring",
+            "cutis-gpu",
+            "cutis-shaders",
+        ]),
     },
     Layer { name: "cutis-newton", level: 3, may_use: These(&["cutis-solver", "cutis-constraints"]) },
     Layer {

@@ -100,5 +100,13 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
 pub fn settings(parts: &Parts, iterations: u32) -> Settings {
     let gravity_m_s2 = [0.0, -9.81 * parts.step / 0.1, 0.0];
     let formulation = parts.formulation;
-    Settings { formulation, dt_s: 0.01, substeps: 2, iterations, gravity_m_s2, damping_per_s: 0.5, relaxation: if formulation == Formulation::Vbd { 1.3 } else { 1.0 } }
+    Settings {
+        formulation,
+        dt_s: 0.01,
+        substeps: 2,
+        iterations,
+        gravity_m_s2,
+        damping_per_s: 0.5,
+        relaxation: if formulation == Formulation::Vbd { 1.3 } else { 1.0 },
+    }
 }
