@@ -11,8 +11,16 @@ use crate::{Split, TetMesh};
 struct Starting<'a> {
     grid: &'a Grid,
     masks: &'a CellMasks,
-    /// Per parity and direction: step in points, and the cells around with their tets.
-    directions: [Vec<(isize, Vec<(isize, u8)>)>; 2],
+    /// By parity of the point.
+    directions: [Vec<Course>; 2],
+}
+
+/// A direction that edges of a lattice run in.
+struct Course {
+    /// To the second point, in flat indices.
+    step: isize,
+    /// The cells around, relative to the point's, and their tets with the edge.
+    around: Vec<(isize, u8)>,
 }
 
 impl<'a> Starting<'a> {
@@ -20,11 +28,10 @@ impl<'a> Starting<'a> {
         let point_step = |[i, j, k]: [i8; 3]| {
             i as isize + grid.shape[0] as isize * (j as isize + grid.shape[1] as isize * k as isize)
         };
+        let around =
+            |cells: &[([i8; 3], u8)]| cells.iter().map(|&(cell, mask)| (masks.delta(cell), mask)).collect();
         let directions = masks.stencil.directions.each_ref().map(|directions| {
-            let around = |cells: &[([i8; 3], u8)]| {
-                cells.iter().map(|&(cell, mask)| (masks.delta(cell), mask)).collect()
-            };
-            directions.iter().map(|d| (point_step(d.step), around(&d.cells))).collect()
+            directions.iter().map(|d| Course { step: point_step(d.step), around: around(&d.cells) }).collect()
         });
         Self { grid, masks, directions }
     }
@@ -37,7 +44,7 @@ impl<'a> Starting<'a> {
             around.iter().any(|&(delta, mask)| self.masks.bytes[cell.wrapping_add_signed(delta)] & mask != 0)
         };
         let own = self.directions[(i + j + k) & 1].iter().enumerate();
-        own.fold(0u16, |bits, (d, (_, around))| bits | u16::from(has(around)) << d)
+        own.fold(0u16, |bits, (d, course)| bits | u16::from(has(&course.around)) << d)
     }
 }
 
@@ -45,7 +52,7 @@ impl<'a> Starting<'a> {
 pub(crate) fn count(grid: &Grid, masks: &CellMasks, used: &[bool]) -> usize {
     let starting = Starting::new(grid, masks);
     let edges = |(point, _): (usize, &bool)| starting.at(point).count_ones() as usize;
-    used.par_iter().enumerate().filter(|(_, used)| **used).map(edges).sum()
+    used.par_iter().enumerate().filter(|(_, used)| **used).map(edges).reduce(|| 0, |a, b| a + b)
 }
 
 /// Ascending; lower vertex first.
@@ -74,8 +81,8 @@ pub(crate) fn generate(
             let parity = grid.point(point).iter().sum::<usize>() & 1;
             let own =
                 starting.directions[parity].iter().enumerate().filter(|(d, _)| bits[vertex] >> d & 1 == 1);
-            for ((_, (step, _)), edge) in own.zip(&mut out) {
-                *edge = [vertex as u32, vertex_of[point.wrapping_add_signed(*step)]];
+            for ((_, course), edge) in own.zip(&mut out) {
+                *edge = [vertex as u32, vertex_of[point.wrapping_add_signed(course.step)]];
             }
         }
     });
