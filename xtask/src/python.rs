@@ -10,7 +10,12 @@ use crate::workspace::{Workspace, execute};
 /// Runs every check.
 pub fn run(workspace: &Workspace) -> Result<()> {
     for script in scripts(&workspace.root.join("tests/python"))? {
-        execute(check(workspace, &script)?.env("CUTIS_PROGRAM", workspace.program()?))?;
+        let mut command = check(workspace, &script)?;
+        execute(
+            command
+                .env("CUTIS_PROGRAM", workspace.program()?)
+                .env("CUTIS_CANTILEVER", workspace.cantilever("debug")?),
+        )?;
     }
     Ok(())
 }
@@ -19,7 +24,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
 pub fn check(workspace: &Workspace, script: &Path) -> Result<Command> {
     let python = environment(workspace, &workspace.target_dir()?.join("venv"))?;
     let mut command = workspace.command(&python);
-    command.arg(script).env("CUTIS_CANTILEVER", workspace.cantilever()?).env("PYTHONDONTWRITEBYTECODE", "1");
+    command.arg(script).env("PYTHONDONTWRITEBYTECODE", "1");
     Ok(command)
 }
 

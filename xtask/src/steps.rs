@@ -176,18 +176,19 @@ fn documentation(workspace: &Workspace) -> Result<()> {
 /// Builds what the Python checks run: the release program, and the one that bends beams.
 pub fn build_for_python(workspace: &Workspace) -> Result<()> {
     build_program(workspace)?;
-    build_cantilever(workspace)
+    build_cantilever(workspace, &[])
 }
 
-fn build_cantilever(workspace: &Workspace) -> Result<()> {
-    execute(workspace.cargo("build").args(["--package", "cutis-tests", "--bin", "cantilever"]))
+fn build_cantilever(workspace: &Workspace, more: &[&str]) -> Result<()> {
+    execute(workspace.cargo("build").args(["--package", "cutis-tests", "--bin", "cantilever"]).args(more))
 }
 
 /// Beams bent by the solver and by an independent FEM, all of them: writes `docs/results/cantilever.md` and its table.
 pub fn cantilever(workspace: &Workspace) -> Result<()> {
-    build_cantilever(workspace)?;
+    build_cantilever(workspace, &["--release"])?;
     let mut command = python::check(workspace, &workspace.root.join("tests/python/cantilever.py"))?;
-    execute(vulkan::for_gpu_tests(command.args(["--page", "docs/results"])))
+    command.env("CUTIS_CANTILEVER", workspace.cantilever("release")?).args(["--page", "docs/results"]);
+    execute(vulkan::for_gpu_tests(&mut command))
 }
 
 /// Builds the release program.

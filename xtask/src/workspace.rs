@@ -105,9 +105,9 @@ impl Workspace {
         self.built("debug/parity", "cargo test --workspace --no-run")
     }
 
-    /// The program that bends beams for the independent FEM, as the tests of the workspace leave it behind.
-    pub fn cantilever(&self) -> Result<PathBuf> {
-        self.built("debug/cantilever", "cargo build -p cutis-tests --bin cantilever")
+    /// The program that bends beams for the independent FEM, as the tests of the workspace leave it behind, or released.
+    pub fn cantilever(&self, profile: &str) -> Result<PathBuf> {
+        self.built(&format!("{profile}/cantilever"), "cargo build -p cutis-tests --bin cantilever")
     }
 
     /// A program in the folder of builds; if it is missing, the error names the command that builds it.

@@ -75,6 +75,7 @@ pub fn real_time(damping_per_s: f64) -> Vec<Way> {
         substeps,
         iterations,
         damping_per_s,
+        most_frames: 300,
     };
     let xpbd = [1, 5, 10, 20, 50].into_iter().flat_map(|s| [1, 2, 5].map(|i| way(Formulation::Xpbd, s, i)));
     let vbd = [(1, 5), (1, 20), (5, 5), (10, 2)].map(|(s, i)| way(Formulation::Vbd, s, i));

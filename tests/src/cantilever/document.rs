@@ -21,9 +21,7 @@ const QUICK: (f64, u32) = (1.0, 5);
 /// The same in single precision, which cannot resolve what gravity does in so short a time.
 const SINGLE: (f64, u32) = (2.0, 30);
 /// Share of its displacement by which a beam at rest may move in a frame, in double and in single precision.
-const STILL: (f64, f64) = (1e-6, 2e-5);
-/// Most simulated time, s.
-const MOST_S: f64 = 5.0;
+const STILL: (f64, f64) = (1e-6, 1e-4);
 /// Most work in real time (substeps × iterations), but for the coarse beam that sinks by a tenth.
 const MOST_SWEEPS: u32 = 50;
 
@@ -204,7 +202,7 @@ fn run<T: cutis_constraints::Scalar>(
     way: Way,
     still: f64,
 ) -> Run {
-    let found = settle(&mut solver, beam, still, MOST_S);
+    let found = settle(&mut solver, beam, still, way.most_frames);
     let error = found.as_ref().err().map(ToString::to_string);
     Run { backend, precision, way, rest: found.ok(), error }
 }

@@ -24,6 +24,8 @@ pub struct Way {
     pub iterations: u32,
     /// Damping, 1/s. It acts on velocities only and so has no part in where the beam rests.
     pub damping_per_s: f64,
+    /// Frames after which the beam should long hang still.
+    pub most_frames: usize,
 }
 
 impl Way {
@@ -68,10 +70,11 @@ pub fn converged(sag_m: f64, substep_s: f64, iterations: u32) -> Way {
         substeps: substeps as u32,
         iterations,
         damping_per_s: 2.0 * slowest,
+        most_frames: 60,
     }
 }
 
-/// Runs until the end of the beam stands still, or for `most_s` of simulated time. Still is what moves in a frame by no more than
+/// Runs until the end of the beam stands still, or for `most_frames`. Still is what moves in a frame by no more than
 /// `tolerance` times its whole displacement.
 ///
 /// # Errors
@@ -80,10 +83,13 @@ pub fn settle<T: Scalar>(
     solver: &mut dyn Solver<T>,
     beam: &Beam,
     tolerance: f64,
-    most_s: f64,
+    most_frames: usize,
 ) -> Result<Rest, SolverError> {
     let (mut displacement, mut still) = (Vector3::zeros(), 0);
-    while still < STILL_FRAMES && solver.time_s() < most_s {
+    for _ in 0..most_frames {
+        if still >= STILL_FRAMES {
+            break;
+        }
         solver.step(1)?;
         let before = displacement;
         displacement = end_displacement(solver, beam)?;
