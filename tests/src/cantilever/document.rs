@@ -1,6 +1,7 @@
 //! Everything that the independent FEM needs, and what it is compared with, as one JSON file.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
 use clap::Parser;
@@ -95,11 +96,12 @@ impl Document {
         let gpu = if options.quick { None } else { device()? };
         let (mut beams, mut cases) = (BTreeMap::new(), Vec::new());
         for case in Case::all(options.quick) {
-            if !beams.contains_key(&case.refinement) {
-                beams.insert(case.refinement, Beam::new(case.cells(), case.refinement, 1.0)?);
-            }
+            let beam = match beams.entry(case.refinement) {
+                Entry::Occupied(made) => made.into_mut(),
+                Entry::Vacant(place) => place.insert(Beam::new(case.cells(), case.refinement, 1.0)?),
+            };
             eprintln!("{}", case.name);
-            cases.push(Answers::of(case.clone(), &beams[&case.refinement], gpu.as_ref(), options.quick)?);
+            cases.push(Answers::of(case.clone(), beam, gpu.as_ref(), options.quick)?);
         }
         Ok(Self {
             schema: "cutis-cantilever/1",

@@ -65,7 +65,8 @@ fn watch<T: Scalar>(case: &Case, scale: f64, make: Make<'_, T>, row: &mut Row) -
         End::Bounded => Ok(Outcome::Bounded),
         End::Unmoved if positions(solver.system()?) == first => Ok(Outcome::Settled),
         End::Unmoved => Err("a vertex has moved".to_owned()),
-        End::Recovers(level) => match after_last(errors.iter().map(|&error| !(error <= level))) {
+        End::Recovers(level) => match after_last(errors.iter().map(|&error| error.is_nan() || error > level))
+        {
             Some(look) => {
                 row.recovery_s = Some(time(look));
                 Ok(Outcome::Settled)
@@ -84,7 +85,7 @@ fn watch<T: Scalar>(case: &Case, scale: f64, make: Make<'_, T>, row: &mut Row) -
     };
     let ratio = row.energy_ratio.unwrap_or(f64::INFINITY);
     match outcome {
-        Ok(_) if !(ratio <= case.energy) => Err(format!(
+        Ok(_) if ratio.is_nan() || ratio > case.energy => Err(format!(
             "the energy is {ratio:.2e} times what was put in; at most {} is allowed",
             case.energy
         )
