@@ -165,7 +165,9 @@ fn what_does_not_fit_is_refused_by_name() {
     let nothing = "{ min_mm = [500, 500, 500], max_mm = [510, 510, 510] }";
     let beside_handle = "{ min_mm = [-40, 20, -100], max_mm = [100, 200, 100] }";
     let uncut = ("incision", "[]");
-    let cases: [(&[(&str, &str)], &str, &str); 8] = [
+    /// Overrides, the key that is blamed, and a part of the message.
+    type Refused<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
+    let cases: [Refused<'_>; 8] = [
         (&[(REGION, "{ around_mm = 4 }")], REGION, "incision[0]"),
         (&[(REGION, elsewhere)], REGION, "incision[0]"),
         (&[(REGION, nothing), uncut], REGION, "none of the"),
