@@ -103,23 +103,34 @@ def run_cells(run, reference):
 
 
 def convergence(found):
-    rows = []
+    rows, worst, lost = [], 0.0, []
     for case in found["cases"]:
         reference = np.array(case["fem"]["displacement"])
         for run in case["converged"]:
-            rows.append([case["name"], f"{run['backend']} {run['precision']}", *run_cells(run, reference)])
-    worst = max(float(row[6]) for row in rows)
-    head = ["case", "backend", "h, ms", "substeps", "iterations", "down, % of length", "off by, %", "at rest"]
-    return (
-        f"## The solver with short substeps\n\nXPBD with substeps `h` that are short beside the time in which a wave crosses a cell. "
-        f"The end is off by at most {worst:.2g} %.\n\n" + table(head, rows)
+            cells = run_cells(run, reference)
+            rows.append([case["name"], f"{run['backend']} {run['precision']}", *cells, f"{case['fem']['f32_resolution']:.0f}"])
+            if run["held"]:
+                worst = max(worst, float(cells[4]))
+            else:
+                lost.append(f"{case['name']} ({cells[4]} %)")
+    head = ["case", "backend", "h, ms", "substeps", "iterations", "down, % of length", "off by, %", "at rest", "resolution of f32"]
+    text = (
+        f"## The solver with short substeps\n\nXPBD with substeps `h` that are not long beside the time in which a wave crosses a cell. "
+        f"The end is off by at most {worst:.2g} %"
     )
+    if lost:
+        text += (
+            f", but for {', '.join(lost)} in `f32`: there rounding takes part of the strain that the weight causes. The last column is that "
+            "strain, `ρgL/max(E, K)`, over the one that rounding a position changes in a cell; below 100 single precision is not held to "
+            "the 1 % that is asked for everywhere else. Double precision needs no such exception"
+        )
+    return text + ".\n\n" + table(head, rows)
 
 
 def real_time(found):
     text = "## The solver in real time\n\nFrames of 1/60 s on the CPU in `f32`, damped until the beam hangs still (or 5 s are over: *no* " \
            "in the last column).\n"
-    best, few = [], []
+    best, few, descent = [], [], []
     for case in found["cases"]:
         if not case["real_time"]:
             continue
@@ -129,14 +140,17 @@ def real_time(found):
         for run in case["real_time"]:
             if run["rest"] and run["way"]["formulation"] == "xpbd":
                 ratio[run["way"]["substeps"], run["way"]["iterations"]] = run["rest"]["displacement"][1] / reference[1]
+        for run, row in zip(case["real_time"], rows):
+            if run["way"]["formulation"] == "vbd" and run["rest"]:
+                descent.append((float(row[5]), case["name"], f"{row[2]} × {row[3]}"))
         for (substeps, iterations), share in ratio.items():
             (best if abs(share - 1) <= 0.05 else few).append((case["name"], substeps, iterations, share))
         head = ["formulation", "h, ms", "substeps", "iterations", "down, % of length", "off by, %", "at rest"]
         text += f"\n### {case['name']}\n\nThe FEM says {-100 * reference[1]:.2f} % down.\n\n" + table(head, rows)
-    return text + "\n" + in_words(best, few)
+    return text + "\n" + in_words(best, few, descent)
 
 
-def in_words(near, far):
+def in_words(near, far, descent):
     """What the tables of real time say."""
     text = "### In words\n\n"
     softest = max(far, key=lambda row: row[3], default=None)
@@ -152,8 +166,11 @@ def in_words(near, far):
     if softest:
         name, substeps, iterations, share = softest
         text += f"The softest was {substeps} × {iterations} on \"{name}\", which sank {share:.1f} times as far as the material does.\n\n"
+    if descent:
+        off, name, setting = max(descent)
+        text += f"Vertex block descent (`vbd`) was off by at most {off:.2g} %, with {setting} on \"{name}\".\n\n"
     return text + (
-        "A beam that hangs still is not a beam that hangs right: with long substeps a constraint pulls with a part of its force only, "
+        "A beam that hangs still is not a beam that hangs right: with long substeps a constraint of XPBD pulls with a part of its force only, "
         "and the stiffer the material and the finer the lattice, the smaller is that part (see [theory](../book/theory.md)). PBD knows no "
         "material: its sag is the same for every `E` and depends on substeps and iterations.\n"
     )
