@@ -15,5 +15,6 @@ mod scene_files;
 mod scenes;
 mod skin_counts;
 mod stability;
+mod tune;
 mod warnings;
 mod wound;

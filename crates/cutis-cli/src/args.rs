@@ -58,6 +58,18 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Measure which setting a scene needs on this machine, and write a copy of the scene with it
+    Tune {
+        /// Scene file (TOML)
+        scene: PathBuf,
+        #[command(flatten)]
+        tune: TuneArgs,
+        #[command(flatten)]
+        change: Change,
+        /// Print as JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Tell what is in a volume file
     Inspect {
         /// NIfTI file
@@ -163,6 +175,29 @@ pub(crate) enum SceneCommand {
     Reference,
     /// JSON schema of report.json
     ReportSchema,
+}
+
+/// What is asked of a setting.
+#[derive(Clone, Debug, Group)]
+pub(crate) struct TuneArgs {
+    /// Take the setting with the least error that needs at most so many milliseconds per frame
+    #[arg(long, value_name = "MS", conflicts_with = "error")]
+    pub(crate) budget_ms: Option<f64>,
+    /// Take the cheapest setting with at most this error, % of the displacement [default: 5, or the best at no more cost than now]
+    #[arg(long, value_name = "PERCENT")]
+    pub(crate) error: Option<f64>,
+    /// The tuned copy of the scene [default: the scene's name with `-tuned`, in the current folder]
+    #[arg(short, long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Replace the copy if it is there
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Do not measure what can be left out
+    #[arg(long)]
+    pub(crate) settings_only: bool,
+    /// Time that the choice of a setting may take, minutes; what can be left out may take as long again
+    #[arg(long, default_value_t = 5.0)]
+    pub(crate) minutes: f64,
 }
 
 /// Changes to a scene from the command line.

@@ -45,6 +45,7 @@ mod gather;
 mod handles;
 mod kind;
 mod memory;
+mod recorder;
 mod residual;
 mod solver;
 

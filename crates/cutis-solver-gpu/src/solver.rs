@@ -1,8 +1,8 @@
 //! The solver of this backend: the schedule, encoded.
 
-use cutis_gpu::{Buffer, Gpu, GpuError, Pass};
+use cutis_gpu::{Buffer, Gpu, GpuError};
 use cutis_solver::{
-    Clock, MemoryPart, Method, Residual, Schedule, Settings, Simulation, Solver, SolverError, System,
+    Clock, Ledger, MemoryPart, Method, Residual, Settings, Simulation, Solver, SolverError, System,
 };
 use nalgebra::{Point3, Vector3};
 
@@ -11,6 +11,7 @@ use crate::descent::DescentOnDevice;
 use crate::gather::Gather;
 use crate::handles::Handles;
 use crate::kind::Kind;
+use crate::recorder::Recorder;
 use crate::residual::Reduction;
 use crate::{GpuSolverError, device_bytes};
 
@@ -76,19 +77,27 @@ impl Constraints {
     }
 
     /// Encodes one iteration.
-    fn encode(&self, pass: &mut Pass<'_>, schedule: &Schedule, iteration: u32) {
+    fn encode(
+        &self,
+        recorder: &mut Recorder<'_>,
+        simulation: &Simulation<f32>,
+        iteration: u32,
+    ) -> Result<(), GpuError> {
+        let schedule = simulation.schedule();
         match self {
             Self::Projected(kinds) => {
                 for sweep in &schedule.sweeps {
-                    kinds[sweep.kind].project(pass, sweep, iteration);
+                    let name = simulation.system().kinds()[sweep.kind].name();
+                    kinds[sweep.kind].project(recorder.part(name)?, sweep, iteration);
                 }
             }
             Self::Pulling(descent) => {
                 for turn in &schedule.turns {
-                    descent.turn(pass, turn);
+                    descent.turn(recorder.part(Ledger::DESCENT)?, turn);
                 }
             }
         }
+        Ok(())
     }
 }
 
@@ -162,18 +171,18 @@ impl SolverGpu {
         device_bytes(self.simulation.system(), self.simulation.settings())
     }
 
-    /// Runs whole frames and the rest of one that was begun.
-    fn run(&mut self, frames: usize) -> Result<(), Stop> {
+    /// Runs whole frames and the rest of one that was begun; with a ledger, part by part.
+    fn run(&mut self, frames: usize, mut ledger: Option<&mut Ledger>) -> Result<(), Stop> {
         let end = self.simulation.clock().frame.saturating_add(frames as u64);
         while self.simulation.clock().frame < end {
             let look = end.min(self.simulation.clock().frame.saturating_add(FRAMES_PER_LOOK));
-            self.run_unseen(look)?;
+            self.run_unseen(look, ledger.as_deref_mut())?;
         }
         Ok(())
     }
 
     /// Runs up to frame `end` and then looks whether the body is finite.
-    fn run_unseen(&mut self, end: u64) -> Result<(), Stop> {
+    fn run_unseen(&mut self, end: u64, mut ledger: Option<&mut Ledger>) -> Result<(), Stop> {
         let settings = *self.simulation.settings();
         let mut clock = self.simulation.clock();
         self.bring_device_up_to_date()?;
@@ -187,32 +196,31 @@ impl SolverGpu {
                 let paths = self.simulation.system().handles();
                 handles.write_paths(&self.gpu, paths, clock, &settings, done)?;
             }
-            let mut pass = self.gpu.pass("frame");
+            let mut recorder = Recorder::new(&self.gpu, ledger.as_deref_mut());
             let mut encoded = Load::default();
             while clock.frame == frame {
                 if encoded.dispatches > DISPATCHES_PER_SUBMIT || encoded.threads > THREADS_PER_SUBMIT {
-                    pass.submit()?;
-                    (pass, encoded) = (self.gpu.pass("frame, further on"), Load::default());
+                    recorder.submit()?;
+                    encoded = Load::default();
                 }
                 encoded.dispatches += self.substep.dispatches;
                 encoded.threads = encoded.threads.saturating_add(self.substep.threads);
-                self.body.begin_substep(&mut pass, begun);
+                self.body.begin_substep(recorder.part(Ledger::VERTICES)?, begun);
                 begun = true;
                 if let Some(handles) = &self.handles {
-                    handles.carry(&mut pass);
+                    handles.carry(recorder.part(Ledger::HANDLES)?);
                 }
-                let schedule = self.simulation.schedule();
-                for iteration in 0..schedule.iterations {
-                    self.constraints.encode(&mut pass, schedule, iteration);
+                for iteration in 0..self.simulation.schedule().iterations {
+                    self.constraints.encode(&mut recorder, &self.simulation, iteration)?;
                 }
-                self.body.check.run(&mut pass);
+                self.body.check.run(recorder.part(Ledger::CHECK)?);
                 clock.tick(&settings);
                 done += 1;
             }
             if clock.frame == end {
-                self.body.finish.run(&mut pass);
+                self.body.finish.run(recorder.part(Ledger::VERTICES)?);
             }
-            pass.submit()?;
+            recorder.submit()?;
         }
         let status = self.body.status(&self.gpu)?;
         let Some(vertex) = status.vertex else {
@@ -228,6 +236,15 @@ impl SolverGpu {
         }
         self.simulation.set_clock(clock);
         Err(Stop::NotFinite(vertex))
+    }
+
+    fn error(&mut self, stop: Stop) -> SolverError {
+        match stop {
+            Stop::Device(error) => self.stopped(&error),
+            Stop::NotFinite(vertex) => {
+                SolverError::not_finite(vertex, self.simulation.clock(), self.simulation.settings())
+            }
+        }
     }
 
     /// The error of a step: what the device holds is not to be relied on, and the host's body is the one that counts, at the
@@ -285,13 +302,13 @@ impl Solver<f32> for SolverGpu {
     }
 
     fn step(&mut self, frames: usize) -> Result<(), SolverError> {
-        match self.run(frames) {
-            Ok(()) => Ok(()),
-            Err(Stop::Device(error)) => Err(self.stopped(&error)),
-            Err(Stop::NotFinite(vertex)) => {
-                Err(SolverError::not_finite(vertex, self.simulation.clock(), self.simulation.settings()))
-            }
-        }
+        let done = self.run(frames, None);
+        done.map_err(|stop| self.error(stop))
+    }
+
+    fn step_timed(&mut self, frames: usize, ledger: &mut Ledger) -> Result<(), SolverError> {
+        let done = self.run(frames, Some(ledger));
+        done.map_err(|stop| self.error(stop))
     }
 
     fn restore(

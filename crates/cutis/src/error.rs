@@ -111,6 +111,14 @@ pub enum Error {
         /// What happened, with the time of the last state that was read.
         source: SolverError,
     },
+    /// No setting of a scene does what is asked of it.
+    #[error("no setting meets the demand ({demand}): {nearest}; no scene was written")]
+    NoSetting {
+        /// What was asked for.
+        demand: String,
+        /// How near the settings came.
+        nearest: String,
+    },
     /// Resampling.
     #[error(transparent)]
     Resample(#[from] ResampleError),
@@ -167,7 +175,7 @@ impl Error {
                     | GpuError::Limit { .. }
                     | GpuError::OutOfMemory { .. }
             ),
-            Self::Resample(_) | Self::Render(_) | Self::Stopped { .. } => false,
+            Self::Resample(_) | Self::Render(_) | Self::Stopped { .. } | Self::NoSetting { .. } => false,
         }
     }
 }

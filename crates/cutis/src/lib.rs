@@ -40,6 +40,7 @@ mod run;
 pub mod scene;
 mod source;
 mod system;
+pub mod tune;
 
 pub use cutis_coloring as coloring;
 pub use cutis_constraints as constraints;
@@ -69,6 +70,7 @@ pub use run::run_on;
 pub use run::{RunOptions, run};
 pub use scene::{LoadedScene, Override, Scene};
 pub use system::{SceneSystem, build_system};
+pub use tune::{TuneOptions, Tuning, tune};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -235,7 +235,7 @@ pub struct Resample {
 }
 
 /// Error of one constraint kind.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KindResidual {
     /// Constraint kind.
     pub kind: String,
@@ -243,6 +243,12 @@ pub struct KindResidual {
     pub rms: f64,
     /// Largest |C| over the rest size.
     pub max: f64,
+}
+
+impl From<&cutis_solver::Residual> for KindResidual {
+    fn from(residual: &cutis_solver::Residual) -> Self {
+        Self { kind: residual.name.into(), rms: residual.rms, max: residual.max }
+    }
 }
 
 impl Report {

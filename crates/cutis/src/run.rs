@@ -146,10 +146,7 @@ fn run_with(
         wound: wounds.first().cloned(),
         wounds,
         resample: products.resample.clone(),
-        residuals: residuals
-            .iter()
-            .map(|r| KindResidual { kind: r.name.into(), rms: r.rms, max: r.max })
-            .collect(),
+        residuals: residuals.iter().map(KindResidual::from).collect(),
         max_displacement_mm,
         border_displacement_mm,
         left_out: plan.left_out,

@@ -3,6 +3,7 @@
 mod devices;
 mod look;
 mod simulate;
+mod tune;
 
 use cutis::{Error, report::Report, scene};
 
@@ -17,6 +18,7 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
             simulate::run(&scene, out, &change, resume, json)
         }
         Command::Check { scene, change, lattice, json } => simulate::check(&scene, &change, lattice, json),
+        Command::Tune { scene, tune: args, change, json } => tune::tune(&scene, &change, &args, json),
         Command::Resample { scene, run, volume, out, change } => {
             simulate::resample(&scene, &change, cutis::ResampleRequest { run, volume, out })
         }

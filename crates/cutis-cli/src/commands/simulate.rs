@@ -156,7 +156,7 @@ pub(crate) fn resample(scene: &Path, change: &Change, request: ResampleRequest) 
 
 impl Change {
     /// The changes that are overrides of keys, in the order in which they hold.
-    fn overrides(&self, lattice: Option<LatticeSize>) -> Vec<Override> {
+    pub(super) fn overrides(&self, lattice: Option<LatticeSize>) -> Vec<Override> {
         let mut list = self.set.clone();
         let mut set = |key: &str, value: String| list.push(Override { key: key.into(), value });
         if let Some(backend) = &self.backend {
@@ -180,7 +180,7 @@ impl Change {
     }
 
     /// Takes the kinds out that `--without` names.
-    fn applied(&self, mut loaded: LoadedScene) -> LoadedScene {
+    pub(super) fn applied(&self, mut loaded: LoadedScene) -> LoadedScene {
         let constraints = &mut loaded.scene.constraints;
         for kind in &self.without {
             match kind {

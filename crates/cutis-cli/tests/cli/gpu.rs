@@ -135,6 +135,10 @@ fn a_run_on_a_gpu_says_where_it_ran() {
     for key in ["kernels", "submits", "dispatches", "readbacks", "readback_bytes"] {
         assert!(report["device"][key].as_u64() > Some(0), "{key}: {report}");
     }
+    let costs = report["ledger"]["parts"].as_array().unwrap();
+    let timed: Vec<&Value> = costs.iter().map(|part| &part["part"]).collect();
+    assert_eq!(timed, ["vertices", "distance", "volume", "stc", "check"]);
+    assert!(costs.iter().all(|part| part["ms_per_frame"].as_f64() > Some(0.0)), "{costs:?}");
     let stages = report["stages"].as_array().unwrap();
     let on = |name: &str| &stages.iter().find(|stage| stage["name"] == name).unwrap()["on"];
     assert_eq!((on("simulate"), on("lattice, skin, incision")), (&"gpu".into(), &"cpu".into()));

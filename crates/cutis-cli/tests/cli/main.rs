@@ -6,6 +6,7 @@ mod exit_codes;
 mod gpu;
 mod json;
 mod printed;
+mod tune;
 
 use std::path::PathBuf;
 use std::process::{Command, Output};

@@ -1,7 +1,9 @@
 //! Equal to the reference: bit for bit on software, within rounding on hardware; with controls that must differ.
 
+use std::time::Instant;
+
 use cutis_gpu::{Gpu, GpuOptions};
-use cutis_solver::{Formulation, Settings, Solver, SolverReference};
+use cutis_solver::{Formulation, Ledger, Settings, Solver, SolverReference};
 use cutis_solver_gpu::SolverGpu;
 use nalgebra::{Point3, Vector3};
 
@@ -87,5 +89,31 @@ fn split_colours_and_baseline_limits() {
                 assert_parity(gpu, Parts::all(Formulation::Vbd), iterations);
             }
         });
+    }
+}
+
+/// A step part by part has the bits of one in one go, by the clock of the host and by the timestamps of the device.
+#[test]
+fn a_timed_step_has_the_same_bits_and_tells_its_parts() {
+    let projected: &[&str] = &["vertices", "handles", "distance", "stc", "volume", "check"];
+    let descending: &[&str] = &["vertices", "handles", "descent", "check"];
+    for (formulation, expected) in [(Formulation::Xpbd, projected), (Formulation::Vbd, descending)] {
+        for timestamps in [false, true] {
+            on_each_adapter(GpuOptions { timestamps, ..GpuOptions::default() }, |gpu| {
+                let parts = Parts::all(formulation);
+                let settings = settings(&parts, 2);
+                let mut plain = SolverGpu::new(gpu, body(parts), settings).unwrap();
+                let mut timed = SolverGpu::new(gpu, body(parts), settings).unwrap();
+                plain.step(3).unwrap();
+                let (mut ledger, start) = (Ledger::default(), Instant::now());
+                timed.step_timed(1, &mut ledger).unwrap();
+                timed.step_timed(2, &mut ledger).unwrap();
+                let wall = start.elapsed().as_secs_f64();
+                assert!(state(&mut timed) == state(&mut plain));
+                let names: Vec<&str> = ledger.parts().iter().map(|part| part.name).collect();
+                assert_eq!(names, expected);
+                assert!(ledger.parts().iter().all(|part| part.seconds > 0.0) && ledger.total_s() < wall);
+            });
+        }
     }
 }

@@ -141,6 +141,11 @@ pub(super) fn memory(_: &Device, system: &System<f32>, settings: &Settings) -> V
     cutis_solver_gpu::device_bytes(system, settings).iter().map(MemoryPart::from).collect()
 }
 
+/// The same, opened.
+pub(super) fn kept_open(device: Device) -> Result<Device, Error> {
+    open(&device).map(Device::Opened)
+}
+
 /// Opens the device.
 pub(super) fn open(device: &Device) -> Result<Gpu, Error> {
     Ok(match device {

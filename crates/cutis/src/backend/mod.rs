@@ -94,8 +94,8 @@ impl Request {
     /// As the device gives them.
     pub(crate) fn open(&self) -> Result<Option<Gpu>, Error> {
         match self {
-            Self::Settled(Chosen { place: Place::Gpu(device), .. }) => gpu::open(device).map(Some),
-            Self::Settled(_) | Self::Auto => Ok(None),
+            Self::Settled(chosen) => chosen.device(),
+            Self::Auto => Ok(None),
         }
     }
 
@@ -128,6 +128,36 @@ impl Chosen {
     /// True if it will open a device.
     pub(crate) fn on_gpu(&self) -> bool {
         matches!(self.place, Place::Gpu(_))
+    }
+
+    /// The same with the device open, if there is one, so that every start uses it.
+    ///
+    /// # Errors
+    /// As the device gives them.
+    pub(crate) fn kept_open(self) -> Result<Self, Error> {
+        Ok(match self.place {
+            Place::Gpu(device) => Self { place: Place::Gpu(gpu::kept_open(device)?), ..self },
+            Place::Cpu | Place::Reference => self,
+        })
+    }
+
+    /// The device, if there is one.
+    ///
+    /// # Errors
+    /// As the device gives them.
+    pub(crate) fn device(&self) -> Result<Option<Gpu>, Error> {
+        match &self.place {
+            Place::Gpu(device) => gpu::open(device).map(Some),
+            Place::Cpu | Place::Reference => Ok(None),
+        }
+    }
+
+    /// Threads of the host for work that runs beside the backend.
+    pub(crate) fn host_threads(&self) -> usize {
+        match self.place {
+            Place::Cpu => self.report.threads,
+            Place::Reference | Place::Gpu(_) => std::thread::available_parallelism().map_or(1, |n| n.get()),
+        }
     }
 
     /// Memory that it takes on a device, by part; nothing on the host's backends.

@@ -1,0 +1,136 @@
+//! `tune`: the calibration of a scene, as tables.
+
+use std::path::{Path, PathBuf};
+
+use cutis::tune::{Candidate, Demand, Omission, WoundError};
+use cutis::{Error, Scene, TuneOptions, Tuning};
+
+use super::pretty;
+use crate::args::{Change, TuneArgs};
+use crate::terminal::{Terminal, print};
+
+pub(super) fn tune(scene: &Path, change: &Change, args: &TuneArgs, json: bool) -> Result<(), Error> {
+    let loaded = change.applied(Scene::load(scene, &change.overrides(None))?);
+    let demand = match (args.budget_ms, args.error) {
+        (Some(ms), _) => Demand::BudgetMs(ms),
+        (None, Some(percent)) => Demand::Error(percent / 100.0),
+        (None, None) => Demand::Default,
+    };
+    let out = args.out.clone().unwrap_or_else(|| beside(scene));
+    let options = TuneOptions {
+        demand,
+        out,
+        overwrite: args.force,
+        minutes: args.minutes,
+        omissions: !args.settings_only,
+    };
+    let tuning = cutis::tune(&loaded, &options, &Terminal::new())?;
+    print(&if json { pretty(&tuning) } else { tables(&tuning) });
+    tuning.unmet().map_or(Ok(()), Err)
+}
+
+/// The scene's name with `-tuned`, in the current folder.
+fn beside(scene: &Path) -> PathBuf {
+    let mut name = scene.file_stem().unwrap_or_default().to_owned();
+    name.push("-tuned.toml");
+    name.into()
+}
+
+fn tables(tuning: &Tuning) -> String {
+    let told = &tuning.reference;
+    let order = told.order.map_or("no limit seen".into(), |order| format!("order {order:.1}"));
+    let levels: Vec<String> = told.substeps.iter().map(u32::to_string).collect();
+    let mut lines = vec![
+        format!(
+            "reference        {} substeps in f64 on the CPU, {:.0} s; extrapolated ({order}); off by at most about {:.2} %",
+            levels.join(", "),
+            told.seconds,
+            100.0 * told.error
+        ),
+        format!(
+            "                 displacement {:.3} mm RMS{}",
+            told.displacement_mm,
+            told.growths_mm.iter().map(|mm| format!("; the wound opens by {mm:.3} mm")).collect::<String>()
+        ),
+        format!("asked for        {}", tuning.demand),
+        String::new(),
+        row("", "setting", "ms/frame", "error", "opening", "difference"),
+    ];
+    let measured = tuning.candidates.iter().filter(|candidate| candidate.error.is_some());
+    lines.extend(measured.map(|candidate| candidate_row(candidate, tuning)));
+    lines.push(
+        "  > picked, * on the front (nothing measured is as cheap and as near), = the scene's own".into(),
+    );
+    lines.extend(given_up(tuning));
+    if !tuning.omissions.is_empty() {
+        lines.push("what the picked setting would save and change without".into());
+        lines.push(omission_row("", "ms/frame", "ms once", "MB", "change", "difference of the opening"));
+        lines.extend(tuning.omissions.iter().map(omission));
+    }
+    lines.extend(tuning.warnings.iter().map(|warning| format!("note: {warning}")));
+    if let Some(file) = &tuning.scene_file {
+        lines.push(format!("written:         {}", file.display()));
+    }
+    lines.join("\n")
+}
+
+/// What was not measured to the end, by reason.
+fn given_up(tuning: &Tuning) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for candidate in &tuning.candidates {
+        let Some(why) = candidate.abandoned.as_deref() else { continue };
+        let setting = candidate.setting.to_string();
+        match reasons.iter_mut().find(|(reason, _)| *reason == why) {
+            Some((_, settings)) => settings.push(setting),
+            None => reasons.push((why, vec![setting])),
+        }
+    }
+    let line = |(why, settings): (&str, Vec<String>)| format!("  {why}: {}", settings.join("; "));
+    let head = (!reasons.is_empty()).then(|| "not measured to the end:".to_owned());
+    head.into_iter().chain(reasons.into_iter().map(line)).collect()
+}
+
+fn candidate_row(candidate: &Candidate, tuning: &Tuning) -> String {
+    let picked = tuning.picked.as_ref().is_some_and(|picked| picked.setting == candidate.setting);
+    let marks: String = [(picked, '>'), (candidate.pareto, '*'), (candidate.own, '=')]
+        .iter()
+        .map(|&(holds, mark)| if holds { mark } else { ' ' })
+        .collect();
+    let list =
+        |of: &dyn Fn(&WoundError) -> String| candidate.wounds.iter().map(of).collect::<Vec<_>>().join(", ");
+    row(
+        &marks,
+        &candidate.setting.to_string(),
+        &candidate.ms_per_frame.map(|ms| format!("{ms:.2}")).unwrap_or_default(),
+        &candidate.error.map(|error| format!("{:.2} %", 100.0 * error)).unwrap_or_default(),
+        &list(&|wound| format!("{:.3} mm", wound.growth_mm)),
+        &list(&|wound| format!("{:+.3} mm ({:+.1} %)", wound.difference_mm, wound.difference_percent)),
+    )
+}
+
+fn omission(omission: &Omission) -> String {
+    if let Some(why) = &omission.skipped {
+        return format!("  {:40} not measured: {why}", omission.what);
+    }
+    let wounds: Vec<String> = omission
+        .wounds
+        .iter()
+        .map(|wound| format!("{:+.3} mm ({:+.1} %)", wound.difference_mm, wound.difference_percent))
+        .collect();
+    omission_row(
+        &omission.what,
+        &omission.saved_ms_per_frame.map(|ms| format!("{ms:.2}")).unwrap_or_default(),
+        &omission.saved_ms.map(|ms| format!("{ms:.0}")).unwrap_or_default(),
+        &format!("{:.1}", omission.saved_bytes as f64 / 1e6),
+        &omission.change.map(|change| format!("{:.1} %", 100.0 * change)).unwrap_or_default(),
+        &wounds.join(", "),
+    )
+}
+
+fn omission_row(what: &str, time: &str, once: &str, bytes: &str, change: &str, wound: &str) -> String {
+    format!("  {what:40} {time:>10} {once:>8} {bytes:>8} {change:>8}  {wound}").trim_end().to_owned()
+}
+
+fn row(marks: &str, setting: &str, time: &str, error: &str, opening: &str, difference: &str) -> String {
+    format!("{marks:4} {setting:16} {time:>10} {error:>10} {opening:>12}  {difference}").trim_end().to_owned()
+}

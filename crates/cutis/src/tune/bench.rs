@@ -1,0 +1,193 @@
+//! The bench: a prepared body that is run again and again with other settings, timed and looked at.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use cutis_constraints::Scalar;
+use cutis_mesh::Gape;
+use cutis_solver::{Formulation, Ledger, Residual, Settings, Solver, System};
+use cutis_solver_cpu::SolverCpu;
+use nalgebra::Point3;
+
+use super::field::{Field, Movable};
+use super::setting::{Line, Model, Setting};
+use crate::backend::Chosen;
+use crate::{Error, Progress};
+
+/// Time after which the measurement of a substep ends, s.
+const LONG_ENOUGH_S: f64 = 0.1;
+
+/// What is run.
+pub(super) struct Bench<'a> {
+    pub(super) system: &'a System<f32>,
+    pub(super) settings: Settings,
+    pub(super) gapes: &'a [Gape],
+    pub(super) backend: &'a Chosen,
+    pub(super) frames: u32,
+    pub(super) movable: Movable,
+}
+
+/// A run as far as it came.
+#[derive(Default)]
+pub(super) struct Run {
+    /// Mean wall time of a frame, ms.
+    pub(super) ms_per_frame: f64,
+    /// At each of [`Bench::moments`] that it reached.
+    pub(super) fields: Vec<Field>,
+    /// What each wound opened by, mm: mean distance of its lips, last frame less before the first.
+    pub(super) growths_mm: Vec<f64>,
+    /// Local metres, one per vertex of the body, at the end; empty if it was stopped before.
+    pub(super) positions: Vec<Point3<f32>>,
+    pub(super) residuals: Vec<Residual>,
+    /// Of the solver, on the host and on the device.
+    pub(super) bytes: usize,
+}
+
+impl Run {
+    /// Whether it came to the end.
+    pub(super) fn finished(&self) -> bool {
+        !self.positions.is_empty()
+    }
+
+    /// Displacements at the last moment that it reached.
+    pub(super) fn at_end(&self) -> &Field {
+        static NONE: Field = Field(Vec::new());
+        self.fields.last().unwrap_or(&NONE)
+    }
+}
+
+impl<'a> Bench<'a> {
+    pub(super) fn new(
+        system: &'a System<f32>,
+        settings: Settings,
+        gapes: &'a [Gape],
+        backend: &'a Chosen,
+        frames: u32,
+    ) -> Self {
+        Self { system, settings, gapes, backend, frames, movable: Movable::of(system) }
+    }
+
+    /// Frames after which the displacements are kept: a quarter, half and all of them.
+    pub(super) fn moments(&self) -> Vec<u32> {
+        let mut moments = vec![self.frames.div_ceil(4), self.frames.div_ceil(2), self.frames];
+        moments.dedup();
+        moments
+    }
+
+    /// Runs a setting on the scene's backend. `go_on` is asked at each moment but the last, with what was found so far.
+    pub(super) fn run(
+        &self,
+        setting: Setting,
+        progress: &dyn Progress,
+        go_on: impl FnMut(&Run) -> ControlFlow<()>,
+    ) -> Result<Run, Error> {
+        let settings = setting.settings(&self.settings);
+        let on_device = self.backend.device_bytes(self.system, &settings);
+        let mut running = self.backend.start(self.system.clone(), settings)?;
+        let mut run = self.follow(&mut *running.solver, progress, go_on)?;
+        run.bytes = on_device + running.solver.bytes().iter().map(|part| part.bytes).sum::<usize>();
+        Ok(run)
+    }
+
+    /// Runs a setting in double precision on the CPU, whatever the scene's backend.
+    pub(super) fn run_f64(
+        &self,
+        system: &System<f64>,
+        setting: Setting,
+        progress: &dyn Progress,
+    ) -> Result<Run, Error> {
+        let threads = self.backend.host_threads();
+        let mut solver = SolverCpu::new(system.clone(), setting.settings(&self.settings), Some(threads))?;
+        self.follow(&mut solver, progress, |_| ControlFlow::Continue(()))
+    }
+
+    fn follow<T: Scalar>(
+        &self,
+        solver: &mut dyn Solver<T>,
+        progress: &dyn Progress,
+        mut go_on: impl FnMut(&Run) -> ControlFlow<()>,
+    ) -> Result<Run, Error> {
+        let moments = self.moments();
+        let mut seconds = 0.0;
+        let mut run = Run::default();
+        for frame in 1..=self.frames {
+            let start = Instant::now();
+            solver.step(1)?;
+            seconds += start.elapsed().as_secs_f64();
+            progress.advance(frame.into());
+            if !moments.contains(&frame) {
+                continue;
+            }
+            run.ms_per_frame = 1e3 * seconds / f64::from(frame);
+            let positions = solver.positions()?;
+            run.fields.push(self.movable.field(&positions));
+            run.growths_mm = self.growths_mm(&positions);
+            if frame == self.frames {
+                run.positions = positions.iter().map(|p| p.map(|x| x.to_f64() as f32)).collect();
+                run.residuals = solver.system()?.residuals();
+            } else if go_on(&run).is_break() {
+                break;
+            }
+        }
+        Ok(run)
+    }
+
+    /// What each wound has opened by at `positions`, mm.
+    fn growths_mm<T: Scalar>(&self, positions: &[Point3<T>]) -> Vec<f64> {
+        let now = |v: u32| positions[v as usize].map(T::to_f64);
+        let rest = |v: u32| {
+            let vertex = self.system.vertices()[v as usize].position() + self.system.origin().coords;
+            vertex.map(f64::from)
+        };
+        let growth = |gape: &Gape| gape.measure_by(&now).mean_mm - gape.measure_by(&rest).mean_mm;
+        self.gapes.iter().map(growth).collect()
+    }
+
+    /// What substeps and iterations cost on the scene's backend: substeps with one iteration and with two.
+    pub(super) fn model(&self) -> Result<Model, Error> {
+        Ok(Model { xpbd: self.line(Formulation::Xpbd)?, vbd: self.line(Formulation::Vbd)? })
+    }
+
+    fn line(&self, formulation: Formulation) -> Result<Line, Error> {
+        let mut ms = [0.0; 2];
+        for (iterations, ms) in [1, 2].into_iter().zip(&mut ms) {
+            let settings = self.one_substep(formulation, iterations);
+            *ms = substep_ms(&mut *self.backend.start(self.system.clone(), settings)?.solver)?;
+        }
+        let iteration_ms = f64::max(ms[1] - ms[0], 0.1 * ms[0]);
+        Ok(Line { substep_ms: f64::max(ms[0] - iteration_ms, 0.0), iteration_ms })
+    }
+
+    /// Milliseconds of a substep in double precision.
+    pub(super) fn substep_f64_ms(&self, system: &System<f64>) -> Result<f64, Error> {
+        let threads = self.backend.host_threads();
+        let settings = self.one_substep(Formulation::Xpbd, 1);
+        substep_ms(&mut SolverCpu::new(system.clone(), settings, Some(threads))?)
+    }
+
+    /// Where the time of a setting goes: one frame part by part, after one to touch all memory.
+    pub(super) fn ledger(&self, setting: Setting) -> Result<Ledger, Error> {
+        let mut running = self.backend.start(self.system.clone(), setting.settings(&self.settings))?;
+        let mut ledger = Ledger::default();
+        running.solver.step(1)?;
+        running.solver.step_timed(1, &mut ledger)?;
+        Ok(ledger)
+    }
+
+    fn one_substep(&self, formulation: Formulation, iterations: u32) -> Settings {
+        let dt_s = self.settings.substep_s();
+        Settings { formulation, dt_s, substeps: 1, iterations, relaxation: 1.0, ..self.settings }
+    }
+}
+
+/// The shortest of several substeps, after one to touch all memory.
+fn substep_ms<T: Scalar>(solver: &mut dyn Solver<T>) -> Result<f64, Error> {
+    solver.step(1)?;
+    let (begin, mut shortest) = (Instant::now(), f64::INFINITY);
+    while shortest.is_infinite() || begin.elapsed().as_secs_f64() < LONG_ENOUGH_S {
+        let start = Instant::now();
+        solver.step(1)?;
+        shortest = shortest.min(start.elapsed().as_secs_f64());
+    }
+    Ok(1e3 * shortest)
+}

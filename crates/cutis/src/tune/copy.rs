@@ -1,0 +1,227 @@
+//! A copy of a scene file with other values: comments, order and spelling of what stays are kept.
+
+use std::path::{Path, PathBuf};
+
+use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
+
+use crate::scene::{LoadedScene, Scene};
+use crate::{Error, files};
+
+/// Where a copy goes, checked before the work.
+pub(super) struct Copy<'a> {
+    loaded: &'a LoadedScene,
+    path: &'a Path,
+}
+
+impl<'a> Copy<'a> {
+    /// Refuses a file that is there already, unless it may be replaced, and the scene's own file in any case.
+    pub(super) fn to(path: &'a Path, overwrite: bool, loaded: &'a LoadedScene) -> Result<Self, Error> {
+        let refuse = |why: &str| Error::Request { what: format!("{}", path.display()), why: why.into() };
+        let same =
+            |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+        if same(path, &loaded.file) {
+            return Err(refuse("is the scene itself, which stays as it is; name another file"));
+        }
+        if path.exists() && !overwrite {
+            return Err(refuse("is there already; --force replaces it, -o names another file"));
+        }
+        Ok(Self { loaded, path })
+    }
+
+    /// Writes the scene's file with whatever makes it `scene`, below a comment.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it cannot be written.
+    pub(super) fn write(&self, scene: &Scene, comment: &str) -> Result<(), Error> {
+        let directory = self.path.parent().unwrap_or(Path::new(""));
+        let text = edited(self.loaded, scene, directory)
+            .map_err(|why| Error::Request { what: format!("{}", self.path.display()), why })?;
+        files::write(self.path, format!("# {comment}\n{text}").as_bytes())
+    }
+}
+
+/// The text of a scene file that means `wanted` when it is read from `directory`.
+fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<String, String> {
+    let plain = |e: &dyn std::fmt::Display| e.to_string();
+    let value = |scene: &Scene| toml::Table::try_from(without_path(scene)).map_err(|e| plain(&e));
+    let written = Scene::parse(&loaded.text, &loaded.file, Path::new(""), &[]).map_err(|e| plain(&e))?.scene;
+    let mut document: DocumentMut = loaded.text.parse().map_err(|e| plain(&e))?;
+    change(document.as_table_mut(), &value(&written)?, &value(wanted)?);
+
+    let read = |document: &DocumentMut| Scene::parse(&document.to_string(), &loaded.file, directory, &[]);
+    let path = |scene: &Scene| scene.volume.path.as_deref().map(absolute);
+    if let Some(path) =
+        path(wanted).filter(|p| read(&document).ok().and_then(|read| path(&read.scene)).as_ref() != Some(p))
+    {
+        let text = path.to_str().ok_or("the path of the volume is not Unicode")?;
+        document["volume"]["path"] = toml_edit::value(text);
+    }
+    let found = read(&document).map_err(|e| plain(&e))?.scene;
+    if without_path(&found) != without_path(wanted) || path(&found) != path(wanted) {
+        return Err("the edited scene does not mean what it should; this is a fault of the program".into());
+    }
+    Ok(document.to_string())
+}
+
+fn without_path(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.volume.path = None;
+    scene
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.into())
+}
+
+/// Makes a table that means `from` mean `to`. Keys that are equal in both stay untouched, whether they are written or not.
+fn change(table: &mut dyn TableLike, from: &toml::Table, to: &toml::Table) {
+    for key in from.keys().filter(|key| !to.contains_key(*key)) {
+        table.remove(key);
+    }
+    for (key, to) in to.iter().filter(|(key, to)| from.get(*key) != Some(to)) {
+        let place = table.entry(key).or_insert(Item::None);
+        match (from.get(key), to) {
+            // A section of outputs names all that is written, so that it is written as a whole where there was none.
+            (Some(toml::Value::Table(from)), toml::Value::Table(to))
+                if key != "output" || !place.is_none() =>
+            {
+                if place.is_none() {
+                    *place = toml_edit::table();
+                }
+                if let Some(table) = place.as_table_like_mut() {
+                    change(table, from, to);
+                }
+            }
+            (Some(toml::Value::Array(from)), toml::Value::Array(to)) if from.len() == to.len() => {
+                change_entries(place, from, to);
+            }
+            _ => put(place, to),
+        }
+    }
+}
+
+/// The same for the entries of a list.
+fn change_entries(place: &mut Item, from: &[toml::Value], to: &[toml::Value]) {
+    let pairs = from.iter().zip(to).enumerate().filter(|(_, (from, to))| from != to);
+    for (n, pair) in pairs {
+        match (pair, &mut *place) {
+            ((toml::Value::Table(from), toml::Value::Table(to)), Item::ArrayOfTables(list)) => {
+                list.get_mut(n).into_iter().for_each(|table| change(table, from, to));
+            }
+            ((toml::Value::Table(from), toml::Value::Table(to)), Item::Value(Value::Array(list))) => {
+                let table = list.get_mut(n).and_then(Value::as_inline_table_mut);
+                table.into_iter().for_each(|table| change(table, from, to));
+            }
+            ((_, to), Item::Value(Value::Array(list))) => {
+                list.replace(n, value(to));
+            }
+            (_, place) => return put(place, &toml::Value::Array(to.to_vec())),
+        }
+    }
+}
+
+/// Replaces a value; the comments around it stay.
+fn put(place: &mut Item, new: &toml::Value) {
+    let mut new = value(new);
+    if let Item::Value(old) = place {
+        *new.decor_mut() = old.decor().clone();
+    }
+    *place = Item::Value(new);
+}
+
+fn value(value_: &toml::Value) -> Value {
+    match value_ {
+        toml::Value::String(text) => text.as_str().into(),
+        toml::Value::Integer(n) => (*n).into(),
+        toml::Value::Float(x) => (*x).into(),
+        toml::Value::Boolean(b) => (*b).into(),
+        toml::Value::Datetime(time) => time.to_string().into(),
+        toml::Value::Array(list) => list.iter().map(value).collect::<Array>().into(),
+        toml::Value::Table(table) => table.iter().map(|(k, v)| (k, value(v))).collect::<InlineTable>().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Override;
+
+    const TEXT: &str = "\
+# My scene.
+[volume]
+path = \"ct.nii.gz\"   # the CT
+
+[constraints.distance]
+youngs_modulus_pa = 5.0e3 # firm
+[constraints.stc] # skin
+area_modulus_n_per_m = 5.0
+
+[[incision]]
+# where it is cut
+from_mm = [30.0, 110.0, -50.0]
+to_mm = [30.0, 110.0, 50.0]
+depth_mm = 20.0
+width_mm = 4.0
+[run]
+frames = 3
+";
+
+    fn loaded(text: &str, set: &[(&str, &str)]) -> LoadedScene {
+        let set: Vec<Override> =
+            set.iter().map(|&(key, value)| Override { key: key.into(), value: value.into() }).collect();
+        Scene::parse(text, Path::new("here/scene.toml"), Path::new("here"), &set).unwrap()
+    }
+
+    #[test]
+    fn only_what_differs_is_changed() {
+        let mut loaded = loaded(TEXT, &[]);
+        loaded.scene.solver.substeps = 7;
+        let scene = loaded.scene.clone();
+        let text = edited(&loaded, &scene, Path::new("here")).unwrap();
+        assert_eq!(text, format!("{TEXT}\n[solver]\nsubsteps = 7\n"));
+        // A second time, into a section that is there, with a comment behind the number.
+        loaded.text =
+            text.replace("substeps = 7", "damping_per_s = 10.0 # as before\nsubsteps = 7 # too few");
+        loaded.scene.solver.substeps = 9;
+        let again = edited(&loaded, &loaded.scene, Path::new("here")).unwrap();
+        assert_eq!(again, loaded.text.replace("substeps = 7", "substeps = 9"));
+    }
+
+    #[test]
+    fn overrides_and_what_is_left_out_are_part_of_it() {
+        let set = [
+            ("incision.0.depth_mm", "25.0"),
+            ("incision.0.to_mm.1", "111.0"),
+            ("output.pictures", "false"),
+            ("tissue.density", "\"water\""),
+            ("handle", "[{ at_mm = [0, 100, 0], radius_mm = 10, move_mm = [0, 20, 0] }]"),
+        ];
+        let mut loaded = loaded(TEXT, &set);
+        loaded.scene.constraints.stc = None;
+        let text = edited(&loaded, &loaded.scene, Path::new("here")).unwrap();
+        for kept in ["# My scene.", "# firm", "# where it is cut", "# the CT", "path = \"ct.nii.gz\""] {
+            assert!(text.contains(kept), "no {kept:?} in {text}");
+        }
+        assert!(!text.contains("stc") && text.contains("depth_mm = 25.0") && text.contains("111.0, 50.0]"));
+        let read = Scene::parse(&text, Path::new("copy.toml"), Path::new("here"), &[]).unwrap();
+        assert_eq!(read.scene, loaded.scene);
+    }
+
+    #[test]
+    fn a_volume_is_found_from_elsewhere_too() {
+        let loaded = loaded(TEXT, &[]);
+        let text = edited(&loaded, &loaded.scene, Path::new("elsewhere")).unwrap();
+        let read = Scene::parse(&text, Path::new("copy.toml"), Path::new("elsewhere"), &[]).unwrap();
+        assert_eq!(read.scene.volume.path, Some(absolute(Path::new("here/ct.nii.gz"))));
+    }
+
+    #[test]
+    fn inline_sections_stay_inline() {
+        let text =
+            "volume = { phantom = { size = [8, 8, 8] } }\nsolver = { substeps = 3, iterations = 2 } # so\n";
+        let mut loaded = loaded(text, &[]);
+        loaded.scene.solver.iterations = 1;
+        let copy = edited(&loaded, &loaded.scene, Path::new("here")).unwrap();
+        assert_eq!(copy, text.replace("iterations = 2", "iterations = 1"));
+    }
+}

@@ -1,0 +1,203 @@
+//! The reference of a calibration: the scene in double precision with more and more substeps, extrapolated, and how far it can
+//! be trusted.
+//!
+//! Displacements with `S`, `2S` and `4S` substeps tend to a limit as `x + c/Sᵖ`. Two differences give the order `p`, and with it
+//! the limit (Richardson). How far the limit lies from the finest run is what the reference is said to be off by at most: that is
+//! to trust the direction of the extrapolation, and not its length. Where the differences do not shrink, or faster than any method
+//! converges, there is no limit to be seen: then the finest run is the reference, and it is said to be off by as much as it
+//! differs from the run before, or by half the difference before that, if that is more.
+
+use std::collections::VecDeque;
+
+use cutis_solver::System;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::bench::{Bench, Run};
+use super::field::Field;
+use super::setting::Setting;
+use crate::Error;
+use crate::clock::Clock;
+
+/// Differences have to shrink by this factor from level to level for a limit to be seen.
+const CONVERGES: f64 = 1.5;
+/// The order of a method is 2 at the most.
+const HIGHEST_ORDER: f64 = 2.0;
+/// Differences that shrink by more than this are chance: something cancels in them.
+const CHANCE: f64 = 6.0;
+/// Displacements of this share of the body's extent are made by the rounding of its rest shape to `f32`.
+const ROUNDING: f64 = 1e-6;
+/// The fewest substeps of the first level: below, nothing is seen of a limit.
+const FEWEST: u32 = 4;
+/// Levels beyond this many substeps are not tried: the time step nears the resolution of the clock of the scene.
+const MOST: u32 = 1 << 20;
+
+/// What candidates are measured against.
+pub(super) struct Reference {
+    /// One per moment of the bench.
+    pub(super) fields: Vec<Field>,
+    pub(super) told: ReferenceReport,
+}
+
+/// What is told of the reference.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct ReferenceReport {
+    /// Substeps of its runs, each of one iteration, in double precision on the CPU.
+    pub substeps: Vec<u32>,
+    /// Relative difference between each run and the one before: RMS of the positions over the RMS displacement.
+    pub differences: Vec<f64>,
+    /// Order of convergence that the last three show; none where they show none.
+    pub order: Option<f64>,
+    /// How far the reference may be off: RMS of the positions over the RMS displacement.
+    pub error: f64,
+    /// RMS displacement of the vertices that can move, mm.
+    pub displacement_mm: f64,
+    /// What each wound opens by, mm: mean distance of its lips, at the end less at the start.
+    pub growths_mm: Vec<f64>,
+    /// Wall time of its runs, s.
+    pub seconds: f64,
+}
+
+/// Runs levels of twice the substeps each, until the error is below `enough` or the next level would take the whole beyond
+/// `limit_s`; three levels at least.
+pub(super) fn run(
+    bench: &Bench<'_>,
+    own: Setting,
+    enough: f64,
+    limit_s: f64,
+    clock: &mut Clock<'_>,
+) -> Result<Reference, Error> {
+    let system: System<f64> = bench.system.to_f64();
+    let frame_s = 1e-3 * bench.substep_f64_ms(&system)? * f64::from(bench.frames);
+    // Three levels take seven times as long as the first.
+    let affordable = (limit_s / 7.0 / frame_s.max(f64::MIN_POSITIVE)) as u32;
+    let mut substeps = own.sweeps().min(affordable).max(FEWEST);
+    let mut levels = Levels::default();
+    loop {
+        let name = format!("reference: {substeps} substeps, f64");
+        let setting = Setting::xpbd(substeps);
+        let run =
+            clock.stage(&name, bench.frames.into(), |progress| bench.run_f64(&system, setting, progress))?;
+        if run.at_end().rms() <= ROUNDING * bench.movable.extent() {
+            let why = "nothing moves in this scene beyond rounding, so that there is no error to be measured";
+            return Err(Error::Request { what: "tuning".into(), why: why.into() });
+        }
+        levels.push(substeps, run, bench.frames);
+        if let Some(reference) = levels.limit() {
+            let next_s =
+                levels.seconds / f64::from(levels.substeps.iter().sum::<u32>()) * f64::from(2 * substeps);
+            if reference.told.error <= enough || levels.seconds + next_s > limit_s || substeps > MOST {
+                return Ok(reference);
+            }
+        }
+        substeps *= 2;
+    }
+}
+
+/// The runs so far, and the displacements of the last three.
+#[derive(Default)]
+struct Levels {
+    substeps: Vec<u32>,
+    differences: Vec<f64>,
+    last: VecDeque<Run>,
+    seconds: f64,
+}
+
+impl Levels {
+    fn push(&mut self, substeps: u32, run: Run, frames: u32) {
+        self.seconds += 1e-3 * run.ms_per_frame * f64::from(frames);
+        if let Some(before) = self.last.back() {
+            let (now, before) = (run.at_end(), before.at_end());
+            self.differences.push(now.rms_to(before) / now.rms());
+        }
+        self.substeps.push(substeps);
+        self.last.push_back(run);
+        if self.last.len() > 3 {
+            self.last.pop_front();
+        }
+    }
+
+    /// What the last three runs say; none if there are fewer.
+    fn limit(&self) -> Option<Reference> {
+        let [first, second, third] = [self.last.front()?, self.last.get(1)?, self.last.get(2)?];
+        let [before, last] = [second.at_end().rms_to(first.at_end()), third.at_end().rms_to(second.at_end())];
+        let shrinks = before / last;
+        let order = (CONVERGES..CHANCE).contains(&shrinks).then(|| shrinks.log2().min(HIGHEST_ORDER));
+        let factor = order.map_or(0.0, |order| 1.0 / (2_f64.powf(order) - 1.0));
+        let pairs = third.fields.iter().zip(&second.fields);
+        let fields: Vec<Field> = pairs.map(|(now, before)| now.beyond(before, factor)).collect();
+        let limit = fields.last()?;
+        let off = if order.is_some() { limit.rms_to(third.at_end()) } else { f64::max(last, 0.5 * before) };
+        let told = ReferenceReport {
+            substeps: self.substeps.clone(),
+            differences: self.differences.clone(),
+            order,
+            error: off / limit.rms(),
+            displacement_mm: 1e3 * limit.rms(),
+            growths_mm: third
+                .growths_mm
+                .iter()
+                .zip(&second.growths_mm)
+                .map(|(now, before)| now + factor * (now - before))
+                .collect(),
+            seconds: self.seconds,
+        };
+        Some(Reference { fields, told })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// Runs that end at `x(substeps)`, for three vertices.
+    fn limit(x: impl Fn(f64) -> [f64; 3]) -> Reference {
+        let mut levels = Levels::default();
+        for substeps in [8, 16, 32, 64] {
+            let x = x(f64::from(substeps));
+            let field = Field(x.map(|x| Vector3::new(x as f32, 0.0, 1.0)).to_vec());
+            let run =
+                Run { ms_per_frame: 1.0, fields: vec![field], growths_mm: vec![x[0]], ..Run::default() };
+            levels.push(substeps, run, 10);
+        }
+        levels.limit().unwrap()
+    }
+
+    #[test]
+    fn the_limit_of_a_converging_sequence_is_found_with_its_order() {
+        for order in [1.0, 2.0] {
+            let found = limit(|s| [3.0 + s.powf(-order), 2.0 - 5.0 * s.powf(-order), 1.0]);
+            let [x, y, _] = [found.fields[0].0[0].x, found.fields[0].0[1].x, 0.0];
+            assert!((x - 3.0).abs() < 1e-5 && (y - 2.0).abs() < 1e-5, "{x} {y}");
+            assert!((found.told.order.unwrap() - order).abs() < 1e-2);
+            assert!(found.told.error < 1.1 * 5.0 / 64_f64.powf(order));
+            assert!((found.told.growths_mm[0] - 3.0).abs() < 1e-4);
+            assert_eq!((found.told.differences.len(), found.told.substeps.len()), (3, 4));
+        }
+    }
+
+    /// A higher power beside the first, so that the order is wrong: the error that is told is not below the error that there is.
+    #[test]
+    fn what_is_told_of_the_error_holds() {
+        for c in [-20.0, -3.0, 3.0, 20.0] {
+            let found = limit(|s| [3.0 + 1.0 / s + c / (s * s), 2.0 - c / s.powi(3), 1.0]);
+            let exact = Field(vec![
+                Vector3::new(3.0, 0.0, 1.0),
+                Vector3::new(2.0, 0.0, 1.0),
+                Vector3::new(1.0, 0.0, 1.0),
+            ]);
+            let error = found.fields[0].rms_to(&exact) / exact.rms();
+            assert!(error <= found.told.error + 1e-7, "{c}: {error} {}", found.told.error);
+        }
+    }
+
+    #[test]
+    fn a_sequence_that_does_not_converge_is_not_extrapolated() {
+        let found = limit(|s| [3.0 + 0.1 * s.log2(), 2.0, 1.0]);
+        assert_eq!(found.told.order, None);
+        assert!((f64::from(found.fields[0].0[0].x) - 3.6).abs() < 1e-6);
+        assert!((found.told.error - found.told.differences[2]).abs() < 1e-6 && found.told.error > 0.01);
+    }
+}

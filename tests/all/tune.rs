@@ -1,0 +1,202 @@
+//! What a calibration promises is what a run of the tuned scene does: its error, measured here against a finer reference of the
+//! test's own, its opening, and its time.
+
+use std::path::{Path, PathBuf};
+
+use cutis::report::Report;
+use cutis::solver::{Formulation, Settings, Solver};
+use cutis::solver_cpu::SolverCpu;
+use cutis::tune::Demand;
+use cutis::{Error, LoadedScene, Scene, Silent, TuneOptions, Tuning};
+use nalgebra::Point3;
+
+use crate::scenes::{self, SMALL, run_in};
+
+/// The small phantom, on a coarser lattice and for a shorter time, in which it comes to rest.
+fn scene(set: &[(&str, &str)]) -> LoadedScene {
+    let quick = [
+        ("lattice.spacing_mm", "14"),
+        ("incision.0.width_mm", "11"),
+        ("solver.damping_per_s", "40"),
+        ("run.frames", "16"),
+        ("output", "{ report = true }"),
+    ];
+    scenes::scene(SMALL, &[&quick, set].concat())
+}
+
+fn options(out: PathBuf, demand: Demand) -> TuneOptions {
+    TuneOptions { demand, out, overwrite: false, minutes: 0.3, omissions: false }
+}
+
+/// Takes as long as it needs.
+fn tuned(loaded: &LoadedScene, folder: &Path, demand: Demand) -> (Tuning, LoadedScene) {
+    let options = TuneOptions { minutes: 30.0, ..options(folder.join("tuned.toml"), demand) };
+    let tuning = cutis::tune(loaded, &options, &Silent).unwrap();
+    let tuned = Scene::load(&folder.join("tuned.toml"), &[]).unwrap();
+    (tuning, tuned)
+}
+
+/// Positions in the checkpoint of a folder, local metres.
+fn state(folder: &Path) -> Vec<Point3<f64>> {
+    let bytes = std::fs::read(folder.join("checkpoint.bin")).unwrap();
+    let values: Vec<f64> = bytes[52..bytes.len() - 32]
+        .chunks_exact(4)
+        .map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap())))
+        .collect();
+    values[..values.len() / 2].chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect()
+}
+
+/// The whole course of a scene in double precision, with its own formulation and many substeps: rest, end, and what can move.
+fn reference(loaded: &LoadedScene, substeps: u32) -> [Vec<Point3<f64>>; 2] {
+    let built = cutis::build_system(loaded).unwrap();
+    let system = built.system.to_f64();
+    let free = |places: Vec<Point3<f64>>| -> Vec<Point3<f64>> {
+        let vertices = built.system.vertices().iter();
+        places.into_iter().zip(vertices).filter(|(_, v)| v.inverse_mass() > 0.0).map(|(p, _)| p).collect()
+    };
+    let rest = system.positions();
+    let settings = Settings {
+        formulation: Formulation::Xpbd,
+        substeps,
+        iterations: 1,
+        relaxation: 1.0,
+        ..built.settings
+    };
+    let mut solver = SolverCpu::new(system, settings, None).unwrap();
+    solver.step(loaded.scene.run.frames as usize).unwrap();
+    [free(rest), free(solver.positions().unwrap())]
+}
+
+fn rms(a: &[Point3<f64>], b: &[Point3<f64>]) -> f64 {
+    (a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len() as f64).sqrt()
+}
+
+fn near(found: f64, promised: f64) -> bool {
+    (found - promised).abs() <= 0.2 * promised.abs()
+}
+
+#[test]
+fn a_run_of_the_tuned_scene_confirms_what_was_promised() {
+    let folder = tempfile::tempdir().unwrap();
+    let loaded = scene(&[]);
+    let (tuning, tuned) = tuned(&loaded, folder.path(), Demand::Error(0.06));
+    let picked = tuning.picked.clone().unwrap();
+    let promised = picked.error.unwrap();
+    assert!(promised + tuning.reference.error <= 0.06 && tuning.reference.error <= 0.006, "{tuning:?}");
+
+    // Nothing but the setting differs.
+    let mut expected = loaded.scene.clone();
+    expected.solver = tuned.scene.solver.clone();
+    assert_eq!(tuned.scene, expected);
+
+    let system = cutis::build_system(&loaded).unwrap().system;
+    let [rest, fine] = reference(&loaded, 2 * tuning.reference.substeps.last().unwrap());
+    let run = |loaded: &LoadedScene| -> (Report, f64) {
+        let mut kept = loaded.clone();
+        kept.scene.run.checkpoint_every = 1000;
+        let report = run_in(folder.path(), &kept, false).unwrap();
+        let end = state(folder.path()).into_iter().zip(system.vertices());
+        let end: Vec<_> = end.filter(|(_, v)| v.inverse_mass() > 0.0).map(|(p, _)| p).collect();
+        (report, rms(&end, &fine) / rms(&fine, &rest))
+    };
+    let (report, error) = run(&tuned);
+    assert!(near(error, promised), "an error of {error} and not {promised}");
+    let wound = report.wound.clone().unwrap();
+    let growth = wound.final_mm - wound.initial_mm;
+    assert!((growth - picked.wounds[0].growth_mm).abs() < 1e-6, "{growth} {picked:?}");
+    // The control: the scene as it was is not what was promised.
+    let (_, before) = run(&loaded);
+    assert!(!near(before, promised), "{before} {promised}");
+
+    // Time, as far as a machine that runs other tests beside can tell: if it is steady, it keeps the promise.
+    let times: Vec<f64> = (0..5).map(|_| run(&tuned).0.frames.ms_mean).collect();
+    let promised = picked.ms_per_frame.unwrap();
+    let (least, most) = times.iter().fold((f64::MAX, 0.0), |(l, m), &t| (f64::min(l, t), f64::max(m, t)));
+    if !times.iter().any(|&ms| near(ms, promised)) {
+        assert!(most > 1.2 * least, "{promised} ms were promised, and the runs took {times:?}");
+        eprintln!(
+            "the machine is too busy to tell times: {promised} ms were promised, and the runs took {times:?}"
+        );
+    }
+}
+
+#[test]
+fn a_budget_is_kept_and_the_front_is_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let loaded = scene(&[("run.frames", "8")]);
+    let (tuning, _) = tuned(&loaded, folder.path(), Demand::Default);
+    let own = tuning.candidates.iter().find(|candidate| candidate.own).unwrap();
+    let budget = own.ms_per_frame.unwrap();
+    assert!(own.error.unwrap() > 0.05, "{own:?}");
+    let best = tuning.picked.unwrap();
+    assert!(best.error < own.error);
+    let mut front: Vec<_> = tuning.candidates.iter().filter(|c| c.pareto).collect();
+    front.sort_by(|a, b| a.ms_per_frame.unwrap().total_cmp(&b.ms_per_frame.unwrap()));
+    assert!(front.len() > 2 && front.windows(2).all(|pair| pair[0].error > pair[1].error), "{front:?}");
+
+    let other = tempfile::tempdir().unwrap();
+    let (tuning, _) = tuned(&loaded, other.path(), Demand::BudgetMs(budget));
+    let picked = tuning.picked.unwrap();
+    assert!(picked.ms_per_frame.unwrap() <= budget);
+    let affordable = tuning.candidates.iter().filter(|c| c.ms_per_frame.is_some_and(|ms| ms <= budget));
+    assert!(affordable.filter_map(|c| c.error).all(|error| error >= picked.error.unwrap()));
+}
+
+#[test]
+fn what_can_be_left_out_is_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let outputs = "{ surface = true, volume = true, report = true }";
+    let loaded = scene(&[("run.frames", "4"), ("output", outputs)]);
+    let options =
+        TuneOptions { omissions: true, ..options(folder.path().join("tuned.toml"), Demand::Error(0.5)) };
+    let tuning = cutis::tune(&loaded, &options, &Silent).unwrap();
+    let find = |what: &str| tuning.omissions.iter().find(|o| o.what.contains(what)).unwrap();
+    let stc = find("stc");
+    assert!((stc.wounds[0].difference_percent + 100.0).abs() < 1.0, "without tension it stays shut: {stc:?}");
+    assert!((stc.change.unwrap() - 1.0).abs() < 0.01);
+    for kind in ["distance", "volume", "stc"] {
+        let part = tuning.ledger.parts.iter().find(|part| part.part == kind).unwrap();
+        assert!(find(kind).saved_bytes >= part.host_bytes as i64, "{kind}");
+        assert!(find(kind).residuals.len() == 2 && find(kind).change > Some(0.0), "{kind}");
+    }
+    let (fine, coarse) = (find("1.25 x"), find("2 x"));
+    assert!(0 < fine.saved_bytes && fine.saved_bytes < coarse.saved_bytes);
+    assert!(fine.change.unwrap() < 1.0, "the same body moves much alike on another lattice: {fine:?}");
+    let region = find("mm and more from the action");
+    assert!(region.saved_bytes > 0 && region.change.is_some(), "{region:?}");
+    let files: Vec<&str> = tuning.omissions.iter().filter_map(|o| o.what.strip_prefix("output.")).collect();
+    assert_eq!(files, ["surface", "volume"]);
+    assert!(find("output.volume").saved_bytes > 0 && find("output.volume").saved_ms > Some(0.0));
+    assert_eq!(scenes::names(folder.path()), ["tuned.toml"], "outputs that were timed are not kept");
+}
+
+#[test]
+fn what_cannot_be_tuned_is_refused_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("tuned.toml");
+    let refused = |set: &[(&str, &str)], demand: Demand, words: &[&str]| {
+        let error = cutis::tune(&scene(set), &options(out.clone(), demand), &Silent).unwrap_err();
+        assert!(error.is_bad_input(), "{error}");
+        words.iter().for_each(|word| assert!(error.to_string().contains(word), "no {word:?} in {error}"));
+    };
+    refused(&[("solver.formulation", "\"pbd\"")], Demand::Default, &["solver.formulation", "pbd", "xpbd"]);
+    refused(&[("run.frames", "0")], Demand::Default, &["run.frames"]);
+    refused(&[], Demand::Error(f64::NAN), &["an error of NaN %", "100 %"]);
+    refused(&[], Demand::BudgetMs(-1.0), &["a budget of -1 ms"]);
+    refused(&[("constraints", "{}"), ("run.frames", "1")], Demand::Default, &["nothing moves"]);
+    std::fs::write(&out, "# mine").unwrap();
+    refused(&[], Demand::Default, &["tuned.toml", "--force"]);
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), "# mine");
+}
+
+#[test]
+fn a_demand_that_nothing_meets_is_told_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let loaded = scene(&[("run.frames", "2")]);
+    let options = options(folder.path().join("tuned.toml"), Demand::BudgetMs(1e-6));
+    let tuning = cutis::tune(&loaded, &options, &Silent).unwrap();
+    let error = tuning.unmet().unwrap();
+    assert!(matches!(&error, Error::NoSetting { .. }) && !error.is_bad_input(), "{error}");
+    assert!(tuning.picked.is_none() && tuning.scene_file.is_none() && !options.out.exists());
+    assert!(tuning.candidates.iter().any(|candidate| candidate.own && candidate.error.is_some()));
+}
