@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::hessian::{Form, assemble, extent};
+use crate::hessian::{assemble, extent};
 use crate::objective::{Objective, Outer, State};
 use crate::{NewtonError, Problem};
 
@@ -30,7 +30,7 @@ impl Problem {
         let state = objective.at(self.local(x));
         let pattern = self.pattern()?;
         let mut factors = pattern.factors()?;
-        assemble(&objective, &state, &pattern.places, Form::Exact, &mut factors);
+        assemble(&objective, &state, &pattern.places, 0.0, &mut factors);
         let step = f64::EPSILON.cbrt() * self.smallest_extent(&state);
         let mut found = Derivatives { gradient: 0.0, hessian: 0.0 };
         for sample in 0..samples {

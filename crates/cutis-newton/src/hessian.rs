@@ -15,21 +15,13 @@ use crate::pattern::Factors;
 /// Elements whose blocks are computed side by side before they are summed up in order.
 const CHUNK: usize = 8192;
 
-/// Whether the elements' Hessians are taken as they are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Form {
-    /// The second derivatives.
-    Exact,
-    /// With the absolute values of each element's eigenvalues.
-    Absolute,
-}
-
-/// The Hessian of the objective at `state`, into `factors`.
+/// The Hessian of the objective at `state`, into `factors`, with the share `turned` of each element's negative curvature turned upwards: 0
+/// for the second derivatives as they are, 1 for the absolute values of their eigenvalues.
 pub(crate) fn assemble(
     objective: &Objective<'_>,
     state: &State,
     places: &[u32],
-    form: Form,
+    turned: f64,
     factors: &mut Factors<'_>,
 ) {
     factors.values.fill(0.0);
@@ -41,7 +33,7 @@ pub(crate) fn assemble(
             let blocks = &mut blocks[..count * n * n];
             blocks.par_chunks_mut((n * n).max(1)).enumerate().for_each_init(
                 || Workspace::new(elements.arity()),
-                |workspace, (k, block)| workspace.hessian(elements, first + k, &state.x, form, block),
+                |workspace, (k, block)| workspace.hessian(elements, first + k, &state.x, turned, block),
             );
             for (k, block) in blocks.chunks_exact((n * n).max(1)).enumerate() {
                 scatter(elements.vertices(first + k), places, block, factors);
@@ -89,7 +81,7 @@ impl Workspace {
     }
 
     /// `(∇C∇Cᵀ + C∇²C)/α` of element `k`, column by column into `block`.
-    fn hessian(&mut self, elements: &Elements, k: usize, x: &[Point3<f64>], form: Form, block: &mut [f64]) {
+    fn hessian(&mut self, elements: &Elements, k: usize, x: &[Point3<f64>], turned: f64, block: &mut [f64]) {
         elements.gather(k, x, &mut self.places);
         let c = elements.evaluate_one(k, &self.places, &mut self.gradient);
         let n = 3 * self.places.len();
@@ -122,9 +114,10 @@ impl Workspace {
                 block[row * n + column] = mean;
             }
         }
-        if form == Form::Absolute {
+        if turned > 0.0 {
             let eigen = SymmetricEigen::new(DMatrix::from_column_slice(n, n, block));
-            let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.abs());
+            let values = eigen.eigenvalues.map(|value| value + turned * (value.abs() - value));
+            let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&values);
             block.copy_from_slice((scaled * eigen.eigenvectors.transpose()).as_slice());
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::hessian::{Form, assemble};
+use crate::hessian::assemble;
 use crate::objective::{Objective, State};
 use crate::pattern::{Factors, Pattern};
 use crate::{NewtonError, Options};
@@ -11,6 +11,8 @@ use crate::{NewtonError, Options};
 const DECREASE: f64 = 1e-4;
 /// Step lengths below this are given up.
 const SHORTEST: f64 = 1e-9;
+/// The least share of the negative curvature that is turned upwards.
+const LEAST_TURNED: f64 = 1e-3;
 /// The first shift of the Hessian, as a share of its diagonal.
 const FIRST_SHIFT: f64 = 1e-6;
 /// With so large a shift every matrix with a positive diagonal would be definite.
@@ -32,7 +34,8 @@ pub(crate) fn minimise(
     options: &Options,
 ) -> Result<Found, NewtonError> {
     let pattern = objective.problem.pattern()?;
-    let mut search = Search { objective, pattern, factors: pattern.factors()?, shift: 0.0, definite: None };
+    let mut search =
+        Search { objective, pattern, factors: pattern.factors()?, turned: 1.0, shift: 0.0, definite: None };
     let mut state = objective.at(start);
     if let Some(n) = state.gradient.iter().position(|g| !g.is_finite()) {
         let (vertex, what) = (objective.problem.free[n / 3] as usize, "the force at the start");
@@ -45,7 +48,7 @@ pub(crate) fn minimise(
         if state.norm <= (options.tolerance * scale).max(state.floor) {
             let definite = match search.definite {
                 Some(definite) => definite,
-                None => search.factorise(&state, Form::Exact, 0.0),
+                None => search.factorise(&state, 0.0, 0.0),
             };
             return Ok(Found { state, gradient, iterations, definite });
         }
@@ -60,6 +63,8 @@ struct Search<'a> {
     objective: &'a Objective<'a>,
     pattern: &'a Pattern,
     factors: Factors<'a>,
+    /// How much of the elements' negative curvature is turned upwards where the Hessian is not definite.
+    turned: f64,
     /// What is added to the diagonal of the Hessian, as a share of it. Zero near a minimum.
     shift: f64,
     /// Whether the Hessian was positive definite as it is, when last looked at.
@@ -69,32 +74,48 @@ struct Search<'a> {
 impl Search<'_> {
     /// The next state, lower than `state`; `None` if no step is.
     fn step(&mut self, state: &State) -> Option<State> {
-        let plain = self.factorise(state, Form::Exact, 0.0);
+        let plain = self.factorise(state, 0.0, 0.0);
         self.definite = Some(plain);
         if plain && let Some((next, _)) = self.along_direction(state) {
             self.shift = 0.0;
             return Some(next);
         }
-        // Where the Hessian bends downwards: the absolute one, and the more of a shift the shorter its steps must be.
+        // Where the Hessian bends downwards: as little of that turned upwards as makes it definite. Beside a saddle, where elements that
+        // bend upwards and downwards all but cancel, the steps would be short with more.
         while self.shift <= LARGEST_SHIFT {
-            if self.factorise(state, Form::Absolute, self.shift)
+            if self.factorise(state, self.turned, self.shift)
                 && let Some((next, length)) = self.along_direction(state)
             {
-                self.shift = match length {
-                    1.0 if self.shift <= FIRST_SHIFT => 0.0,
-                    1.0 => self.shift / 10.0,
-                    length if length < 0.1 => (10.0 * self.shift).max(FIRST_SHIFT),
-                    _ => self.shift,
-                };
+                match length {
+                    1.0 => self.loosen(),
+                    length if length < 0.1 => self.tighten(),
+                    _ => (),
+                }
                 return Some(next);
             }
-            self.shift = (10.0 * self.shift).max(FIRST_SHIFT);
+            self.tighten();
         }
         None
     }
 
-    fn factorise(&mut self, state: &State, form: Form, shift: f64) -> bool {
-        assemble(self.objective, state, &self.pattern.places, form, &mut self.factors);
+    fn tighten(&mut self) {
+        if self.turned < 1.0 {
+            self.turned = (4.0 * self.turned).min(1.0);
+        } else {
+            self.shift = (10.0 * self.shift).max(FIRST_SHIFT);
+        }
+    }
+
+    fn loosen(&mut self) {
+        if self.shift > 0.0 {
+            self.shift = if self.shift <= FIRST_SHIFT { 0.0 } else { self.shift / 10.0 };
+        } else {
+            self.turned = (0.5 * self.turned).max(LEAST_TURNED);
+        }
+    }
+
+    fn factorise(&mut self, state: &State, turned: f64, shift: f64) -> bool {
+        assemble(self.objective, state, &self.pattern.places, turned, &mut self.factors);
         if shift > 0.0 {
             let diagonal: Vec<usize> = (0..state.gradient.len()).map(|n| self.factors.diagonal(n)).collect();
             let mean = diagonal.iter().map(|&n| self.factors.values[n]).sum::<f64>() / diagonal.len() as f64;

@@ -106,3 +106,12 @@ proptest! {
         prop_assert!(found.gradient <= 1e-10, "{} after {}", found.gradient, found.iterations);
     }
 }
+
+/// Beside a saddle the way down is found in a few steps, not in thousands.
+#[test]
+fn a_saddle_is_left() {
+    let problem = problem(1.0, [1.183, 1.168e-4, 0.1075], 1e-3);
+    let start = shaken(problem.positions(), 0.781, |v| problem.masses()[v].is_infinite());
+    let found = problem.equilibrium(&start, &Options::default()).unwrap();
+    assert!(found.definite);
+}
