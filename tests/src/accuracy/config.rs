@@ -87,6 +87,14 @@ pub const XPBD: Method = Method {
     weight: 1,
 };
 
+/// Vertex by vertex, with true convergence.
+pub const VBD: Method = Method {
+    formulation: "vbd",
+    variant: "",
+    apply: |settings| settings.formulation = Formulation::Vbd,
+    weight: 2,
+};
+
 /// Without a material.
 pub const PBD: Method = Method {
     formulation: "pbd",
@@ -98,12 +106,7 @@ pub const PBD: Method = Method {
 /// The methods that solve for the material's answer.
 pub const METHODS: &[Method] = &[
     XPBD,
-    Method {
-        formulation: "vbd",
-        variant: "",
-        apply: |settings| settings.formulation = Formulation::Vbd,
-        weight: 2,
-    },
+    VBD,
     Method {
         formulation: "vbd",
         variant: "ω 1.7",

@@ -3,7 +3,7 @@
 use cutis_gpu::Gpu;
 
 use super::cases::Case;
-use super::config::{Backend, Config, METHODS, Method, PBD, XPBD, is_software};
+use super::config::{Backend, Config, METHODS, Method, PBD, VBD, XPBD, is_software};
 
 /// Which pairs of substeps and iterations there are.
 #[derive(Clone, Copy)]
@@ -58,6 +58,7 @@ pub fn configs(case: &Case, quick: bool, gpu: Option<&Gpu>) -> Vec<Config> {
         add(Backend::Cpu, method, limits.shared_by(method.weight), true);
     }
     add(Backend::CpuDouble, XPBD, limits, false);
+    add(Backend::CpuDouble, VBD, limits.shared_by(VBD.weight), false);
     add(Backend::Reference, XPBD, limits.shared_by(8), false);
     match gpu {
         None => (),

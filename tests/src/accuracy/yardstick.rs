@@ -64,7 +64,9 @@ impl Yardstick {
         let system = case.xpbd.to_f64();
         let problem = Problem::of(&system, settings.gravity_m_s2)?;
         tell("equilibrium by Newton's method");
-        let equilibrium = problem.equilibrium(&run.positions()?, &Options::default())?.positions;
+        let found = problem.equilibrium(&run.positions()?, &Options::default())?;
+        tell(&format!("equilibrium {} after {} iterations", if found.definite { "stable" } else { "not stable" }, found.iterations));
+        let equilibrium = found.positions;
         Ok(Self {
             rest: system.positions(),
             free: system.vertices().iter().map(|vertex| vertex.inverse_mass() > 0.0).collect(),

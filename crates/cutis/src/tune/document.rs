@@ -1,0 +1,146 @@
+//! What a calibration found: the document that is printed, and written as JSON.
+
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Demand, Omission, ReferenceReport, Setting};
+use crate::report::{Backend, Machine, Stage};
+use crate::{CostLedger, Error};
+
+/// Version of the layout of a calibration; the number grows when a key changes its meaning or goes.
+pub const SCHEMA: &str = "cutis-tune/1";
+
+/// A calibration.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Tuning {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of this program.
+    pub cutis_version: String,
+    /// Machine that it ran on.
+    pub machine: Machine,
+    /// What the candidates ran on.
+    pub backend: Backend,
+    /// Frames of a run.
+    pub frames: u32,
+    /// What was asked for.
+    pub demand: Demand,
+    /// What the candidates were measured against.
+    pub reference: ReferenceReport,
+    /// All settings that were thought of, by the cost that was expected.
+    pub candidates: Vec<Candidate>,
+    /// The one to take; none if none meets the demand.
+    pub picked: Option<Candidate>,
+    /// The tuned copy of the scene; none if no setting meets the demand.
+    pub scene_file: Option<PathBuf>,
+    /// Bytes and time of the picked setting by part.
+    pub ledger: CostLedger,
+    /// What can be left out, and what that saves and changes; empty if it was not measured.
+    pub omissions: Vec<Omission>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Time that it took, by stage.
+    pub stages: Vec<Stage>,
+}
+
+/// A setting and what was found of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Candidate {
+    /// The setting.
+    pub setting: Setting,
+    /// Wall time of a frame that was expected before, ms.
+    pub expected_ms: f64,
+    /// Mean wall time of the frames that were run, ms; none if it was not run.
+    pub ms_per_frame: Option<f64>,
+    /// RMS distance of the positions from the reference at the end over the RMS displacement of the reference, over the vertices that
+    /// can move; none if it did not get there.
+    pub error: Option<f64>,
+    /// Opening of each wound: what it opens by and how that differs from the reference; empty if it did not get there.
+    pub wounds: Vec<WoundError>,
+    /// Whether no other measured setting is as cheap and as near.
+    pub pareto: bool,
+    /// Whether it is the scene's own.
+    pub own: bool,
+    /// Why it was not run, or not to the end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub abandoned: Option<String>,
+}
+
+/// How a wound opened, against the reference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WoundError {
+    /// What it opened by, mm: mean distance of its lips, at the end less at the start.
+    pub growth_mm: f64,
+    /// That, less what it opens by in the reference, mm.
+    pub difference_mm: f64,
+    /// The same in percent of what it opens by in the reference.
+    pub difference_percent: f64,
+}
+
+impl Candidate {
+    /// A candidate that was not run yet.
+    pub(super) fn planned(setting: Setting, expected_ms: f64) -> Self {
+        Self {
+            setting,
+            expected_ms,
+            ms_per_frame: None,
+            error: None,
+            wounds: Vec::new(),
+            pareto: false,
+            own: false,
+            abandoned: None,
+        }
+    }
+}
+
+impl WoundError {
+    pub(super) fn of(growth_mm: f64, expected_mm: f64) -> Self {
+        let difference_mm = growth_mm - expected_mm;
+        Self { growth_mm, difference_mm, difference_percent: 100.0 * difference_mm / expected_mm.abs() }
+    }
+}
+
+impl Tuning {
+    /// What is promised of a setting, in a line.
+    pub(super) fn promise(&self, picked: &Candidate) -> String {
+        let percent = |share: Option<f64>| 100.0 * share.unwrap_or(f64::NAN);
+        let processor = match &self.backend.adapter {
+            Some(adapter) => adapter.clone(),
+            None => format!("{}, {} threads", self.machine.cpu, self.backend.threads),
+        };
+        format!(
+            "Tuned by cutis {}: error {:.2} % (reference within {:.2} %), {:.1} ms per frame on {} ({processor}).",
+            self.cutis_version,
+            percent(picked.error),
+            100.0 * self.reference.error,
+            picked.ms_per_frame.unwrap_or(f64::NAN),
+            self.backend.name,
+        )
+    }
+
+    /// The error of a calibration in which no setting meets the demand.
+    pub fn unmet(&self) -> Option<Error> {
+        let measured = |candidate: &&Candidate| candidate.error.is_some();
+        let best = self
+            .candidates
+            .iter()
+            .filter(measured)
+            .min_by(|a, b| a.error.unwrap_or(f64::INFINITY).total_cmp(&b.error.unwrap_or(f64::INFINITY)));
+        let nearest = best.map_or("none was measured to the end".into(), |best| {
+            format!(
+                "the nearest of those measured, {}, has an error of {:.2} % and takes {:.1} ms per frame",
+                best.setting,
+                100.0 * best.error.unwrap_or(f64::NAN),
+                best.ms_per_frame.unwrap_or(f64::NAN)
+            )
+        });
+        self.picked.is_none().then(|| Error::NoSetting { demand: self.demand.to_string(), nearest })
+    }
+
+    /// JSON schema of a calibration.
+    pub fn json_schema() -> serde_json::Value {
+        schemars::schema_for!(Tuning).to_value()
+    }
+}
