@@ -1,7 +1,7 @@
 //! `cutis tune`: which setting a scene needs on this machine, measured; and what of it can be left out.
 //!
 //! A calibration runs the scene to its end, again and again on one prepared body. First a reference in double precision
-//! ([`mod@reference`]), with an estimate of its own error; then candidate settings, cheapest first, on the scene's backend, each timed
+//! (`reference`), with an estimate of its own error; then candidate settings, cheapest first, on the scene's backend, each timed
 //! and compared with the reference. A candidate is given up a quarter or half of the way when a cheaper one is much
 //! nearer to the reference already, or when it is over the budget. What is promised of the chosen setting was measured on a
 //! whole run of it, so that a run of the scene repeats it: its displacements bit for bit, its time as far as the machine
