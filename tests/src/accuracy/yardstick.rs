@@ -65,7 +65,11 @@ impl Yardstick {
         let problem = Problem::of(&system, settings.gravity_m_s2)?;
         tell("equilibrium by Newton's method");
         let found = problem.equilibrium(&run.positions()?, &Options::default())?;
-        tell(&format!("equilibrium {} after {} iterations", if found.definite { "stable" } else { "not stable" }, found.iterations));
+        tell(&format!(
+            "equilibrium {} after {} iterations",
+            if found.definite { "stable" } else { "not stable" },
+            found.iterations
+        ));
         let equilibrium = found.positions;
         Ok(Self {
             rest: system.positions(),
