@@ -125,8 +125,8 @@ impl DescentOnDevice {
     }
 
     /// Dispatches of an iteration, and their threads.
-    pub(crate) fn load(&self) -> [usize; 2] {
-        let chunks = || self.colors.iter().flatten();
+    pub(crate) fn load(&self, turns: &[Turn]) -> [usize; 2] {
+        let chunks = || turns.iter().flat_map(|turn| &self.colors[turn.color]);
         let threads = |chunk: &Chunk| chunk.len + chunk.kinds.iter().map(|(_, _, len)| len).sum::<usize>();
         [chunks().map(|chunk| 1 + chunk.kinds.len()).sum(), chunks().map(threads).sum()]
     }

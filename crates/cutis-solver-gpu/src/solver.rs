@@ -70,7 +70,7 @@ impl Constraints {
                 threads: simulation.system().kinds().iter().map(|kind| kind.len()).sum(),
             },
             Self::Pulling(descent) => {
-                let [dispatches, threads] = descent.load();
+                let [dispatches, threads] = descent.load(&simulation.schedule().turns);
                 Load { dispatches, threads }
             }
         }

@@ -39,7 +39,7 @@ pub struct Schedule {
     pub iterations: u32,
     /// What one iteration projects, in order. Empty colours are left out. None in vertex block descent.
     pub sweeps: Vec<Sweep>,
-    /// Which vertices one iteration moves, in order, in vertex block descent; none elsewhere.
+    /// Which vertices one iteration moves, in order, in vertex block descent: all colours there and back. None elsewhere.
     pub turns: Vec<Turn>,
 }
 
@@ -57,15 +57,18 @@ impl Schedule {
         Self { substeps: settings.substeps, iterations: settings.iterations, sweeps, turns: Vec::new() }
     }
 
+    /// There and back, so that an iteration is symmetric: see the top of `descent.rs`.
     pub(crate) fn of_vertices(groups: &Groups, settings: &Settings) -> Self {
         let turn = |(color, range): (usize, &[u32])| Turn {
             color,
             start: range[0] as usize,
             end: range[1] as usize,
         };
-        let turns = groups.offsets.windows(2).enumerate().map(turn).filter(|turn| turn.start < turn.end);
+        let there = groups.offsets.windows(2).enumerate().map(turn).filter(|turn| turn.start < turn.end);
+        let there: Vec<Turn> = there.collect();
+        let turns = there.iter().chain(there.iter().rev()).copied().collect();
         let Settings { substeps, iterations, .. } = *settings;
-        Self { substeps, iterations, sweeps: Vec::new(), turns: turns.collect() }
+        Self { substeps, iterations, sweeps: Vec::new(), turns }
     }
 
     /// Projections of one frame; in vertex block descent, steps of a vertex.

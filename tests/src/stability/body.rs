@@ -14,49 +14,77 @@ use super::Failure;
 use crate::lattice::Kuhn;
 use crate::sheet::Sheet;
 
+/// Compliances in the body's own units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compliances {
+    /// Of springs.
+    pub distance: f64,
+    /// Of skin triangles.
+    pub skin: f64,
+    /// Of tetrahedra.
+    pub volume: f64,
+}
+
+impl Compliances {
+    /// A soft solid whose volume is some five times as stiff as its shape.
+    pub const SOFT: Self = Self { distance: 7e-4, skin: 2e-4, volume: 3e-6 };
+
+    /// The same solid, a thousand times as stiff.
+    pub const STIFF: Self = Self { distance: 7e-7, skin: 2e-7, volume: 3e-9 };
+
+    /// The same number for all kinds.
+    pub const fn uniform(compliance: f64) -> Self {
+        Self { distance: compliance, skin: compliance, volume: compliance }
+    }
+}
+
 /// How stiff, by formulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// Share of an error that a projection takes back.
     Pbd(f64),
-    /// Compliance of springs, skin triangles and volumes, in the body's own units.
-    Xpbd {
-        /// Of springs.
-        distance: f64,
-        /// Of skin triangles.
-        skin: f64,
-        /// Of tetrahedra.
-        volume: f64,
-    },
+    /// Constraint after constraint.
+    Xpbd(Compliances),
+    /// Vertex after vertex.
+    Vbd(Compliances),
 }
 
 impl Law {
-    /// A soft solid whose volume is some five times as stiff as its shape.
-    pub const SOFT: Self = Self::Xpbd { distance: 7e-4, skin: 2e-4, volume: 3e-6 };
+    /// A soft solid.
+    pub const SOFT: Self = Self::Xpbd(Compliances::SOFT);
     /// Nothing yields.
-    pub const RIGID: Self = Self::uniform(0.0);
+    pub const RIGID: Self = Self::Xpbd(Compliances::uniform(0.0));
     /// Every projection takes back all of its error.
     pub const PBD: Self = Self::Pbd(1.0);
+    /// The soft solid by vertex block descent.
+    pub const DESCENT: Self = Self::Vbd(Compliances::SOFT);
+    /// A thousand times as stiff.
+    pub const STIFF_DESCENT: Self = Self::Vbd(Compliances::STIFF);
 
-    /// The same number for all kinds.
-    pub const fn uniform(compliance: f64) -> Self {
-        Self::Xpbd { distance: compliance, skin: compliance, volume: compliance }
-    }
+    /// What most cases are tried with.
+    pub const ALL: [Self; 5] = [Self::SOFT, Self::RIGID, Self::PBD, Self::DESCENT, Self::STIFF_DESCENT];
 
     /// Whether a substep of 1/240 s resolves it.
     pub fn is_resolved(self) -> bool {
         match self {
             Self::Pbd(_) => false,
-            Self::SOFT => true,
-            Self::Xpbd { distance, .. } => distance >= 1e-3,
+            Self::Xpbd(compliances) | Self::Vbd(compliances) => {
+                compliances == Compliances::SOFT || compliances.distance >= 1e-3
+            }
         }
     }
 
-    /// PBD or XPBD.
+    /// Whether its energy is that of its compliances, however long a substep is: an implicit step makes none.
+    pub fn is_implicit(self) -> bool {
+        matches!(self, Self::Vbd(_))
+    }
+
+    /// PBD, XPBD or VBD.
     pub fn formulation(self) -> Formulation {
         match self {
             Self::Pbd(_) => Formulation::Pbd,
-            Self::Xpbd { .. } => Formulation::Xpbd,
+            Self::Xpbd(_) => Formulation::Xpbd,
+            Self::Vbd(_) => Formulation::Vbd,
         }
     }
 
@@ -64,9 +92,11 @@ impl Law {
     pub fn name(self) -> String {
         match self {
             Self::SOFT => "XPBD".into(),
+            Self::DESCENT => "VBD".into(),
             Self::Pbd(1.0) => "PBD".into(),
             Self::Pbd(share) => format!("PBD, stiffness {share}"),
-            Self::Xpbd { distance, .. } => format!("XPBD, compliance {distance:e}"),
+            Self::Xpbd(Compliances { distance, .. }) => format!("XPBD, compliance {distance:e}"),
+            Self::Vbd(Compliances { distance, .. }) => format!("VBD, compliance {distance:e}"),
         }
     }
 }
@@ -207,7 +237,8 @@ impl Body {
     fn stiffness<T: Scalar>(&self, power: i32, scale: f64) -> Stiffness<T> {
         match self.law {
             Law::Pbd(share) => Stiffness::pbd(T::constant(share)),
-            Law::Xpbd { distance, skin, volume } => {
+            Law::Xpbd(Compliances { distance, skin, volume })
+            | Law::Vbd(Compliances { distance, skin, volume }) => {
                 let compliance = [distance, skin, volume][power as usize / 2];
                 Stiffness::compliance(T::constant(compliance * scale.powi(power)))
             }

@@ -37,6 +37,8 @@ pub struct Run {
     pub gravity: [f64; 3],
     /// As in [`Settings`].
     pub damping_per_s: f64,
+    /// As in [`Settings`].
+    pub relaxation: f64,
 }
 
 impl Default for Run {
@@ -50,6 +52,7 @@ impl Default for Run {
             frames: 1,
             gravity: [0.0; 3],
             damping_per_s: 4.0,
+            relaxation: 1.0,
         }
     }
 }
@@ -74,13 +77,14 @@ pub struct Case {
 impl Case {
     /// A case with the default run, which must end like this.
     pub fn new(name: impl Into<String>, body: Body, end: End) -> Self {
-        let energy = if body.law.is_resolved() { RESOLVED } else { UNRESOLVED };
+        let energy = if body.law.is_resolved() || body.law.is_implicit() { RESOLVED } else { UNRESOLVED };
         Self { name: name.into(), body, run: Run::default(), energy, end, quick: false }
     }
 
     /// With the energy that a stiffness may have that no substep resolves.
     pub fn unresolved(self) -> Self {
-        Self { energy: UNRESOLVED, ..self }
+        let energy = if self.body.law.is_implicit() { self.energy } else { UNRESOLVED };
+        Self { energy, ..self }
     }
 
     /// Part of the quick run as well.
@@ -95,7 +99,7 @@ impl Case {
 
     /// Settings at a scale.
     pub fn settings(&self, scale: f64) -> Settings {
-        let Run { h, substeps, iterations, gravity, damping_per_s, .. } = self.run;
+        let Run { h, substeps, iterations, gravity, damping_per_s, relaxation, .. } = self.run;
         Settings {
             formulation: self.body.law.formulation(),
             dt_s: h * f64::from(substeps),
@@ -103,6 +107,7 @@ impl Case {
             iterations,
             gravity_m_s2: gravity.map(|g| g * scale),
             damping_per_s,
+            relaxation,
             ..Settings::default()
         }
     }

@@ -3,7 +3,7 @@
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, SkinTension, Volume};
 use cutis_solver::{
-    Handle, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
+    Formulation, Handle, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
 };
 use nalgebra::{Point3, Vector3};
 
@@ -25,6 +25,13 @@ const DOORS: &[Door] = &[
     ("a rest length that is infinite", || length(f32::INFINITY), names_element),
     ("a compliance that is NaN", || compliance(f32::NAN), names_element),
     ("a compliance below zero", || compliance(-1.0), names_element),
+    ("a compliance of zero for VBD", || descent(0.0), names_element),
+    ("a compliance for VBD whose inverse is beyond f32", || descent(1e-39), names_element),
+    (
+        "a relaxation of 2 for VBD",
+        || settings(|s| (s.formulation, s.relaxation) = (Formulation::Vbd, 2.0)),
+        names_key,
+    ),
     (
         "a rest edge without length",
         || from_rest([[0.0; 3], [0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
@@ -113,6 +120,11 @@ fn length(value: f32) -> Option<SolverError> {
 
 fn compliance(value: f32) -> Option<SolverError> {
     spring(1.0, Stiffness::compliance(value)).err()
+}
+
+fn descent(value: f32) -> Option<SolverError> {
+    let settings = Settings { formulation: Formulation::Vbd, ..Settings::default() };
+    spring(1.0, Stiffness::compliance(value)).and_then(|system| SolverReference::new(system, settings)).err()
 }
 
 /// The first edge, the first triangle and the tetrahedron of four points, in this order.

@@ -2,7 +2,7 @@
 //!
 //! A constraint stiffer than a substep can resolve acts as one that takes back its error within a substep: its compliance counts
 //! as at least `h²·Σ w|∇C|²` at its rest shape. So PBD and a compliance of 0 have a finite energy too: the kinetic energy that
-//! taking back their error in one substep makes. All sums are in `f64`, by
+//! taking back their error in one substep makes. Vertex block descent steps implicitly; there a compliance counts as it is. All sums are in `f64`, by
 //! [`evaluate`](cutis_solver::ConstraintSet::evaluate), from the stored parameters.
 //!
 //! Every projection rounds positions, and a position that is off by half a unit in its last place is a velocity that is off by
@@ -10,7 +10,7 @@
 //! in, and is told.
 
 use cutis_constraints::Scalar;
-use cutis_solver::{Settings, Stiffness, System};
+use cutis_solver::{Formulation, Settings, Stiffness, System};
 use nalgebra::{Point3, Vector3};
 
 /// The total energy may be so many times what was put in where a substep resolves the stiffness: it does not grow.
@@ -64,6 +64,9 @@ impl Meter {
                 let compliance = match set.stiffness() {
                     _ if weighted == 0.0 => f64::INFINITY,
                     Stiffness::Pbd(share) => resolved / share.at(k).to_f64(),
+                    Stiffness::Compliance(compliance) if settings.formulation == Formulation::Vbd => {
+                        compliance.at(k).to_f64()
+                    }
                     Stiffness::Compliance(compliance) => compliance.at(k).to_f64().max(resolved),
                 };
                 rounding += 0.5 * (strain * set.rest_size(k).to_f64()).powi(2) / compliance;

@@ -1,4 +1,4 @@
-//! The mutations that the stability suite must see: guards left out, the convex form of skin tension left, absolute lengths.
+//! The mutations that the stability suite must see: guards left out, descent that goes one way or too far, the convex form of skin tension left, absolute lengths.
 
 use super::list::Suite::Stability;
 use super::list::{Mutation, mutation};
@@ -95,5 +95,26 @@ pub const STABILITY: &[Mutation] = &[
         "shaders/wgsl/solver/quotient.wgsl",
         "let quotient = numerator / select(1.0, denominator, defined);",
         "let quotient = numerator / (select(1.0, denominator, defined) + 1e-6);",
+    ),
+    mutation(
+        Stability,
+        "an iteration of vertex block descent goes one way only",
+        "crates/cutis-solver/src/schedule.rs",
+        "there.iter().chain(there.iter().rev())",
+        "there.iter()",
+    ),
+    mutation(
+        Stability,
+        "steps of vertex block descent are half as long again, Rust",
+        "crates/cutis-solver/src/descent.rs",
+        "Vector3::new(z1, z2, z3) * self.relaxation;",
+        "Vector3::new(z1, z2, z3) * (self.relaxation * T::constant(1.5));",
+    ),
+    mutation(
+        Stability,
+        "steps of vertex block descent are half as long again, WGSL",
+        "shaders/wgsl/solver/descend.wgsl",
+        "* descent.relaxation;",
+        "* (descent.relaxation * 1.5);",
     ),
 ];

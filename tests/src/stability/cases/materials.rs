@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::{Random, deformed};
-use crate::stability::body::{Body, Law};
+use crate::stability::body::{Body, Compliances, Law};
 use crate::stability::case::{Case, End, Run};
 
 const BLOCK: [usize; 3] = [3, 3, 3];
@@ -16,6 +16,7 @@ const UNDAMPED: Run = Run {
     frames: 1,
     gravity: [0.0; 3],
     damping_per_s: 0.0,
+    relaxation: 1.0,
 };
 
 pub fn cases() -> Vec<Case> {
@@ -36,17 +37,25 @@ fn block(law: Law) -> Body {
 fn compliances() -> Vec<Case> {
     let mut cases = Vec::new();
     for compliance in [0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6] {
-        let law = Law::uniform(compliance);
         // A softer body than 1e-3 takes longer than the two seconds.
         let end = if compliance <= 1e-3 { End::Recovers(0.02) } else { End::Bounded };
         let extreme = compliance == 0.0 || compliance == 1e6;
-        let add = |name: &str, end, run| {
-            let case = Case::new(format!("compliance {compliance:e}{name}"), block(law), end).run(run);
-            Case { quick: extreme, ..case }
-        };
-        cases.push(add("", end, Run::default()));
-        cases.push(add(", undamped", End::Bounded, UNDAMPED));
-        cases.push(add(", 8 iterations", end, Run { iterations: 8, ..Run::default() }));
+        compliance_cases(&mut cases, Law::Xpbd(Compliances::uniform(compliance)), end, extreme);
+    }
+    for compliance in [1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6] {
+        let end = if compliance == 1e-3 { End::Recovers(0.02) } else { End::Bounded };
+        let extreme = compliance == 1e-12 || compliance == 1e6;
+        compliance_cases(&mut cases, Law::Vbd(Compliances::uniform(compliance)), end, extreme);
+    }
+    for relaxation in [0.1, 1.5, 1.9] {
+        for law in [Law::DESCENT, Law::STIFF_DESCENT] {
+            let name = format!("steps {relaxation} times as long, {}", law.name());
+            let run = Run { relaxation, ..UNDAMPED };
+            cases.push(Case {
+                quick: relaxation == 1.9,
+                ..Case::new(name, block(law), End::Bounded).run(run)
+            });
+        }
     }
     for share in [0.0, 0.1, 1.0] {
         let end = if share > 0.0 { End::Recovers(0.02) } else { End::Bounded };
@@ -58,12 +67,22 @@ fn compliances() -> Vec<Case> {
     cases
 }
 
+fn compliance_cases(cases: &mut Vec<Case>, law: Law, end: End, quick: bool) {
+    let mut add = |name: &str, end, run| {
+        let case = Case::new(format!("{}{name}", law.name()), block(law), end).run(run);
+        cases.push(Case { quick, ..case });
+    };
+    add("", end, Run::default());
+    add(", undamped", End::Bounded, UNDAMPED);
+    add(", 8 iterations", end, Run { iterations: 8, ..Run::default() });
+}
+
 /// A free sheet whose skin is stretched, and one that is held at its border at a hundred times its area. No substep resolves the
 /// stiffness of skin that is stretched so far.
 fn amplifications() -> Vec<Case> {
     let mut cases = Vec::new();
     for amplification in [0.0, 1.0, 1e3, 1e6] {
-        for law in [Law::SOFT, Law::RIGID, Law::PBD] {
+        for law in [Law::SOFT, Law::RIGID, Law::PBD, Law::DESCENT] {
             let mut add = |name: &str, body: Body, end| {
                 let name = format!("amplification {amplification:e}{name}, {}", law.name());
                 let looks = if end == End::Rests { 360 } else { 120 };
@@ -92,7 +111,7 @@ fn amplifications() -> Vec<Case> {
 /// Neighbours a million times as heavy.
 fn masses() -> Vec<Case> {
     let mut cases = Vec::new();
-    for law in [Law::SOFT, Law::RIGID, Law::PBD] {
+    for law in [Law::SOFT, Law::RIGID, Law::PBD, Law::DESCENT] {
         let mut random = Random(3);
         let mut body = block(law);
         body.inverse_masses.iter_mut().for_each(|w| *w = 10f64.powf(3.0 * random.signed()));

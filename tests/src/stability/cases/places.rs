@@ -10,7 +10,7 @@ const BLOCK: [usize; 3] = [3, 3, 3];
 
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for law in [Law::SOFT, Law::RIGID, Law::PBD] {
+    for law in Law::ALL {
         let of = law.name();
         let mut add = |name: &str, body, end| {
             cases.push(Case::new(format!("{name}, {of}"), body, end).quick());
