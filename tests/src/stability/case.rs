@@ -108,7 +108,6 @@ impl Case {
             gravity_m_s2: gravity.map(|g| g * scale),
             damping_per_s,
             relaxation,
-            ..Settings::default()
         }
     }
 }

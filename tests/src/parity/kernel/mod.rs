@@ -1,5 +1,6 @@
 //! The middle ring: one pass of each kernel, run on its own.
 
+mod descent;
 mod handles;
 mod raymarch;
 mod reduction;
@@ -12,6 +13,7 @@ use super::bench::{Bench, Failure};
 /// Runs the ring.
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     sweep::run(bench)?;
+    descent::run(bench)?;
     vertices::run(bench)?;
     handles::run(bench)?;
     reduction::run(bench)?;

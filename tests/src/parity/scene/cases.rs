@@ -35,6 +35,7 @@ pub fn all(effort: Effort) -> Result<Vec<Case>, Failure> {
     let mut cases = vec![
         Case::new("demo, coarse", cutis::demo(&set(&coarse))?, frames, true),
         Case::new("demo, coarse, PBD", pbd(cutis::demo(&set(&coarse))?), frames, false),
+        Case::new("demo, coarse, VBD", vbd(cutis::demo(&set(&coarse))?), frames, false),
         Case::new("demo, coarse, 3 iterations", iterated(cutis::demo(&set(&coarse))?), frames, false),
         abdomen(quick, frames)?,
         handle(frames)?,
@@ -78,10 +79,12 @@ const SMALL: &[(&str, &str)] = &[
     ("solver.gravity_m_s2", "[0.7, -9.81, 1.3]"),
 ];
 
-/// Each kind alone and all together, in both formulations, under gravity so that each has something to do.
+/// Each kind alone and all together, in all formulations, under gravity so that each has something to do.
 fn kinds(frames: u32) -> Result<Vec<Case>, Failure> {
     let mut cases = Vec::new();
-    for (formula, formulation) in [("XPBD", FormulationChoice::Xpbd), ("PBD", FormulationChoice::Pbd)] {
+    for (formula, formulation) in
+        [("XPBD", FormulationChoice::Xpbd), ("PBD", FormulationChoice::Pbd), ("VBD", FormulationChoice::Vbd)]
+    {
         for (kind, kept) in [
             ("distance", [true, false, false]),
             ("volume", [false, true, false]),
@@ -108,6 +111,12 @@ fn kinds(frames: u32) -> Result<Vec<Case>, Failure> {
 
 fn pbd(mut loaded: LoadedScene) -> LoadedScene {
     loaded.scene.solver.formulation = FormulationChoice::Pbd;
+    loaded
+}
+
+fn vbd(mut loaded: LoadedScene) -> LoadedScene {
+    loaded.scene.solver.formulation = FormulationChoice::Vbd;
+    (loaded.scene.solver.iterations, loaded.scene.solver.relaxation) = (2, 1.3);
     loaded
 }
 
