@@ -1,0 +1,110 @@
+//! What a kind tells of itself: its arrays, and what can be measured of it.
+
+use std::marker::PhantomData;
+use std::sync::Arc;
+
+use cutis_constraints::{Constraint, Params, Scalar};
+use nalgebra::{Point3, Vector3};
+
+use super::Batch;
+use crate::{ConstraintSet, Kind, Residual, Stiffness, Values, Vertex};
+
+impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, N, T, C::Params<T>> {
+    fn name(&self) -> &'static str {
+        C::NAME
+    }
+
+    fn arity(&self) -> usize {
+        N
+    }
+
+    fn offsets(&self) -> &[u32] {
+        &self.offsets
+    }
+
+    fn indices(&self) -> &[u32] {
+        self.indices.as_flattened()
+    }
+
+    fn param_count(&self) -> usize {
+        <C::Params<T> as Params<T>>::LEN
+    }
+
+    fn params(&self) -> &[T] {
+        Params::flat(&self.params)
+    }
+
+    fn rest_size(&self, k: usize) -> T {
+        C::rest_size(&self.params[k])
+    }
+
+    fn wgsl(&self) -> &'static str {
+        C::WGSL
+    }
+
+    fn stiffness(&self) -> &Stiffness<T> {
+        &self.stiffness
+    }
+
+    fn residual(&self, vertices: &[Vertex<T>]) -> Residual {
+        let ratios = (0..self.indices.len()).filter_map(|k| {
+            let rest_size = C::rest_size(&self.params[k]).to_f64();
+            let c = C::eval(&self.positions(k, vertices), &self.params[k]).c.to_f64();
+            (rest_size != 0.0).then(|| c / rest_size)
+        });
+        Residual::of(C::NAME, ratios)
+    }
+
+    fn elastic_energy(&self, vertices: &[Vertex<T>]) -> Option<f64> {
+        let Stiffness::Compliance(compliance) = &self.stiffness else { return None };
+        let energy = |k: usize| {
+            let c = C::eval(&self.positions(k, vertices), &self.params[k]).c.to_f64();
+            let compliance = compliance.at(k).to_f64();
+            if compliance > 0.0 { 0.5 * c * c / compliance } else { 0.0 }
+        };
+        Some((0..self.indices.len()).map(energy).sum())
+    }
+
+    fn collapsed(&self, vertices: &[Vertex<T>], tolerance: f64) -> Option<(usize, f64)> {
+        (0..self.indices.len()).find_map(|k| {
+            let eval = C::eval(&self.positions(k, vertices), &self.params[k]);
+            let ratio = eval.c.to_f64() / C::rest_size(&self.params[k]).to_f64();
+            let free = |&i: &usize| vertices[self.indices[k][i] as usize].inverse_mass() > T::zero();
+            let mut movable = (0..N).filter(free).peekable();
+            let cannot_act = movable.peek().is_some() && movable.all(|i| eval.grad[i] == Vector3::zeros());
+            (ratio.is_finite() && ratio.abs() > tolerance && cannot_act).then_some((k, ratio))
+        })
+    }
+
+    fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64 {
+        let params = self.params[k].as_ref();
+        let params = <C::Params<f64> as Params<f64>>::from_fn(|j| params[j].to_f64());
+        let eval = C::eval(&std::array::from_fn(|i| x[i]), &params);
+        grad.copy_from_slice(&eval.grad);
+        eval.c
+    }
+
+    fn to_f64(&self) -> Kind<f64> {
+        let wide =
+            |params: &C::Params<T>| <C::Params<f64> as Params<f64>>::from_fn(|j| params.as_ref()[j].to_f64());
+        Arc::new(Batch::<C, N, f64, C::Params<f64>> {
+            vertex_count: self.vertex_count,
+            offsets: self.offsets.clone(),
+            indices: self.indices.clone(),
+            params: self.params.iter().map(wide).collect(),
+            stiffness: self.stiffness.to_f64(),
+            kind: PhantomData,
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        let stiffness = match self.stiffness.values() {
+            Values::Uniform(_) => 0,
+            Values::Each(values) => size_of_val(values.as_slice()),
+        };
+        size_of_val(self.offsets.as_slice())
+            + size_of_val(self.indices.as_slice())
+            + size_of_val(self.params.as_slice())
+            + stiffness
+    }
+}
