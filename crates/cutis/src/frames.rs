@@ -14,6 +14,9 @@ use crate::report::Frames;
 use crate::scene::RunSection;
 use crate::{CostLedger, Error, Progress};
 
+/// The value over rest size from which on a constraint that cannot act is told of.
+const VIOLATED: f64 = 0.01;
+
 /// One line of `frames.csv`.
 #[derive(Clone, Debug)]
 pub(crate) struct FrameRow {
@@ -78,6 +81,8 @@ pub(crate) struct Finish {
     /// Local metres, one per vertex.
     pub(crate) positions: Vec<Point3<f32>>,
     pub(crate) residuals: Vec<Residual>,
+    /// Names an element that has collapsed and cannot act, if there is one.
+    pub(crate) collapsed: Option<String>,
     pub(crate) times: Times,
 }
 
@@ -129,12 +134,13 @@ impl Course<'_> {
         // room on it cannot take a finished run.
         let system = solver.system()?;
         let (positions, residuals) = (system.positions(), system.residuals());
+        let collapsed = system.check_collapsed(VIOLATED).err().map(|error| error.to_string());
         // What happens to the body from here on is nobody's business, and a failure no reason to lose the run.
         if self.timing == Timing::OneMore && rows.len() > 1 && solver.step_timed(1, &mut times.ledger).is_ok()
         {
             times.frames = 1;
         }
-        Ok(Finish { rows, positions, residuals, times })
+        Ok(Finish { rows, positions, residuals, collapsed, times })
     }
 
     fn save(&self, solver: &mut dyn Solver<f32>, frame: u32) -> Result<(), Error> {

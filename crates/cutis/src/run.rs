@@ -103,10 +103,12 @@ fn run_with(
         timing,
     };
     let todo = u64::from(frames.saturating_sub(course.done()));
-    let Finish { rows, positions: deformed, residuals, times } =
+    let Finish { rows, positions: deformed, residuals, collapsed, times } =
         clock.stage_on(running.place(), "simulate", todo, |progress| {
             course.run(&mut *running.solver, progress)
         })?;
+    collapsed.iter().for_each(|warning| progress.note(warning));
+    plan.warnings.extend(collapsed);
 
     let outcome = Outcome { loaded, source: &source, body: &body, deformed: &deformed, folder: &folder };
     // The body's memory on the device is free for the stages that follow.
@@ -159,4 +161,65 @@ fn run_with(
         report.write(&folder.report())?;
     }
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::Override;
+
+    /// Keeps what is noted.
+    #[derive(Default)]
+    struct Notes(Mutex<Vec<String>>);
+
+    impl Progress for Notes {
+        fn begin(&self, _stage: &str, _total: u64) {}
+        fn advance(&self, _done: u64) {}
+        fn end(&self) {}
+        fn note(&self, message: &str) {
+            if let Ok(mut notes) = self.0.lock() {
+                notes.push(message.into());
+            }
+        }
+    }
+
+    /// A run goes on from a body whose vertices all lie in one point, and is at its end: it says that nothing can act.
+    #[test]
+    fn a_body_that_ends_collapsed_is_told_of() {
+        let folder = tempfile::tempdir().unwrap();
+        let set = |(key, value): (&str, &str)| Override { key: key.into(), value: value.into() };
+        let loaded = crate::demo(
+            &[
+                ("volume.phantom", "{ size = [48, 48, 32], seed = 1 }"),
+                ("lattice.spacing_mm", "16.0"),
+                ("solver.backend", "\"cpu\""),
+                ("solver.substeps", "1"),
+                ("run", "{ frames = 1, checkpoint_every = 1 }"),
+                ("output", "{ report = true }"),
+            ]
+            .map(set),
+        )
+        .unwrap();
+        let collapsed = |report: &Report| report.warnings.iter().any(|w| w.contains("have collapsed"));
+        let options = RunOptions { out: folder.path().into(), resume: false };
+        assert!(!collapsed(&run(&loaded, &options, &crate::Silent).unwrap()));
+
+        let path = RunFolder(folder.path().into()).checkpoint();
+        let bytes = fs::read(&path).unwrap();
+        let fingerprint: [u8; 32] = bytes[8..40].try_into().unwrap();
+        let count = u64::from_le_bytes(bytes[44..52].try_into().unwrap()) as usize;
+        let mut saved = Checkpoint::read(&path, &fingerprint, count).unwrap();
+        let place = saved.positions[0];
+        saved.positions.fill(place);
+        saved.write(&path, &fingerprint).unwrap();
+        let notes = Notes::default();
+        let resumed = RunOptions { resume: true, ..options };
+        assert!(collapsed(&run(&loaded, &resumed, &notes).unwrap()));
+        assert!(notes.0.lock().unwrap().iter().any(|note| note.contains("have collapsed")));
+        let html = fs::read_to_string(RunFolder(folder.path().into()).html()).unwrap();
+        assert!(html.contains("have collapsed"));
+    }
 }
