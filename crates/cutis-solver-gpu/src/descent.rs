@@ -125,10 +125,10 @@ impl DescentOnDevice {
     }
 
     /// Dispatches of an iteration, and their threads.
-    pub(crate) fn load(&self, turns: &[Turn]) -> [usize; 2] {
-        let chunks = || turns.iter().flat_map(|turn| &self.colors[turn.color]);
-        let threads = |chunk: &Chunk| chunk.len + chunk.kinds.iter().map(|(_, _, len)| len).sum::<usize>();
-        [chunks().map(|chunk| 1 + chunk.kinds.len()).sum(), chunks().map(threads).sum()]
+    pub(crate) fn load<'a>(&self, turns: impl Iterator<Item = &'a Turn>) -> [usize; 2] {
+        let chunks: Vec<&Chunk> = turns.flat_map(|turn| &self.colors[turn.color]).collect();
+        let threads = |chunk: &&Chunk| chunk.len + chunk.kinds.iter().map(|(_, _, len)| len).sum::<usize>();
+        [chunks.iter().map(|chunk| 1 + chunk.kinds.len()).sum(), chunks.iter().map(threads).sum()]
     }
 }
 

@@ -70,7 +70,7 @@ impl Constraints {
                 threads: simulation.system().kinds().iter().map(|kind| kind.len()).sum(),
             },
             Self::Pulling(descent) => {
-                let [dispatches, threads] = descent.load(&simulation.schedule().turns);
+                let [dispatches, threads] = descent.load(simulation.schedule().turns_of(0));
                 Load { dispatches, threads }
             }
         }
@@ -92,7 +92,7 @@ impl Constraints {
                 }
             }
             Self::Pulling(descent) => {
-                for turn in &schedule.turns {
+                for turn in schedule.turns_of(iteration) {
                     descent.turn(recorder.part(Ledger::DESCENT)?, turn);
                 }
             }

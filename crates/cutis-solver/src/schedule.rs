@@ -29,7 +29,7 @@ pub struct Turn {
     pub end: usize,
 }
 
-/// A frame: `substeps` times { predict and carry handles; `iterations` times { the sweeps in order, or the turns in order };
+/// A frame: `substeps` times { predict and carry handles; `iterations` times { the sweeps in order, or the turns of the iteration };
 /// update velocities }.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {
@@ -39,7 +39,7 @@ pub struct Schedule {
     pub iterations: u32,
     /// What one iteration projects, in order. Empty colours are left out. None in vertex block descent.
     pub sweeps: Vec<Sweep>,
-    /// Which vertices one iteration moves, in order, in vertex block descent: all colours there and back. None elsewhere.
+    /// All colours of the vertices that move, in order, in vertex block descent; none elsewhere. See [`turns_of`](Self::turns_of).
     pub turns: Vec<Turn>,
 }
 
@@ -57,7 +57,6 @@ impl Schedule {
         Self { substeps: settings.substeps, iterations: settings.iterations, sweeps, turns: Vec::new() }
     }
 
-    /// There and back, so that an iteration is symmetric: see the top of `descent.rs`.
     pub(crate) fn of_vertices(groups: &Groups, settings: &Settings) -> Self {
         let turn = |(color, range): (usize, &[u32])| Turn {
             color,
@@ -65,16 +64,42 @@ impl Schedule {
             end: range[1] as usize,
         };
         let there = groups.offsets.windows(2).enumerate().map(turn).filter(|turn| turn.start < turn.end);
-        let there: Vec<Turn> = there.collect();
-        let turns = there.iter().chain(there.iter().rev()).copied().collect();
         let Settings { substeps, iterations, .. } = *settings;
-        Self { substeps, iterations, sweeps: Vec::new(), turns }
+        Self { substeps, iterations, sweeps: Vec::new(), turns: there.collect() }
+    }
+
+    /// The turns of an iteration of vertex block descent, counted from 0, in order: all colours twice. Of all passes over the
+    /// colours in a substep the first half goes there and the second half back, so that a substep is symmetric: see the top
+    /// of `descent.rs`.
+    pub fn turns_of(&self, iteration: u32) -> impl Iterator<Item = &Turn> {
+        let pass = |number: u64| {
+            let back = number >= u64::from(self.iterations);
+            let (there, back) =
+                if back { (&self.turns[..0], &self.turns[..]) } else { (&self.turns[..], &self.turns[..0]) };
+            there.iter().chain(back.iter().rev())
+        };
+        let first = 2 * u64::from(iteration);
+        pass(first).chain(pass(first + 1))
     }
 
     /// Projections of one frame; in vertex block descent, steps of a vertex.
     pub fn projections_per_frame(&self) -> u64 {
         let sweeps: u64 = self.sweeps.iter().map(|sweep| (sweep.end - sweep.start) as u64).sum();
         let turns: u64 = self.turns.iter().map(|turn| (turn.end - turn.start) as u64).sum();
-        (sweeps + turns) * u64::from(self.substeps) * u64::from(self.iterations)
+        (sweeps + 2 * turns) * u64::from(self.substeps) * u64::from(self.iterations)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_a_substeps_passes_go_there_and_half_back() {
+        let groups = Groups { order: vec![4, 2, 7], offsets: vec![0, 1, 3] };
+        let settings = Settings { iterations: 3, ..Settings::default() };
+        let schedule = Schedule::of_vertices(&groups, &settings);
+        let turns = |iteration| schedule.turns_of(iteration).map(|turn| turn.color).collect::<Vec<_>>();
+        assert_eq!([turns(0), turns(1), turns(2)], [[0, 1, 0, 1], [0, 1, 1, 0], [1, 0, 1, 0]]);
     }
 }

@@ -237,7 +237,7 @@ impl<T: Scalar> Simulation<T> {
             let clear = &mut || multipliers.iter_mut().for_each(|kind| kind.fill(T::zero()));
             execute.alone(Ledger::MULTIPLIERS, clear);
         }
-        for _ in 0..self.schedule.iterations {
+        for iteration in 0..self.schedule.iterations {
             match &self.method {
                 Method::Project(step) => {
                     for &sweep in &self.schedule.sweeps {
@@ -247,7 +247,7 @@ impl<T: Scalar> Simulation<T> {
                     }
                 }
                 Method::Descend(descent) => {
-                    for &turn in &self.schedule.turns {
+                    for &turn in self.schedule.turns_of(iteration) {
                         execute.turn(ColouredVertices::new(&mut self.system, descent, turn));
                     }
                 }

@@ -75,7 +75,7 @@ pub struct Method {
     pub variant: &'static str,
     /// Chooses it.
     pub apply: fn(&mut Settings),
-    /// So many times fewer sweeps are tried, because one takes longer or brings more.
+    /// So many times fewer iterations are tried, because one takes longer and brings more.
     pub weight: u32,
 }
 
@@ -92,7 +92,7 @@ pub const VBD: Method = Method {
     formulation: "vbd",
     variant: "",
     apply: |settings| settings.formulation = Formulation::Vbd,
-    weight: 2,
+    weight: 4,
 };
 
 /// Without a material.
@@ -109,12 +109,12 @@ pub const METHODS: &[Method] = &[
     VBD,
     Method {
         formulation: "vbd",
-        variant: "ω 1.7",
+        variant: "ω 1.4",
         apply: |settings| {
             settings.formulation = Formulation::Vbd;
-            settings.relaxation = 1.7;
+            settings.relaxation = 1.4;
         },
-        weight: 2,
+        weight: 4,
     },
 ];
 

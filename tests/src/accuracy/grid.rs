@@ -17,7 +17,7 @@ struct Limits {
 }
 
 const FULL: Limits =
-    Limits { substeps: &[1, 2, 5, 10, 20, 40, 80], sweeps: 80, raised: [(1, 1024), (10, 64)] };
+    Limits { substeps: &[1, 2, 5, 10, 20, 40, 80], sweeps: 40, raised: [(1, 512), (10, 64)] };
 const QUICK: Limits = Limits { substeps: &[1, 10, 40], sweeps: 20, raised: [(1, 16), (10, 16)] };
 
 impl Limits {

@@ -21,6 +21,7 @@ mod page;
 mod row;
 mod running;
 mod sweep;
+mod trials;
 mod words;
 mod yardstick;
 
@@ -50,14 +51,22 @@ pub type Failure = Box<dyn Error>;
 /// A problem that cannot be built, a search that does not converge, a file that cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let (start, load_before) = (Instant::now(), load());
-    let gpu = if options.no_gpu { None } else { config::first_gpu()? };
-    let (mut sections, mut checks) = (Vec::new(), Vec::new());
+    let gpu = if options.no_gpu || options.trials { None } else { config::first_gpu()? };
+    let (mut sections, mut tried, mut checks) = (Vec::new(), Vec::new(), Vec::new());
     let wanted = |name: &&str| match &options.problem {
         Some(only) => only == name,
+        None if options.trials => cases::TRIED.contains(name),
         None => !options.quick || cases::QUICK.contains(name),
     };
     for name in cases::NAMES.into_iter().filter(wanted) {
         let Some(case) = cases::named(name, options.quick)? else { continue };
+        if options.trials {
+            let (found, held) = trials::run(&case)?;
+            writeln!(out, "\n{}: {}\n\n{}", case.name, case.what, found.table())?;
+            tried.push(found);
+            checks.extend(held);
+            continue;
+        }
         let (section, held) = problem(&case, options.quick, gpu.as_ref(), out)?;
         writeln!(out, "\n{}", page::front_table(&section.rows))?;
         sections.push(section);
@@ -82,7 +91,10 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
             gpu: gpu.as_ref().map_or_else(|| "none".into(), |gpu| gpu.adapter().name.clone()),
             took_s: start.elapsed().as_secs_f64(),
         };
-        write(&origin, &sections, &folder)?;
+        match options.trials {
+            true => write_trials(&origin, &tried, &folder)?,
+            false => write(&origin, &sections, &folder)?,
+        }
     }
     Ok(good)
 }
@@ -138,6 +150,14 @@ fn write(origin: &Origin, sections: &[Section], folder: &Path) -> Result<(), Fai
         }
     }
     fs::write(folder.join("accuracy.md"), page::page(origin, sections))?;
+    Ok(())
+}
+
+/// Writes page and table of the trials.
+fn write_trials(origin: &Origin, tried: &[trials::Tried], folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder)?;
+    fs::write(folder.join("accelerations.csv"), trials::csv(tried))?;
+    fs::write(folder.join("accelerations.md"), trials::page(origin, tried))?;
     Ok(())
 }
 

@@ -20,7 +20,11 @@ pub struct Options {
     /// Only this problem.
     #[arg(long, value_name = "P", value_parser = NAMES)]
     pub problem: Option<String>,
-    /// Write the page docs/results/accuracy.md, its table accuracy.csv and its charts. Only for all problems at full size.
+    /// Try accelerations instead: how many sweeps a substep takes with each, on the incision and the block unless told which problem.
+    #[arg(long)]
+    pub trials: bool,
+    /// Write the page docs/results/accuracy.md, its table accuracy.csv and its charts; with --trials accelerations.md and its table.
+    /// Only for all problems at full size.
     #[arg(long, conflicts_with_all = ["quick", "problem", "out"])]
     pub write: bool,
     /// Write page, table and charts into this folder.
@@ -36,6 +40,7 @@ impl Options {
     pub fn command(&self) -> String {
         let mut words = vec!["cargo xtask accuracy".to_owned()];
         words.extend(self.quick.then(|| "--quick".to_owned()));
+        words.extend(self.trials.then(|| "--trials".to_owned()));
         words.extend(self.problem.iter().map(|name| format!("--problem {name}")));
         words.extend(self.write.then(|| "--write".to_owned()));
         words.extend(self.out.iter().map(|folder| format!("--out {}", folder.display())));

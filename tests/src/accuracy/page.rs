@@ -42,7 +42,8 @@ pub struct Origin {
 }
 
 const MEASURES: &str = "\
-A *setting* is written substeps × iterations; a frame has as many sweeps over all constraints as the product says. Times are the
+A *setting* is written substeps × iterations; a frame has as many sweeps over all constraints as the product says, and with
+`vbd` twice as many over all vertices. Times are the
 shortest and the middle one of all frames, in milliseconds; configurations took turns, so that load falls on all alike.
 
 - **E1**, algebraic: one substep from the moving body, against the minimiser of the implicit step, which Newton's method with a

@@ -18,6 +18,16 @@ const FINER: u32 = 64;
 /// Substeps and iterations of the run to rest from which the search for the equilibrium starts: it has not far to go then.
 const TO_REST: [u32; 2] = [40, 2];
 
+/// One implicit substep.
+pub struct Implicit {
+    /// Where the body is, m.
+    pub start: Vec<Point3<f64>>,
+    /// Where it would go if nothing held it together, m; what a handle carries is where the handle puts it.
+    pub predicted: Vec<Point3<f64>>,
+    /// Where it goes, m.
+    pub minimum: Vec<Point3<f64>>,
+}
+
 /// The right answers of one problem.
 pub struct Yardstick {
     system: System<f64>,
@@ -91,23 +101,18 @@ impl Yardstick {
     /// A search that does not converge.
     pub fn minimise(&mut self, substeps: u32) -> Result<(), Failure> {
         for instant in 0..self.states.len() {
-            let found = self.step_of(instant, substeps, 1.0)?;
-            self.steps.insert((instant, substeps), found);
+            let Implicit { start, minimum, .. } = self.step_of(instant, substeps, 1.0)?;
+            self.steps.insert((instant, substeps), [start, minimum]);
         }
         Ok(())
     }
 
-    /// Start and minimiser of a substep from the state at `instant`, with a step that is `longer` times as long as it should be:
+    /// A substep from the state at `instant`, with a step that is `longer` times as long as it should be:
     /// 1, or another number for a control.
     ///
     /// # Errors
     /// A search that does not converge.
-    pub fn step_of(
-        &self,
-        instant: usize,
-        substeps: u32,
-        longer: f64,
-    ) -> Result<[Vec<Point3<f64>>; 2], Failure> {
+    pub fn step_of(&self, instant: usize, substeps: u32, longer: f64) -> Result<Implicit, Failure> {
         let state = &self.states[instant];
         let h = self.settings.dt_s / f64::from(substeps);
         let start: Vec<Point3<f64>> = state.positions.iter().map(|x| x.cast()).collect();
@@ -115,8 +120,8 @@ impl Yardstick {
         let mut held = start.clone();
         self.carry(&mut held, f64::from(state.frame) * self.settings.dt_s + h);
         let predicted = self.problem.predicted(&held, &velocities, longer * h);
-        let minimum = self.problem.step(&held, &predicted, longer * h, &Options::default())?;
-        Ok([start, minimum.positions])
+        let minimum = self.problem.step(&held, &predicted, longer * h, &Options::default())?.positions;
+        Ok(Implicit { start, predicted, minimum })
     }
 
     /// Puts the handles' vertices where they are at `time_s`.
@@ -172,6 +177,11 @@ impl Yardstick {
                 reaction(found) / reaction(&self.equilibrium)
             }
         }
+    }
+
+    /// The body in `f64`, at rest.
+    pub fn system(&self) -> &System<f64> {
+        &self.system
     }
 
     /// Positions of the equilibrium.

@@ -40,6 +40,9 @@ pub const NAMES: [&str; 6] = ["sheet", "incision", "abdomen", "block", "hanging"
 /// Those that `--quick` runs, unless it is told which.
 pub const QUICK: [&str; 3] = ["sheet", "incision", "hanging"];
 
+/// Those on which accelerations are tried, unless it is told which.
+pub const TRIED: [&str; 2] = ["incision", "block"];
+
 /// The problem of that name; none, with a printed reason, where its data are absent. `quick` ones are smaller.
 ///
 /// # Errors
