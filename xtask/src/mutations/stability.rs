@@ -98,10 +98,10 @@ pub const STABILITY: &[Mutation] = &[
     ),
     mutation(
         Stability,
-        "an iteration of vertex block descent goes one way only",
+        "a substep of vertex block descent goes one way only",
         "crates/cutis-solver/src/schedule.rs",
-        "there.iter().chain(there.iter().rev())",
-        "there.iter()",
+        "let back = number >= u64::from(self.iterations);",
+        "let back = number >= 2 * u64::from(self.iterations);",
     ),
     mutation(
         Stability,

@@ -1,9 +1,5 @@
 //! Vertex block descent: one iteration over all colours, there and back, from a body out of shape.
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
-use std::ops::Range;
-
 use cutis_conformance::Alteration;
 use cutis_gpu::{BindGroup, Gpu, Kernel};
 use cutis_shaders::solver::{self, DESCEND, PULL};
@@ -153,30 +149,28 @@ impl Body {
             (4, step.whole()),
         ];
         let moving = gpu.bind(&descend, 0, &moving)?;
-        let turns = &self.simulation.schedule().turns;
-        let turns = if matches!(wrong, Wrong::OneWay) { &turns[..turns.len() / 2] } else { turns };
-        let mut colors = HashMap::new();
+        let groups = self.descent()?.groups();
+        let colors: Vec<Color> = groups
+            .iter()
+            .filter(|chosen| !chosen.is_empty())
+            .map(|chosen| self.color(gpu, [&pull, &descend], chosen))
+            .collect::<Result<_, _>>()?;
+        let back = if matches!(wrong, Wrong::OneWay) { &[][..] } else { &colors[..] };
         let mut pass = gpu.pass("descent");
-        for turn in turns {
-            let color = match colors.entry(turn.color) {
-                Entry::Occupied(found) => found.into_mut(),
-                Entry::Vacant(place) => {
-                    place.insert(self.color(gpu, [&pull, &descend], turn.start..turn.end)?)
-                }
-            };
+        for color in colors.iter().chain(back.iter().rev()) {
             if let Some((group, len)) = &color.acting {
                 pass.dispatch(&pull, &[&acting, group], *len);
             }
-            pass.dispatch(&descend, &[&moving, &color.chosen], turn.end - turn.start);
+            pass.dispatch(&descend, &[&moving, &color.chosen], color.len);
         }
         pass.submit()?;
         Ok(gpu.read(&vertices, 0..vertices.len())?)
     }
 
     /// A colour's vertices, and the constraints on them.
-    fn color(&self, gpu: &Gpu, [pull, descend]: [&Kernel; 2], range: Range<usize>) -> Result<Color, Failure> {
+    fn color(&self, gpu: &Gpu, [pull, descend]: [&Kernel; 2], chosen: &[u32]) -> Result<Color, Failure> {
         let (set, descent) = (self.set(), self.descent()?);
-        let chosen = &descent.groups().order[range];
+        let moved = chosen.len();
         let (mut places, mut shares) = (Vec::<u32>::new(), Vec::<[u32; 3]>::new());
         for (n, &vertex) in (0u32..).zip(chosen) {
             let start = places.len() as u32;
@@ -188,7 +182,7 @@ impl Body {
         let order = gpu.buffer("vertices of a colour", chosen)?;
         let chosen = gpu.bind(descend, 1, &[(0, order.whole())])?;
         if shares.is_empty() {
-            return Ok(Color { chosen, acting: None });
+            return Ok(Color { chosen, len: moved, acting: None });
         }
         let stiffness = set.stiffness().values();
         let shape: Vec<[f32; 2]> =
@@ -206,12 +200,14 @@ impl Body {
             (3, places.whole()),
             (4, shares.whole()),
         ];
-        Ok(Color { chosen, acting: Some((gpu.bind(pull, 1, &bindings)?, len)) })
+        Ok(Color { chosen, len: moved, acting: Some((gpu.bind(pull, 1, &bindings)?, len)) })
     }
 }
 
 struct Color {
     chosen: BindGroup,
+    /// Vertices of the colour.
+    len: usize,
     /// Nothing where no constraint acts.
     acting: Option<(BindGroup, usize)>,
 }
