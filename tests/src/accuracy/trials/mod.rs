@@ -26,7 +26,7 @@ pub use page::{Tried, csv, page};
 /// Errors that a trial has to come below.
 pub const LEVELS: [f64; 2] = [0.01, 0.001];
 /// Sweeps after which a trial ends.
-pub const MOST_SWEEPS: usize = 512;
+pub const MOST_SWEEPS: usize = 256;
 /// The grid of the coarse start has a step of so many mean lengths of a constraint's first edge.
 const COARSER: f64 = 3.0;
 /// Substeps of a frame.
@@ -204,7 +204,7 @@ fn halves(step: &Step<'_>, recipe: Recipe, start: &Iterate) -> Vec<(usize, f64)>
             step.sweep(recipe.method, &mut iterate, recipe.relaxed, sweep >= half);
         }
         errors.push((2 * half, step.error(&iterate.x)));
-        half += half.div_ceil(8);
+        half += half.div_ceil(4);
     }
     errors
 }

@@ -67,7 +67,7 @@ pub fn page(origin: &Origin, tried: &[Tried]) -> String {
          Anderson's, the coarse solution) is left out, in favour of the recipes.\n\n\
          - *ω*: each change is taken so many times.\n\
          - *there and back*: every other sweep goes through the colours backwards, as in symmetric Gauss–Seidel.\n\
-         - *half there, half back*: the second half of the sweeps does; their number was raised by an eighth at a time.\n\
+         - *half there, half back*: the second half of the sweeps does; their number was raised by a quarter at a time.\n\
          - *Chebyshev ρ*: semi-iterative weights for an assumed spectral radius, from the second sweep on.\n\
          - *Anderson m*: the combination of the last m + 1 iterates whose changes cancel best; for XPBD the multipliers are combined \
          with the same weights.\n\
