@@ -1,9 +1,9 @@
 //! The Hessian of the objective: `(∇C∇Cᵀ + C∇²C)/α` of each constraint, and the inertia on the diagonal.
 //!
 //! `∇²C` comes from central differences of the exact gradients, with a step in proportion to the element. Far from a minimum the
-//! Hessian may not be positive definite, as in compressed springs; then each element's block is replaced by the matrix with the
-//! absolute values of its eigenvalues (Chen et al., *Stabler Neo-Hookean Simulation: Absolute Eigenvalue Filtering for Projected
-//! Newton*, SIGGRAPH 2024), so that the sum is positive semidefinite.
+//! Hessian may not be positive definite, as in compressed springs; then a share of the negative eigenvalues of each element's block
+//! is turned upwards. All of it gives their absolute values (Chen et al., *Stabler Neo-Hookean Simulation: Absolute Eigenvalue Filtering
+//! for Projected Newton*, SIGGRAPH 2024), and a sum that is positive semidefinite.
 
 use nalgebra::{DMatrix, Matrix3, Point3, SymmetricEigen, Vector3};
 use rayon::prelude::*;

@@ -1,4 +1,5 @@
-//! Charts of a problem: error against time per frame, a line for each number of substeps, the front behind them.
+//! Charts of a problem: error against time per frame, a colour for each backend and method, a line for each number of substeps,
+//! the front behind them.
 
 use std::collections::BTreeMap;
 
@@ -7,24 +8,27 @@ use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
 use super::front::pareto;
 use super::row::{Measure, Row};
 
+/// Points by the number of substeps.
+type Lines = BTreeMap<u32, Vec<[f64; 2]>>;
+
 /// The chart of one error over all rows of a problem, as SVG; none if no row has it.
 pub fn chart(problem: &str, rows: &[Row], measure: Measure) -> Option<String> {
-    let mut lines: BTreeMap<(bool, String, u32), Vec<[f64; 2]>> = BTreeMap::new();
+    let mut families: BTreeMap<(bool, String), Lines> = BTreeMap::new();
     let mut all = Vec::new();
     for row in rows {
         let Some(error) = row.error(measure) else { continue };
         let point = [row.ms_min, error];
         all.push(point);
-        // Beside the usual backend and method, one line each is enough.
-        let substeps = if row.is_usual() { row.substeps } else { 0 };
-        lines.entry((!row.is_usual(), row.family(), substeps)).or_default().push(point);
+        let family = families.entry((!row.is_usual(), row.family())).or_default();
+        family.entry(row.substeps).or_default().push(point);
     }
     let front: Vec<[f64; 2]> = pareto(&all).into_iter().map(|n| all[n]).collect();
     let mut named = vec![("Pareto front".to_owned(), front, Mark::Band)];
-    for ((other, family, substeps), mut points) in lines {
-        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let name = if other { family } else { format!("{family}, {substeps} × n") };
-        named.push((name, points, if other { Mark::Rings } else { Mark::Dots }));
+    for ((other, name), mut lines) in families {
+        lines.values_mut().for_each(|line| line.sort_by(|a, b| a[0].total_cmp(&b[0])));
+        // What is not finite breaks the line.
+        let lines: Vec<Vec<[f64; 2]>> = lines.into_values().collect();
+        named.push((name, lines.join(&[f64::NAN; 2]), if other { Mark::Rings } else { Mark::Dots }));
     }
     let series: Vec<Series<'_>> =
         named.iter().map(|(name, points, mark)| Series { name, points, mark: *mark }).collect();

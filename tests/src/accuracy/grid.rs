@@ -18,6 +18,8 @@ struct Limits {
 
 const FULL: Limits =
     Limits { substeps: &[1, 2, 5, 10, 20, 40, 80], sweeps: 40, raised: [(1, 512), (10, 64)] };
+/// For what is run to be compared with, not to be fast: the serial reference, and a GPU that is none.
+const SLOW: Limits = Limits { substeps: &[1, 5, 20], sweeps: 5, raised: [(1, 64), (5, 8)] };
 const QUICK: Limits = Limits { substeps: &[1, 10, 40], sweeps: 20, raised: [(1, 16), (10, 16)] };
 
 impl Limits {
@@ -43,6 +45,7 @@ impl Limits {
 /// All configurations of `case`.
 pub fn configs(case: &Case, quick: bool, gpu: Option<&Gpu>) -> Vec<Config> {
     let limits = if quick { QUICK } else { FULL };
+    let slow = if quick { QUICK.shared_by(8) } else { SLOW };
     let mut configs = Vec::new();
     let mut add = |backend: Backend, method: Method, limits: Limits, all: bool| {
         let chosen = limits.pairs().into_iter().filter(|([s, n], _)| all || *n == 1 || [1, 10].contains(s));
@@ -59,10 +62,10 @@ pub fn configs(case: &Case, quick: bool, gpu: Option<&Gpu>) -> Vec<Config> {
     }
     add(Backend::CpuDouble, XPBD, limits, false);
     add(Backend::CpuDouble, VBD, limits.shared_by(VBD.weight), false);
-    add(Backend::Reference, XPBD, limits.shared_by(8), false);
+    add(Backend::Reference, XPBD, slow, false);
     match gpu {
         None => (),
-        Some(gpu) if is_software(gpu) => add(Backend::Gpu(gpu.clone()), XPBD, limits.shared_by(8), false),
+        Some(gpu) if is_software(gpu) => add(Backend::Gpu(gpu.clone()), XPBD, slow, false),
         Some(gpu) => add(Backend::Gpu(gpu.clone()), XPBD, limits, true),
     }
     if case.pbd.is_some() {

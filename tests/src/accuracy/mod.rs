@@ -93,7 +93,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         };
         match options.trials {
             true => write_trials(&origin, &tried, &folder)?,
-            false => write(&origin, &sections, &folder)?,
+            false => write(&origin, &sections, &checks, &folder)?,
         }
     }
     Ok(good)
@@ -137,7 +137,7 @@ fn problem(
 }
 
 /// Writes page, table and charts.
-fn write(origin: &Origin, sections: &[Section], folder: &Path) -> Result<(), Failure> {
+fn write(origin: &Origin, sections: &[Section], checks: &[Check], folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder)?;
     let rows: Vec<Row> = sections.iter().flat_map(|section| section.rows.iter().cloned()).collect();
     fs::write(folder.join("accuracy.csv"), row::csv(&rows))?;
@@ -149,7 +149,7 @@ fn write(origin: &Origin, sections: &[Section], folder: &Path) -> Result<(), Fai
             }
         }
     }
-    fs::write(folder.join("accuracy.md"), page::page(origin, sections))?;
+    fs::write(folder.join("accuracy.md"), page::page(origin, sections, checks))?;
     Ok(())
 }
 

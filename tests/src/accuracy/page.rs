@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use cutis::report::Machine;
 
+use super::checks::Check;
 use super::front::pareto;
 use super::row::{Measure, Row};
 use super::words::{
@@ -62,7 +63,7 @@ PBD has no E1 and no E2: it minimises nothing, and its result has no limit as su
 ";
 
 /// The whole page.
-pub fn page(origin: &Origin, sections: &[Section]) -> String {
+pub fn page(origin: &Origin, sections: &[Section], checks: &[Check]) -> String {
     let machine = Machine::here();
     let load = |load: &Option<String>| load.clone().unwrap_or_else(|| "unknown".into());
     let mut text = format!(
@@ -82,6 +83,10 @@ pub fn page(origin: &Origin, sections: &[Section]) -> String {
     text += &summary(sections);
     for section in sections {
         text += &of_problem(section);
+    }
+    text += "\n## Checks\n\nThe command ends with an error if one of these does not hold.\n\n";
+    for Check { what, holds } in checks {
+        let _ = writeln!(text, "- {} {what}", if *holds { "holds:" } else { "**FAILS:**" });
     }
     text
 }
@@ -135,7 +140,8 @@ fn of_problem(section: &Section) -> String {
         let _ =
             writeln!(text, "![{}](accuracy-{name}-{}.svg)", measure.label(), measure.name().to_lowercase());
     }
-    text += "\nSettings on the front of at least one error (that error in bold):\n\n";
+    text += "\nA line has one number of substeps; from point to point its iterations double. Settings on the front of at least one error (that \
+             error in bold):\n\n";
     text += &front_table(rows);
     let usual: Vec<&Row> = rows.iter().filter(|row| row.is_usual()).collect();
     text += "\nThe fastest on the CPU in `f32`:\n\n";
