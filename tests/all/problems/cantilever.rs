@@ -5,13 +5,9 @@
 //! length; times grow with the root.
 
 use cutis_constraints::Scalar;
-use cutis_gpu::{Gpu, GpuError, GpuOptions};
-use cutis_solver::Solver;
-use cutis_solver_cpu::SolverCpu;
-use cutis_solver_gpu::SolverGpu;
 use cutis_tests::cantilever::{Beam, GRAVITY_M_S2, Material, converged, settle};
 
-use super::{SCALES, at_most, within};
+use super::{SCALES, Start, at_most, cpu, on_each_adapter, within};
 
 const CELLS: [usize; 3] = [8, 2, 2];
 /// Sinks by a tenth of its length.
@@ -28,7 +24,7 @@ fn reference(beam: &Beam, material: &Material) -> f64 {
 }
 
 /// How far the end sinks by the solver; its substeps are a share of the time in which a wave crosses a cell.
-fn sag<T: Scalar>(scale: f64, material: Material, share: f64, gpu: Option<&Gpu>) -> (f64, f64) {
+fn sag<T: Scalar>(start: &Start<T>, scale: f64, material: Material, share: f64) -> (f64, f64) {
     let beam = Beam::new(CELLS, 1, scale).unwrap();
     let right = at_scale(SOFT, scale);
     let expected = reference(&beam, &right);
@@ -37,52 +33,37 @@ fn sag<T: Scalar>(scale: f64, material: Material, share: f64, gpu: Option<&Gpu>)
     let way = converged(expected * beam.length_m, share * crossing_s, 10);
     let material = at_scale(material, scale);
     let still = if size_of::<T>() == 8 { 1e-8 } else { 1e-4 };
-    let rest = match gpu {
-        Some(gpu) => {
-            let system = beam.system::<f32>(&material, None).unwrap();
-            settle(&mut SolverGpu::new(gpu, system, way.settings()).unwrap(), &beam, still, way.most_frames)
-        }
-        None => {
-            let system = beam.system::<T>(&material, None).unwrap();
-            let mut solver = SolverCpu::new(system, way.settings(), Some(1)).unwrap();
-            settle(&mut solver as &mut dyn Solver<T>, &beam, still, way.most_frames)
-        }
-    };
-    let rest = rest.unwrap();
+    let system = beam.system::<T>(&material, None).unwrap();
+    let mut solver = start(system, way.settings());
+    let rest = settle(&mut *solver, &beam, still, way.most_frames).unwrap();
     assert!(rest.at_rest, "still moving after {} s", rest.time_s);
     (-rest.displacement[1], expected)
 }
 
-fn check<T: Scalar>(scale: f64, material: Material, share: f64, gpu: Option<&Gpu>) -> Result<(), String> {
-    let (found, expected) = sag::<T>(scale, material, share, gpu);
+fn check<T: Scalar>(start: &Start<T>, scale: f64, material: Material, share: f64) -> Result<(), String> {
+    let (found, expected) = sag(start, scale, material, share);
     within(found, expected, 0.01)
 }
 
 #[test]
 fn the_solver_hangs_where_newton_says() {
     for scale in SCALES {
-        check::<f64>(scale, SOFT, 0.5, None).unwrap();
-        check::<f32>(scale, SOFT, 1.0, None).unwrap();
+        check(&cpu::<f64>, scale, SOFT, 0.5).unwrap();
+        check(&cpu::<f32>, scale, SOFT, 1.0).unwrap();
     }
 }
 
 #[test]
 fn so_does_the_solver_on_a_gpu() {
-    match Gpu::open(&GpuOptions::default()) {
-        Ok(gpu) => SCALES.into_iter().for_each(|scale| check::<f32>(scale, SOFT, 1.0, Some(&gpu)).unwrap()),
-        Err(error @ GpuError::NoAdapter) => {
-            let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
-            assert!(!required, "{error}");
-            eprintln!("skipped: {error}");
-        }
-        Err(error) => panic!("{error}"),
+    for scale in SCALES {
+        on_each_adapter(|start| check(start, scale, SOFT, 1.0));
     }
 }
 
 #[test]
 fn the_error_falls_with_the_square_of_the_substep() {
     let apart = |share| {
-        let (found, expected) = sag::<f64>(1.0, SOFT, share, None);
+        let (found, expected) = sag(&cpu::<f64>, 1.0, SOFT, share);
         (found / expected - 1.0).abs()
     };
     let (half, whole) = (apart(0.25), apart(0.5));
@@ -91,7 +72,7 @@ fn the_error_falls_with_the_square_of_the_substep() {
 
 #[test]
 fn control_another_material_is_refused() {
-    check::<f64>(1.0, Material { bulk_pa: 0.5 * SOFT.bulk_pa, ..SOFT }, 0.5, None).unwrap_err();
-    check::<f64>(1.0, Material { youngs_pa: 1.03 * SOFT.youngs_pa, ..SOFT }, 0.5, None).unwrap_err();
-    check::<f64>(1.0, Material { density_kg_m3: 1.03 * SOFT.density_kg_m3, ..SOFT }, 0.5, None).unwrap_err();
+    check(&cpu::<f64>, 1.0, Material { bulk_pa: 0.5 * SOFT.bulk_pa, ..SOFT }, 0.5).unwrap_err();
+    check(&cpu::<f64>, 1.0, Material { youngs_pa: 1.03 * SOFT.youngs_pa, ..SOFT }, 0.5).unwrap_err();
+    check(&cpu::<f64>, 1.0, Material { density_kg_m3: 1.03 * SOFT.density_kg_m3, ..SOFT }, 0.5).unwrap_err();
 }

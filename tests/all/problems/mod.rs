@@ -1,5 +1,5 @@
 //! Problems whose answers are known from outside the solver: closed forms, an independent Newton solution, independent
-//! programs. Each has a negative control, which its own check must refuse.
+//! programs. Whatever needs a solver runs on every backend. Each has a negative control, which its own check must refuse.
 
 mod affine_patch;
 mod beam;
@@ -15,11 +15,72 @@ mod wound_gape;
 
 use cutis_constraints::Scalar;
 use cutis_gpu::{Gpu, GpuOptions, Select};
-use cutis_solver::Solver;
+use cutis_solver::{Settings, Solver, SolverReference, System};
+use cutis_solver_cpu::SolverCpu;
+use cutis_solver_gpu::SolverGpu;
 use nalgebra::Point3;
 
 /// The length scales of every problem: results may not depend on the unit of length.
 const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
+
+/// Starts a body on a backend.
+type Start<T> = dyn Fn(System<T>, Settings) -> Box<dyn Solver<T>>;
+
+fn reference<T: Scalar>(system: System<T>, settings: Settings) -> Box<dyn Solver<T>> {
+    Box::new(SolverReference::new(system, settings).unwrap())
+}
+
+/// On two threads, where a colour is large enough for them.
+fn cpu<T: Scalar>(system: System<T>, settings: Settings) -> Box<dyn Solver<T>> {
+    Box::new(SolverCpu::new(system, settings, Some(2)).unwrap())
+}
+
+fn gpu(gpu: &Gpu) -> impl Fn(System<f32>, Settings) -> Box<dyn Solver<f32>> + use<> {
+    let gpu = gpu.clone();
+    move |system, settings| Box::new(SolverGpu::new(&gpu, system, settings).unwrap())
+}
+
+/// Fails where `check` does on a backend, in `f64`: no GPU has it.
+#[track_caller]
+fn in_double(check: impl Fn(&Start<f64>) -> Result<(), String>) {
+    on_each_host(check);
+}
+
+/// Fails where `check` does on a backend, in `f32`.
+#[track_caller]
+fn in_single(check: impl Fn(&Start<f32>) -> Result<(), String>) {
+    on_each_host(&check);
+    on_each_adapter(&check);
+}
+
+#[track_caller]
+fn on_each_host<T: Scalar>(check: impl Fn(&Start<T>) -> Result<(), String>) {
+    let hosts: [(&str, &Start<T>); 2] = [("reference", &reference::<T>), ("cpu", &cpu::<T>)];
+    for (name, start) in hosts {
+        if let Err(error) = check(start) {
+            panic!("{name}: {error}");
+        }
+    }
+}
+
+/// Fails where `check` does on a GPU adapter of the machine. Without one the test is left out with a word, or fails where
+/// one is required.
+#[track_caller]
+fn on_each_adapter(check: impl Fn(&Start<f32>) -> Result<(), String>) {
+    let adapters = cutis_gpu::adapters();
+    if adapters.is_empty() {
+        let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
+        assert!(!required, "this test needs a GPU adapter; a software one is enough");
+        eprintln!("left out: there is no GPU adapter");
+    }
+    for adapter in adapters {
+        let options = GpuOptions { select: Select::Index(adapter.index), ..GpuOptions::default() };
+        let start = gpu(&Gpu::open(&options).unwrap());
+        if let Err(error) = check(&start) {
+            panic!("{}: {error}", adapter.name);
+        }
+    }
+}
 
 /// `points` in another unit of length.
 fn scaled(points: &[Point3<f64>], scale: f64) -> Vec<Point3<f64>> {
@@ -27,7 +88,7 @@ fn scaled(points: &[Point3<f64>], scale: f64) -> Vec<Point3<f64>> {
 }
 
 /// The solver's positions in double precision, divided by `scale`.
-fn positions<T: Scalar>(solver: &mut impl Solver<T>, scale: f64) -> Vec<Point3<f64>> {
+fn positions<T: Scalar>(solver: &mut dyn Solver<T>, scale: f64) -> Vec<Point3<f64>> {
     solver.positions().unwrap().iter().map(|p| p.map(|x| x.to_f64() / scale)).collect()
 }
 
@@ -40,18 +101,4 @@ fn within(found: f64, expected: f64, tolerance: f64) -> Result<(), String> {
 /// Fails unless `found` is at most `bound`.
 fn at_most(what: &str, found: f64, bound: f64) -> Result<(), String> {
     if found <= bound { Ok(()) } else { Err(format!("{what} is {found:e}, above {bound:e}")) }
-}
-
-/// Runs `test` on each GPU adapter of the machine. Without one the test is left out with a word, or fails where one is required.
-fn on_each_adapter(mut test: impl FnMut(&Gpu)) {
-    let adapters = cutis_gpu::adapters();
-    if adapters.is_empty() {
-        let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
-        assert!(!required, "this test needs a GPU adapter; a software one is enough");
-        eprintln!("left out: there is no GPU adapter");
-    }
-    for adapter in adapters {
-        let options = GpuOptions { select: Select::Index(adapter.index), ..GpuOptions::default() };
-        test(&Gpu::open(&options).unwrap());
-    }
 }

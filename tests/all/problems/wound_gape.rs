@@ -8,11 +8,10 @@ use std::f64::consts::{PI, SQRT_2};
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, SkinTension};
-use cutis_solver::{Formulation, Settings, Solver, Stiffness, SystemBuilder};
-use cutis_solver_cpu::SolverCpu;
+use cutis_solver::{Formulation, Settings, Stiffness, SystemBuilder};
 use cutis_tests::sheet::Sheet;
 
-use super::{SCALES, positions, scaled, within};
+use super::{SCALES, Start, cpu, in_double, in_single, positions, scaled, within};
 
 #[derive(Clone, Copy)]
 struct Case {
@@ -33,7 +32,7 @@ const MIDDLE: Case = Case { nx: 120, a: 12.0, opening: 0.13450, ..SMALL };
 const LARGE: Case = Case { nx: 200, a: 10.0, opening: 0.11773, ..SMALL };
 
 /// Opening in units of the spacing, after the sheet has come to rest.
-fn gape<T: Scalar>(case: &Case, scale: f64) -> f64 {
+fn gape<T: Scalar>(start: &Start<T>, case: &Case, scale: f64) -> f64 {
     let sheet = Sheet::new(case.nx).cut(case.a);
     let count = sheet.positions.len();
     let rest_length = scale / (1.0 + case.e);
@@ -63,42 +62,42 @@ fn gape<T: Scalar>(case: &Case, scale: f64) -> f64 {
         damping_per_s: 2.0 * slowest,
         relaxation: 1.0,
     };
-    let mut solver = SolverCpu::new(system.build(), settings, None).unwrap();
+    let mut solver = start(system.build(), settings);
     solver.step(1).unwrap();
-    sheet.opening(&positions(&mut solver, scale))
+    sheet.opening(&positions(&mut *solver, scale))
 }
 
-fn check<T: Scalar>(case: &Case, scale: f64) -> Result<(), String> {
-    within(gape::<T>(case, scale), case.opening, 0.01)
+fn check<T: Scalar>(start: &Start<T>, case: &Case, scale: f64) -> Result<(), String> {
+    within(gape(start, case, scale), case.opening, 0.01)
 }
 
 #[test]
 fn small_sheet_at_every_scale_in_both_precisions() {
     for scale in SCALES {
-        check::<f64>(&SMALL, scale).unwrap();
-        check::<f32>(&SMALL, scale).unwrap();
+        in_double(|start| check(start, &SMALL, scale));
+        in_single(|start| check(start, &SMALL, scale));
     }
 }
 
 #[test]
 fn middle_sheet() {
-    check::<f64>(&MIDDLE, 1.0).unwrap();
+    check(&cpu::<f64>, &MIDDLE, 1.0).unwrap();
 }
 
 #[test]
 fn large_sheet() {
-    check::<f64>(&LARGE, 1.0).unwrap();
+    check(&cpu::<f64>, &LARGE, 1.0).unwrap();
 }
 
 #[test]
 fn skin_tension_opens_the_slit_further() {
-    check::<f64>(&Case { k_area: 1.0, opening: 0.17734, ..MIDDLE }, 1.0).unwrap();
-    check::<f64>(&Case { k_area: 5.0, opening: 0.33497, ..MIDDLE }, 1.0).unwrap();
+    check(&cpu::<f64>, &Case { k_area: 1.0, opening: 0.17734, ..MIDDLE }, 1.0).unwrap();
+    check(&cpu::<f64>, &Case { k_area: 5.0, opening: 0.33497, ..MIDDLE }, 1.0).unwrap();
 }
 
 #[test]
 fn control_wrong_prestrain_or_area_stiffness_is_refused() {
-    check::<f64>(&Case { e: 0.002 * 1.03, ..SMALL }, 1.0).unwrap_err();
-    check::<f64>(&Case { k_area: 0.05, ..SMALL }, 1.0).unwrap_err();
-    check::<f64>(&Case { a: 7.0, ..SMALL }, 1.0).unwrap_err();
+    check(&cpu::<f64>, &Case { e: 0.002 * 1.03, ..SMALL }, 1.0).unwrap_err();
+    check(&cpu::<f64>, &Case { k_area: 0.05, ..SMALL }, 1.0).unwrap_err();
+    check(&cpu::<f64>, &Case { a: 7.0, ..SMALL }, 1.0).unwrap_err();
 }

@@ -23,7 +23,7 @@ pub enum Suite {
     Solver,
     /// Resampling by the GPU against its twin and against `f64`.
     Resample,
-    /// Problems with known answers, on the CPU.
+    /// Problems with known answers, on the CPU and on a GPU.
     Problems,
     /// The quick part of the stability suite, on the CPU and on a GPU.
     Stability,
