@@ -12,29 +12,34 @@ struct Limits {
     substeps: &'static [u32],
     /// Most sweeps of a frame. With a single iteration there may be more.
     sweeps: u32,
-    /// Most iterations with one or ten substeps, for E1 and E2 only: where does iterating alone lead?
-    raised: [(u32, u32); 2],
+    /// Most iterations with some numbers of substeps, for E1 and E2 only: where does iterating alone lead?
+    raised: &'static [(u32, u32)],
+    /// All but a single iteration is divided by this.
+    times: u32,
 }
 
-const FULL: Limits =
-    Limits { substeps: &[1, 2, 5, 10, 20, 40, 80], sweeps: 40, raised: [(1, 512), (10, 64)] };
+const FULL: Limits = Limits {
+    substeps: &[1, 2, 5, 10, 20, 40, 80],
+    sweeps: 40,
+    raised: &[(1, 512), (2, 128), (5, 64), (10, 64), (20, 16), (40, 8), (80, 4)],
+    times: 1,
+};
+const QUICK: Limits = Limits { substeps: &[1, 10, 40], sweeps: 20, raised: &[(1, 16), (10, 16)], times: 1 };
 /// For what is run to be compared with, not to be fast: the serial reference, and a GPU that is none.
-const SLOW: Limits = Limits { substeps: &[1, 5, 20], sweeps: 5, raised: [(1, 64), (5, 8)] };
-const QUICK: Limits = Limits { substeps: &[1, 10, 40], sweeps: 20, raised: [(1, 16), (10, 16)] };
+const SLOW: Limits = Limits { substeps: &[1, 10, 20], sweeps: 5, raised: &[(1, 64), (10, 8)], times: 1 };
 
 impl Limits {
     /// For what takes `times` as long.
     fn shared_by(self, times: u32) -> Self {
-        let Self { substeps, sweeps, raised } = self;
-        Self { substeps, sweeps: sweeps / times, raised: raised.map(|(s, n)| (s, n / times)) }
+        Self { times, ..self }
     }
 
     /// Substeps and iterations, and whether they are few enough to wait until the body has settled.
     fn pairs(self) -> Vec<([u32; 2], bool)> {
         let of = |&s: &u32| {
-            let most = (self.sweeps / s).max(1);
-            let raised =
-                self.raised.iter().find(|(raised, _)| *raised == s).map_or(most, |(_, n)| most.max(*n));
+            let most = (self.sweeps / self.times / s).max(1);
+            let raised = self.raised.iter().find(|(raised, _)| *raised == s);
+            let raised = raised.map_or(most, |(_, n)| most.max(n / self.times));
             let powers = (0..).map(|power| 1u32 << power).take_while(move |n| *n <= raised);
             powers.map(move |n| ([s, n], n <= most))
         };
@@ -80,7 +85,7 @@ mod tests {
 
     #[test]
     fn pairs_stay_within_the_limits() {
-        let limits = Limits { substeps: &[1, 2, 10, 40], sweeps: 20, raised: [(1, 64), (10, 4)] };
+        let limits = Limits { substeps: &[1, 2, 10, 40], sweeps: 20, raised: &[(1, 64), (10, 4)], times: 1 };
         let pairs = limits.pairs();
         assert!(pairs.iter().all(|([s, n], settles)| !settles || s * n <= 20 || *n == 1));
         for pair in [

@@ -203,12 +203,20 @@ pub fn pbd(rows: &[Row]) -> Option<String> {
     let mut settled: Vec<&Row> =
         rows.iter().filter(|row| row.formulation == PBD.formulation && row.e3.is_some()).collect();
     settled.sort_by_key(|row| row.sweeps());
-    let entry = |row: &&Row| {
+    // Settings with the same result share an entry.
+    let mut entries: Vec<(String, Vec<String>)> = Vec::new();
+    for row in settled {
         let opening =
             row.opening.map_or_else(String::new, |ratio| format!(", opening {ratio:.2} times as wide"));
-        format!("{} × {}: E3 {}{opening}", row.substeps, row.iterations, percent(row.e3.unwrap_or(f64::NAN)))
-    };
-    let entries: Vec<String> = settled.iter().map(entry).collect();
+        let result = format!("E3 {}{opening}", percent(row.e3.unwrap_or(f64::NAN)));
+        let setting = format!("{} × {}", row.substeps, row.iterations);
+        match entries.iter_mut().find(|(known, _)| *known == result) {
+            Some((_, settings)) => settings.push(setting),
+            None => entries.push((result, vec![setting])),
+        }
+    }
+    let entries: Vec<String> =
+        entries.iter().map(|(result, settings)| format!("{}: {result}", settings.join(", "))).collect();
     (!entries.is_empty()).then(|| {
         format!(
             "PBD has stiffness per iteration and no material: E1 and E2 have no meaning for it, and E3 says how far from the \
