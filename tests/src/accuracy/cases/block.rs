@@ -64,7 +64,7 @@ pub fn hanging(size: [usize; 3]) -> Result<Case, Failure> {
         xpbd: system(size, None)?,
         settings: Settings { gravity_m_s2: [9.81, 0.0, 0.0], ..settings() },
         // Large substeps of descent swallow motion; what hangs creeps to its rest.
-        most_frames: 400,
+        most_frames: 150,
         ..pulled(size)?
     })
 }
