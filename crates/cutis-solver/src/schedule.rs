@@ -74,9 +74,8 @@ impl Schedule {
     pub fn turns_of(&self, iteration: u32) -> impl Iterator<Item = &Turn> {
         let pass = |number: u64| {
             let back = number >= u64::from(self.iterations);
-            let (there, back) =
-                if back { (&self.turns[..0], &self.turns[..]) } else { (&self.turns[..], &self.turns[..0]) };
-            there.iter().chain(back.iter().rev())
+            let count = self.turns.len();
+            (0..count).map(move |n| &self.turns[if back { count - 1 - n } else { n }])
         };
         let first = 2 * u64::from(iteration);
         pass(first).chain(pass(first + 1))

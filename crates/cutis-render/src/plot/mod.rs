@@ -74,9 +74,10 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
     let across = Span::new(x.scale, series.iter().flat_map(|s| s.points).map(|p| p[0]), [left, right]);
     let upward = Span::new(y.scale, series.iter().flat_map(|s| s.points).map(|p| p[1]), [bottom, top]);
     let beside = series.len() > INSIDE;
-    let width = if beside { WIDTH + legend_size(series)[0] } else { WIDTH };
+    let [wide, high] = legend_size(series);
+    let [width, height] = if beside { [WIDTH + wide, HEIGHT.max(top + high)] } else { [WIDTH, HEIGHT] };
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {HEIGHT}\" width=\"{width}\" height=\"{HEIGHT}\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
          font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
     );
     let mut add = |text: std::fmt::Arguments<'_>| {
@@ -248,11 +249,13 @@ mod tests {
     fn a_long_legend_stands_beside_the_plot() {
         let axis = |label| Axis { label, scale: Scale::Linear };
         let one = Series { name: "name", points: &[[0.0, 1.0]], mark: Mark::Dots };
-        let width = |count| {
+        let size = |what: &str, count| {
             let svg = line_chart("", axis("x"), axis("y"), &vec![one; count]);
-            svg.split("width=\"").nth(1).and_then(|s| s.split('"').next()?.parse::<f64>().ok()).unwrap_or(0.0)
+            svg.split(&format!(" {what}=\"")).nth(1).and_then(|s| s.split('"').next()?.parse::<f64>().ok())
         };
-        assert_eq!(width(INSIDE), WIDTH);
-        assert!(width(INSIDE + 1) > WIDTH);
+        assert_eq!(size("width", INSIDE), Some(WIDTH));
+        assert!(size("width", INSIDE + 1) > Some(WIDTH));
+        assert_eq!(size("height", INSIDE + 1), Some(HEIGHT));
+        assert!(size("height", 40) > Some(18.0 * 40.0), "every name has its row");
     }
 }
