@@ -1,6 +1,6 @@
 //! Volume constraint: a tetrahedron keeps its signed volume.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, SimdBool, Vector3};
 
 use crate::material::{MaterialError, check_positive};
 use crate::{Constraint, Eval, Real};
@@ -84,13 +84,48 @@ impl Constraint<4> for Volume {
     ) -> Option<T> {
         let (a, b, c) = (x2 - x1, x3 - x1, x4 - x1);
         let edge_squared = a.dot(&a).simd_max(b.dot(&b)).simd_max(c.dot(&c));
-        let rest_squared = (rest_volume.simd_abs() * edge_squared.simd_sqrt()).simd_sqrt();
-        let size_squared = edge_squared.simd_max(rest_squared);
+        // e³ > V0 is the rule and decides without a root; the factor two keeps its rounding out of the result.
+        let grown = (edge_squared * edge_squared * edge_squared)
+            .simd_gt(rest_volume * rest_volume * T::constant(2.0));
+        let size_squared = if grown.all() {
+            edge_squared
+        } else {
+            edge_squared.simd_max((rest_volume.simd_abs() * edge_squared.simd_sqrt()).simd_sqrt())
+        };
         let inverse = T::constant(1.0 / 16.0) / size_squared;
         Some(inverse.select(size_squared.simd_gt(T::zero()), T::zero()))
     }
 
     fn rest_size<T: Real>(&[rest_volume]: &[T; 1]) -> T {
         rest_volume.simd_abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The reach as the shader finds it, with both roots taken.
+    fn with_roots(edge_squared: f32, rest_volume: f32) -> f32 {
+        let size_squared = edge_squared.max((rest_volume * edge_squared.sqrt()).sqrt());
+        if size_squared > 0.0 { 1.0 / 16.0 / size_squared } else { 0.0 }
+    }
+
+    #[test]
+    fn deciding_without_roots_changes_no_bit() {
+        for edge in [0.0, 1e-12, 3e-7, 2e-4, 0.7, 41.0, 5e6, 1e15] {
+            let x =
+                [[0.0f32, 0.0, 0.0], [edge, 0.0, 0.0], [0.0, edge, 0.0], [0.0, 0.0, edge]].map(Point3::from);
+            let cube = edge * edge * edge;
+            let near = (-4000..4000).map(|step| cube * (1.0 + step as f32 * 1e-4));
+            for rest_volume in near.chain([0.0, 1e-30, 1e-9, 1.0, 1e30]).map(f32::abs) {
+                let found = Volume::inverse_reach_squared(&x, &[rest_volume]);
+                assert_eq!(
+                    found,
+                    Some(with_roots(edge * edge, rest_volume)),
+                    "edge {edge}, volume {rest_volume}"
+                );
+            }
+        }
     }
 }
