@@ -76,7 +76,7 @@ impl Problem {
 /// The larger one of a deviation and `error/scale`; what is not a number is larger than any.
 fn larger(deviation: f64, error: f64, scale: f64) -> f64 {
     let ratio = if error == 0.0 { 0.0 } else { error / scale };
-    if ratio <= deviation { deviation } else { ratio }
+    if deviation.is_nan() || ratio <= deviation { deviation } else { ratio }
 }
 
 /// A number from −1 to 1 without pattern.
@@ -85,4 +85,15 @@ fn noise(sample: usize, n: usize) -> f64 {
         ^ (sample as u64 + 1).wrapping_mul(0xD1B5_4A32_D192_ED03);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     ((mixed ^ (mixed >> 32)) >> 11) as f64 / 2f64.powi(52) - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_number_stays_the_largest() {
+        assert!(larger(f64::NAN, 0.1, 1.0).is_nan() && larger(0.1, f64::NAN, 1.0).is_nan());
+        assert_eq!((larger(0.1, 0.0, 0.0), larger(0.1, 1.0, 2.0)), (0.1, 0.5));
+    }
 }

@@ -8,7 +8,8 @@
 //! - **Curvature from `C` and `∇C` alone.** The model's matrix is `m/h² + Σ (∇C∇Cᵀ + κ·1)/α` with `κ = |∇C|²·C⁺/(C⁺ + R)`, `C⁺` the
 //!   stretch and `R` the rest size. For a distance `C⁺ + R` is the length, and `κ = C/length` the true curvature across
 //!   the edge; for an area likewise; a volume has none in a single vertex. What is compressed has a negative curvature, which is
-//!   left out. So the matrix is positive definite whatever the shape, and bounds the true one for these.
+//!   left out. So the matrix is positive definite whatever the shape, and bounds the true one for distances, areas and volumes. Of amplified
+//!   skin, `U'' ∝ 1 + 2βC/A0` along `∇A`, it has at least three quarters: a step lowers the energy for `ω ≤ 1.5`.
 //! - **The start is `x_n + h·v`, without gravity.** A body in static equilibrium then has no force left on any vertex at the
 //!   start, and stays: what comes to rest is in equilibrium for any number of iterations and substeps.
 //! - **There and back**: an iteration is two passes over the colours. In the first half of a substep's passes they take their turns
