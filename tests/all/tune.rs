@@ -142,6 +142,22 @@ fn a_budget_is_kept_and_the_front_is_one() {
     assert!(affordable.filter_map(|c| c.error).all(|error| error >= picked.error.unwrap()));
 }
 
+/// The ledger is that of a run of the tuned scene, and not of the scene as it was.
+#[test]
+fn the_ledger_is_that_of_the_picked_setting() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = [("run.frames", "2"), ("solver.formulation", "\"vbd\""), ("solver.substeps", "4")];
+    let loaded = scene(&own);
+    let (tuning, tuned) = tuned(&loaded, folder.path(), Demand::Error(0.5));
+    let stored = |loaded: &LoadedScene| cutis::check(loaded, &Silent).unwrap().memory;
+    let parts = tuning.ledger.parts.iter().filter(|part| part.host_bytes > 0);
+    let parts: Vec<(&str, usize)> = parts.map(|part| (part.part.as_str(), part.host_bytes)).collect();
+    let expected = stored(&tuned);
+    assert_eq!(parts, expected.iter().map(|part| (part.part.as_str(), part.bytes)).collect::<Vec<_>>());
+    assert!(tuning.ledger.ms_per_frame() > Some(0.0));
+    assert_ne!(expected, stored(&loaded), "nothing to tell apart: {:?}", tuning.picked);
+}
+
 #[test]
 fn what_can_be_left_out_is_measured() {
     let folder = tempfile::tempdir().unwrap();
@@ -199,4 +215,14 @@ fn a_demand_that_nothing_meets_is_told_and_writes_nothing() {
     assert!(matches!(&error, Error::NoSetting { .. }) && !error.is_bad_input(), "{error}");
     assert!(tuning.picked.is_none() && tuning.scene_file.is_none() && !options.out.exists());
     assert!(tuning.candidates.iter().any(|candidate| candidate.own && candidate.error.is_some()));
+    assert!(!error.to_string().contains("could afford") && tuning.reference.needs_minutes.is_none());
+
+    // A reference that there is no time for to be finer than the scene.
+    let loaded = scene(&[("run.frames", "2"), ("solver.substeps", "400")]);
+    let tuning = cutis::tune(&loaded, &TuneOptions { minutes: 1e-6, ..options }, &Silent).unwrap();
+    assert_eq!(tuning.reference.substeps, [4, 8, 16]);
+    let error = tuning.unmet().unwrap().to_string();
+    for words in ["could afford 16 substeps a frame, the scene has 400", "--minutes"] {
+        assert!(error.contains(words), "no {words:?} in {error}");
+    }
 }

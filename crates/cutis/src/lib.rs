@@ -24,6 +24,7 @@ mod demo;
 mod devices;
 mod dynamics;
 mod error;
+mod expense;
 mod files;
 mod find_skin;
 mod frames;

@@ -5,10 +5,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use crate::backend::{self, Chosen, Request, Work};
+use crate::backend::{self, Chosen, Request};
 use crate::body::{Body, needs_skin};
 use crate::clock::Clock;
 use crate::dynamics::{self, Dynamics};
+use crate::expense::Expense;
 use crate::report::{Backend, MemoryPart, Sizes, Stage};
 use crate::scene::LoadedScene;
 use crate::source::{self, Source};
@@ -24,7 +25,7 @@ pub struct Plan {
     pub backend: Backend,
     /// Element counts.
     pub sizes: Sizes,
-    /// Colours per constraint kind.
+    /// Colours per constraint kind; in vertex block descent those of the vertices, as `descent`, and no others.
     pub colors: BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
@@ -35,7 +36,7 @@ pub struct Plan {
     pub ledger: CostLedger,
     /// Bytes of the volume's voxels.
     pub volume_bytes: usize,
-    /// Constraints × iterations × substeps × frames; the largest 64-bit number where it is more.
+    /// Projections of the run, or steps of a vertex in vertex block descent; the largest 64-bit number where it is more.
     pub projections: u64,
     /// What the scene leaves out, and therefore costs nothing.
     pub left_out: Vec<String>,
@@ -99,7 +100,9 @@ pub(crate) fn prepare(
     warnings.extend(region::idle(&body));
     warnings.extend(dynamics.skin_rate.and_then(|rate| unresolved_skin(loaded, rate)));
     let sizes = sizes(&body, &dynamics);
-    let work = work(loaded, &dynamics);
+    let expense = Expense::of(&dynamics.system, &dynamics.settings)
+        .map_err(|error| loaded.blame("solver")(Error::Solver(error)))?;
+    let work = expense.work(&dynamics.system, &dynamics.settings, loaded.scene.run.frames);
     let backend = request.settle(loaded, &work)?;
     warnings.extend(backend.note.clone());
     if let (Some(adapter), false) = (&loaded.scene.solver.adapter, backend.on_gpu()) {
@@ -108,14 +111,18 @@ pub(crate) fn prepare(
             backend.report.name
         ));
     }
-    let memory = memory(&dynamics);
+    let colors = match expense.vertex_colors() {
+        Some(number) => BTreeMap::from([(Ledger::DESCENT.to_owned(), number)]),
+        None => dynamics.colors.clone(),
+    };
+    let Expense { memory, .. } = expense;
     let device_memory = backend.device_memory(&dynamics.system, &dynamics.settings);
     let mut left_out = left_out(loaded, &backend);
     region::left_out(&body, &memory, &mut left_out);
     let plan = Plan {
         backend: backend.report.clone(),
         sizes,
-        colors: dynamics.colors.clone(),
+        colors,
         ledger: CostLedger::of_memory(&memory, &device_memory, NO_DEVICE),
         memory,
         device_memory,
@@ -126,30 +133,6 @@ pub(crate) fn prepare(
         stages: Vec::new(),
     };
     Ok(Prepared { source, body, dynamics, backend, plan })
-}
-
-/// What the solver will store on the host.
-fn memory(dynamics: &Dynamics) -> Vec<MemoryPart> {
-    let mut parts: Vec<MemoryPart> = dynamics.system.bytes().iter().map(MemoryPart::from).collect();
-    if dynamics.settings.keeps_multipliers() {
-        let count: usize = dynamics.system.kinds().iter().map(|kind| kind.len()).sum();
-        parts.push(MemoryPart { part: Ledger::MULTIPLIERS.into(), bytes: count * size_of::<f32>() });
-    }
-    parts
-}
-
-/// How much the solver will have to do.
-fn work(loaded: &LoadedScene, dynamics: &Dynamics) -> Work {
-    let kinds = dynamics.system.kinds();
-    let constraints: u64 = kinds.iter().map(|kind| kind.len() as u64).sum();
-    let solver = &loaded.scene.solver;
-    let passes = [solver.iterations, solver.substeps, loaded.scene.run.frames];
-    Work {
-        vertices: dynamics.system.vertices().len() as u64,
-        constraints,
-        sweeps: kinds.iter().map(|kind| kind.colors() as u64).sum(),
-        projections: passes.iter().fold(constraints, |product, &n| product.saturating_mul(n.into())),
-    }
 }
 
 fn sizes(body: &Body, dynamics: &Dynamics) -> Sizes {

@@ -30,7 +30,8 @@ pub struct Report {
     /// Quality of the detected skin, if something needed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinQuality>,
-    /// Colours (groups without shared vertices) per constraint kind; absent kinds were left out.
+    /// Colours (groups without shared vertices) per constraint kind; absent kinds were left out. In vertex block descent those of
+    /// the vertices, as `descent`, and no others.
     pub colors: std::collections::BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
@@ -161,7 +162,7 @@ impl From<&cutis_mesh::SkinReport> for SkinQuality {
 /// Memory of one part of the solver.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MemoryPart {
-    /// `vertices` or a constraint kind.
+    /// `vertices`, a constraint kind, `multipliers`, `incidences`, …
     pub part: String,
     /// Bytes.
     pub bytes: usize,

@@ -5,18 +5,19 @@ use cutis_solver::Vertex;
 
 use super::Work;
 
-/// Constraints of a colour, on average, from which `auto` takes a GPU of its own memory.
+/// Constraints of a colour, on average, or vertices in vertex block descent, from which `auto` takes a GPU of its own memory.
 ///
 /// A colour is one dispatch, and colours run one after the other. What a dispatch costs before it computes anything (launch,
 /// and the barrier to the one before) is of the order of 10 µs on a GPU; the CPU backend projects about 40 constraints per
 /// microsecond and core (the demo on two cores: 57 million projections in 0.7 s). With fewer constraints than
 /// 40 × 10 µs × cores, several thousand on a common machine, the CPU is done before a GPU has begun; and a large GPU needs
 /// some ten thousand threads at once to be busy. This is an estimate: no hardware GPU was at hand to measure it.
-const MIN_CONSTRAINTS_PER_SWEEP: u64 = 16_384;
+/// A vertex has several ten constraints to evaluate, so that the CPU would be done later; a GPU needs as many threads to be busy.
+const MIN_PER_SWEEP: u64 = 16_384;
 
-/// Projections of a run from which `auto` takes a GPU: a second or two on the CPU backend with two cores. Opening a device,
+/// Constraints that a run evaluates from which `auto` takes a GPU, one in each projection: a second or two on the CPU backend with two cores. Opening a device,
 /// compiling kernels and uploading the body costs a part of a second, which a shorter run never earns back. An estimate too.
-const MIN_PROJECTIONS: u64 = 100_000_000;
+const MIN_EVALUATIONS: u64 = 100_000_000;
 
 /// How many times as many constraints `auto` asks for before it takes a GPU that shares the memory of the CPU: projections
 /// wait for memory rather than for arithmetic, and there both wait for the same. An estimate too.
@@ -35,18 +36,19 @@ pub(super) fn weigh(
     adapter: Option<&str>,
     adapters: impl FnOnce() -> Vec<Adapter>,
 ) -> Result<Verdict, GpuError> {
-    let per_sweep = work.constraints / work.sweeps.max(1);
-    if per_sweep < MIN_CONSTRAINTS_PER_SWEEP {
+    let element = work.element;
+    let per_sweep = work.elements / work.sweeps.max(1);
+    if per_sweep < MIN_PER_SWEEP {
         return Ok(Verdict::Cpu(format!(
-            "{per_sweep} constraints of a colour are too few for a GPU, which pays from about {MIN_CONSTRAINTS_PER_SWEEP}"
+            "{per_sweep} {element} of a colour are too few for a GPU, which pays from about {MIN_PER_SWEEP}"
         )));
     }
-    if work.projections < MIN_PROJECTIONS {
+    if work.evaluations < MIN_EVALUATIONS {
         let millions = |n: u64| n as f64 / 1e6;
         return Ok(Verdict::Cpu(format!(
-            "{:.1} million projections are too short a run for a GPU, which pays from about {:.0} million",
-            millions(work.projections),
-            millions(MIN_PROJECTIONS)
+            "{:.1} million evaluations of a constraint are too short a run for a GPU, which pays from about {:.0} million",
+            millions(work.evaluations),
+            millions(MIN_EVALUATIONS)
         )));
     }
     let all = adapters();
@@ -59,7 +61,7 @@ pub(super) fn weigh(
         match objection(adapter).or_else(|| too_small_for(adapter, work, per_sweep)) {
             Some(why) => first_objection = first_objection.or(Some(why)),
             None => {
-                let reason = format!("{per_sweep} constraints of a colour keep a {} GPU busy", adapter.kind);
+                let reason = format!("{per_sweep} {element} of a colour keep a {} GPU busy", adapter.kind);
                 return Ok(Verdict::Gpu(adapter.clone(), reason));
             }
         }
@@ -85,12 +87,12 @@ pub(super) fn objection(adapter: &Adapter) -> Option<String> {
 
 /// Why `auto` does not take an adapter for this scene.
 fn too_small_for(adapter: &Adapter, work: &Work, per_sweep: u64) -> Option<String> {
-    let pays_from = MIN_CONSTRAINTS_PER_SWEEP * SHARED_MEMORY_FACTOR;
+    let pays_from = MIN_PER_SWEEP * SHARED_MEMORY_FACTOR;
     if adapter.kind == AdapterKind::Integrated && per_sweep < pays_from {
         return Some(format!(
-            "{per_sweep} constraints of a colour are too few for {}, which shares the processor's memory and pays from \
-             about {pays_from}",
-            adapter.name
+            "{per_sweep} {} of a colour are too few for {}, which shares the processor's memory and pays from about \
+             {pays_from}",
+            work.element, adapter.name
         ));
     }
     let vertex_bytes = work.vertices.saturating_mul(size_of::<Vertex<f32>>() as u64);
@@ -113,8 +115,14 @@ mod tests {
 
     use super::*;
 
-    const LARGE: Work =
-        Work { vertices: 1 << 20, constraints: 10_000_000, sweeps: 50, projections: 10_000_000_000 };
+    const LARGE: Work = Work {
+        vertices: 1 << 20,
+        element: "constraints",
+        elements: 10_000_000,
+        sweeps: 50,
+        projections: 10_000_000_000,
+        evaluations: 10_000_000_000,
+    };
 
     fn adapter(index: usize, name: &str, kind: AdapterKind) -> Adapter {
         let limits = Limits {
@@ -155,7 +163,7 @@ mod tests {
         assert_eq!(verdict(LARGE, None, std::slice::from_ref(&lent)), Ok(0));
 
         // A scene that keeps a card busy, but not a chip that shares the memory of the CPU.
-        let middle = Work { constraints: 20_000 * 50, ..LARGE };
+        let middle = Work { elements: 20_000 * 50, ..LARGE };
         assert_eq!(verdict(middle, None, &[card, chip.clone()]), Ok(0));
         let why = verdict(middle, Some("1"), &[lent, chip]).unwrap_err();
         assert!(why.contains("Chip") && why.contains("65536"), "{why}");
@@ -191,9 +199,10 @@ mod tests {
     fn auto_looks_for_no_adapter_if_the_scene_is_too_small() {
         let looked = || -> Vec<Adapter> { panic!("looked for adapters") };
         for (work, word) in [
-            (Work { constraints: 16_383 * 50, ..LARGE }, "16383 constraints"),
-            (Work { constraints: 0, sweeps: 0, ..LARGE }, "0 constraints"),
-            (Work { projections: 99_000_000, ..LARGE }, "99.0 million"),
+            (Work { elements: 16_383 * 50, ..LARGE }, "16383 constraints"),
+            (Work { element: "vertices", elements: 16_383 * 50, ..LARGE }, "16383 vertices"),
+            (Work { elements: 0, sweeps: 0, ..LARGE }, "0 constraints"),
+            (Work { evaluations: 99_000_000, ..LARGE }, "99.0 million"),
         ] {
             let Ok(Verdict::Cpu(why)) = weigh(&work, Some("unheard-of"), looked) else { panic!("{work:?}") };
             assert!(why.contains(word), "{why}");

@@ -33,12 +33,16 @@ pub(crate) enum Request {
 #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only a build with GPUs has a choice"))]
 pub(crate) struct Work {
     pub(crate) vertices: u64,
-    /// Constraints of all kinds.
-    pub(crate) constraints: u64,
-    /// Colours of all kinds: what an iteration executes one after the other.
+    /// What is done at once: constraints, or vertices in vertex block descent.
+    pub(crate) element: &'static str,
+    /// Of these, all that an iteration goes through.
+    pub(crate) elements: u64,
+    /// Colours that an iteration executes one after the other.
     pub(crate) sweeps: u64,
-    /// Of the whole run.
+    /// Projections of the whole run, or steps of a vertex.
     pub(crate) projections: u64,
+    /// Constraints that are evaluated in the whole run: once in a projection, and in the step of a vertex as many as it is in.
+    pub(crate) evaluations: u64,
 }
 
 /// The backend that will run.

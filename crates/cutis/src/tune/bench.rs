@@ -12,7 +12,8 @@ use nalgebra::Point3;
 use super::field::{Field, Movable};
 use super::setting::{Line, Model, Setting};
 use crate::backend::Chosen;
-use crate::{Error, Progress};
+use crate::expense::Expense;
+use crate::{CostLedger, Error, Progress};
 
 /// Time after which the measurement of a substep ends, s.
 const LONG_ENOUGH_S: f64 = 0.1;
@@ -172,6 +173,14 @@ impl<'a> Bench<'a> {
         running.solver.step(1)?;
         running.solver.step_timed(1, &mut ledger)?;
         Ok(ledger)
+    }
+
+    /// What a setting takes of memory, part by part.
+    pub(super) fn bytes(&self, setting: Setting) -> Result<CostLedger, Error> {
+        let settings = setting.settings(&self.settings);
+        let Expense { memory, .. } = Expense::of(self.system, &settings)?;
+        let on_device = self.backend.device_memory(self.system, &settings);
+        Ok(CostLedger::of_memory(&memory, &on_device, "not measured"))
     }
 
     fn one_substep(&self, formulation: Formulation, iterations: u32) -> Settings {

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Candidate;
+use super::{Candidate, ReferenceReport};
 
 /// Error that a setting is asked for by default: RMS of the positions over the RMS displacement.
 const DEFAULT_ERROR: f64 = 0.05;
@@ -13,7 +13,7 @@ const DEFAULT_ERROR: f64 = 0.05;
 #[serde(rename_all = "snake_case")]
 pub enum Demand {
     /// The cheapest with an error of at most 5 %; if there is none, the one with the least error that costs no more than the
-    /// scene's own setting.
+    /// scene's own setting, if the reference is fine enough to tell.
     #[default]
     Default,
     /// The one with the least error that takes at most so many milliseconds per frame.
@@ -49,9 +49,15 @@ impl Demand {
         0.1 * self.error().unwrap_or(DEFAULT_ERROR)
     }
 
-    /// The place of the setting to take. `own` is the scene's, and `uncertain` what the reference may be off by: a setting meets an
-    /// error only if it does so with the reference as wrong as it may be.
-    pub(super) fn choose(self, candidates: &[Candidate], own: usize, uncertain: f64) -> Option<usize> {
+    /// The place of the setting to take. `own` is the scene's. A setting meets an error only if it does so with the reference as
+    /// wrong as it may be; and none is taken for being the nearest by default to a reference that is hardly finer than the scene.
+    pub(super) fn choose(
+        self,
+        candidates: &[Candidate],
+        own: usize,
+        reference: &ReferenceReport,
+    ) -> Option<usize> {
+        let uncertain = reference.error;
         let best = |fits: &dyn Fn(f64, f64) -> bool, rank: fn((f64, f64)) -> f64| {
             let measured =
                 candidates.iter().enumerate().filter_map(|(n, c)| Some((n, (c.ms_per_frame?, c.error?))));
@@ -63,7 +69,10 @@ impl Demand {
         match self {
             Self::BudgetMs(budget) => nearest(budget),
             Self::Error(error) => cheapest(error),
-            Self::Default => cheapest(DEFAULT_ERROR).or_else(|| nearest(candidates.get(own)?.ms_per_frame?)),
+            Self::Default => cheapest(DEFAULT_ERROR).or_else(|| {
+                let own_ms = candidates.get(own)?.ms_per_frame?;
+                nearest(own_ms).filter(|_| reference.needs_minutes.is_none())
+            }),
         }
     }
 }
@@ -96,7 +105,8 @@ mod tests {
 
     #[test]
     fn the_cheapest_that_is_near_enough_or_the_nearest_within_the_budget() {
-        let pick = |demand: Demand, uncertain| demand.choose(&list(), 2, uncertain);
+        let reference = |error| ReferenceReport { error, ..ReferenceReport::default() };
+        let pick = |demand: Demand, uncertain| demand.choose(&list(), 2, &reference(uncertain));
         assert_eq!(pick(Demand::Error(0.5), 0.0), Some(1));
         assert_eq!(pick(Demand::Error(0.5), 0.01), Some(2), "a reference that may be off");
         assert_eq!(pick(Demand::Error(0.01), 0.0), None);
@@ -104,6 +114,10 @@ mod tests {
         assert_eq!(pick(Demand::BudgetMs(0.9), 0.0), None, "what was abandoned is not taken");
         assert_eq!(pick(Demand::Default, 0.0), Some(4));
         assert_eq!(pick(Demand::Default, 0.02), Some(2), "the scene's own cost");
+        let coarse = |error| ReferenceReport { needs_minutes: Some(9.0), ..reference(error) };
+        let pick = |demand: Demand, uncertain| demand.choose(&list(), 2, &coarse(uncertain));
+        assert_eq!(pick(Demand::Default, 0.02), None, "nearest to what is no better than the scene");
+        assert_eq!(pick(Demand::Default, 0.0), Some(4), "what meets the demand does so");
     }
 
     #[test]

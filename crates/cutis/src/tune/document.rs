@@ -35,7 +35,7 @@ pub struct Tuning {
     pub picked: Option<Candidate>,
     /// The tuned copy of the scene; none if no setting meets the demand.
     pub scene_file: Option<PathBuf>,
-    /// Bytes and time of the picked setting by part.
+    /// Bytes and time of the picked setting by part; no parts if none was picked.
     pub ledger: CostLedger,
     /// What can be left out, and what that saves and changes; empty if it was not measured.
     pub omissions: Vec<Omission>,
@@ -136,6 +136,9 @@ impl Tuning {
                 best.ms_per_frame.unwrap_or(f64::NAN)
             )
         });
+        let own = self.candidates.iter().find(|candidate| candidate.own);
+        let coarse = own.and_then(|own| self.reference.coarse(own.setting));
+        let nearest = coarse.map_or(nearest.clone(), |coarse| format!("{coarse}; {nearest}"));
         self.picked.is_none().then(|| Error::NoSetting { demand: self.demand.to_string(), nearest })
     }
 

@@ -2,8 +2,8 @@
 //!
 //! A calibration runs the scene to its end, again and again on one prepared body. First a reference in double precision
 //! (`reference`), with an estimate of its own error; then candidate settings, cheapest first, on the scene's backend, each timed
-//! and compared with the reference. A candidate is given up a quarter or half of the way when a cheaper one is much
-//! nearer to the reference already, or when it is over the budget. What is promised of the chosen setting was measured on a
+//! and compared with the reference. A candidate is given up a quarter or half of the way when a cheaper one of the same formulation
+//! is much nearer to the reference already, or when it is over the budget. What is promised of the chosen setting was measured on a
 //! whole run of it, so that a run of the scene repeats it: its displacements bit for bit, its time as far as the machine
 //! is as busy as it was.
 
@@ -27,7 +27,7 @@ use crate::dynamics::{self, Dynamics};
 use crate::plan::{self, Prepared};
 use crate::report::Machine;
 use crate::scene::{FormulationChoice, LoadedScene};
-use crate::{Error, Progress};
+use crate::{CostLedger, Error, Progress};
 
 use bench::Bench;
 pub use choose::Demand;
@@ -93,7 +93,7 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
     let mut candidates = trials.done;
     choose::mark_front(&mut candidates);
     let place = candidates.iter().position(|candidate| candidate.own).unwrap_or(0);
-    let picked = options.demand.choose(&candidates, place, reference.told.error);
+    let picked = options.demand.choose(&candidates, place, &reference.told);
     let picked = picked.map(|place| candidates[place].clone());
     let mut tuning = Tuning {
         schema: SCHEMA.into(),
@@ -102,19 +102,19 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         backend: plan.backend,
         frames: bench.frames,
         demand: options.demand,
-        warnings: warnings(&reference, picked.as_ref()),
+        warnings: warnings(&reference, picked.as_ref(), own),
         reference: reference.told,
         candidates,
         picked,
         scene_file: None,
-        ledger: plan.ledger,
+        ledger: CostLedger { time: "no setting was picked".into(), ..CostLedger::default() },
         omissions: Vec::new(),
         stages: Vec::new(),
     };
     if let Some(picked) = &tuning.picked {
         let times = clock.stage("parts of a frame", 0, |_| bench.ledger(picked.setting))?;
         let how = "one frame of the picked setting, part by part";
-        tuning.ledger = tuning.ledger.with_times(&times, 1.0, how);
+        tuning.ledger = bench.bytes(picked.setting)?.with_times(&times, 1.0, how);
         let mut scene = loaded.scene.clone();
         scene.solver = picked.setting.applied_to(&scene.solver);
         clock.stage("write the scene", 0, |_| copy.write(&scene, &tuning.promise(picked)))?;
@@ -169,9 +169,10 @@ fn check(loaded: &LoadedScene, options: &TuneOptions) -> Result<(), Error> {
     }
 }
 
-fn warnings(reference: &Reference, picked: Option<&Candidate>) -> Vec<String> {
+fn warnings(reference: &Reference, picked: Option<&Candidate>, own: Setting) -> Vec<String> {
     let told = &reference.told;
     let mut lines = Vec::new();
+    lines.extend(told.coarse(own));
     if told.order.is_none() {
         lines.push(format!(
             "the reference shows no limit yet: its last two runs differ by {:.1} %; --minutes allows finer ones",

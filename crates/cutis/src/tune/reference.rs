@@ -13,6 +13,7 @@ use cutis_solver::System;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::REFERENCE_SHARE;
 use super::bench::{Bench, Run};
 use super::field::Field;
 use super::setting::Setting;
@@ -32,6 +33,11 @@ const FEWEST: u32 = 4;
 /// Levels beyond this many substeps are not tried: the time step nears the resolution of the clock of the scene.
 const MOST: u32 = 1 << 20;
 
+/// The last level has to have so many times the scene's own substeps for the scene's own setting to be judged by it.
+const FINER_THAN_OWN: f64 = 2.0;
+/// What is said to be needed is more than was extrapolated from the levels that were run: a machine is not always equally busy.
+const SPARE: f64 = 1.2;
+
 /// What candidates are measured against.
 pub(super) struct Reference {
     /// One per moment of the bench.
@@ -40,7 +46,7 @@ pub(super) struct Reference {
 }
 
 /// What is told of the reference.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ReferenceReport {
     /// Substeps of its runs, each of one iteration, in double precision on the CPU.
     pub substeps: Vec<u32>,
@@ -56,6 +62,23 @@ pub struct ReferenceReport {
     pub growths_mm: Vec<f64>,
     /// Wall time of its runs, s.
     pub seconds: f64,
+    /// Where its last run has fewer than twice the scene's own substeps, for want of time: the minutes that a calibration needs for
+    /// one that has them, about.
+    pub needs_minutes: Option<f64>,
+}
+
+impl ReferenceReport {
+    /// Says so if its last run is hardly finer than the scene itself.
+    pub(super) fn coarse(&self, own: Setting) -> Option<String> {
+        self.needs_minutes.map(|minutes| {
+            format!(
+                "the reference could afford {} substeps a frame, the scene has {}; needs about {} minutes (--minutes)",
+                self.substeps.last().copied().unwrap_or(0),
+                own.substeps,
+                minutes.ceil()
+            )
+        })
+    }
 }
 
 /// Runs levels of twice the substeps each, until the error is below `enough` or the next level would take the whole beyond
@@ -87,7 +110,11 @@ pub(super) fn run(
             let next_s =
                 levels.seconds / f64::from(levels.substeps.iter().sum::<u32>()) * f64::from(2 * substeps);
             if reference.told.error <= enough || levels.seconds + next_s > limit_s || substeps > MOST {
-                return Ok(reference);
+                let needs_minutes = levels.needs_minutes(own.substeps);
+                return Ok(Reference {
+                    told: ReferenceReport { needs_minutes, ..reference.told },
+                    ..reference
+                });
             }
         }
         substeps *= 2;
@@ -141,8 +168,19 @@ impl Levels {
                 .map(|(now, before)| now + factor * (now - before))
                 .collect(),
             seconds: self.seconds,
+            needs_minutes: None,
         };
         Some(Reference { fields, told })
+    }
+
+    /// Minutes of a calibration whose last level has twice as many substeps as the scene, at least; none if this one's has.
+    fn needs_minutes(&self, own_substeps: u32) -> Option<f64> {
+        let enough = f64::from(own_substeps) * FINER_THAN_OWN;
+        let last = f64::from(self.substeps.last().copied()?);
+        let substep_s = self.seconds / self.substeps.iter().map(|&n| f64::from(n)).sum::<f64>();
+        // Three levels take 7/4 of the time of the last.
+        let needed_s = SPARE * 1.75 * enough * substep_s / REFERENCE_SHARE;
+        (last < enough).then(|| (needed_s / 60.0).max(f64::MIN_POSITIVE))
     }
 }
 
@@ -191,6 +229,19 @@ mod tests {
             let error = found.fields[0].rms_to(&exact) / exact.rms();
             assert!(error <= found.told.error + 1e-7, "{c}: {error} {}", found.told.error);
         }
+    }
+
+    #[test]
+    fn a_reference_that_is_not_finer_than_the_scene_says_what_it_needs() {
+        let mut levels = Levels::default();
+        for substeps in [8, 16, 32] {
+            // Ten frames, 1 s for each substep of all of them.
+            levels.push(substeps, Run { ms_per_frame: 100.0 * f64::from(substeps), ..Run::default() }, 10);
+        }
+        assert_eq!((levels.needs_minutes(8), levels.needs_minutes(16)), (None, None));
+        // The levels 50, 100 and 200 take 350 s.
+        let minutes = levels.needs_minutes(100).unwrap();
+        assert!((minutes - SPARE * 350.0 / REFERENCE_SHARE / 60.0).abs() < 1e-9, "{minutes}");
     }
 
     #[test]

@@ -1,14 +1,17 @@
 //! The trials of the candidates, cheapest first, and when one is given up.
 
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 use super::bench::{Bench, Run};
+use super::field::Field;
 use super::reference::Reference;
-use super::{Candidate, Demand, Setting, WoundError, field, setting};
+use super::{Candidate, Demand, Setting, WoundError, setting};
 use crate::Error;
 use crate::clock::Clock;
+use crate::scene::FormulationChoice;
 
-/// A candidate is given up when a cheaper one's error is smaller by this factor at the same moment.
+/// A candidate is given up when the error of a cheaper one of its formulation is smaller by this factor at the same moment.
 const MUCH_NEARER: f64 = 0.7;
 /// A candidate is given up when it is over the budget by this factor.
 const OVER_BUDGET: f64 = 1.2;
@@ -23,6 +26,25 @@ pub(super) struct Trials<'a> {
     pub done: Vec<Candidate>,
 }
 
+/// A run as others are compared with it.
+struct Course {
+    formulation: FormulationChoice,
+    ms_per_frame: f64,
+    /// At each moment that it reached.
+    errors: Vec<f64>,
+}
+
+impl Course {
+    /// Whether a cheaper one was much nearer when it was where this one is now. Only one of the same formulation can tell: vertex block
+    /// descent with few substeps is far off while the body moves, and nearest where it comes to rest.
+    fn is_hopeless_beside(&self, other: &Self) -> bool {
+        let moment = self.errors.len() - 1;
+        other.formulation == self.formulation
+            && other.ms_per_frame <= self.ms_per_frame
+            && other.errors.get(moment).is_some_and(|error| *error < MUCH_NEARER * self.errors[moment])
+    }
+}
+
 impl Trials<'_> {
     /// Tries candidates, cheapest first, for about `limit_s` seconds; the scene's own whatever it takes.
     pub fn run(&mut self, own: Setting, limit_s: f64, clock: &mut Clock<'_>) -> Result<(), Error> {
@@ -33,7 +55,7 @@ impl Trials<'_> {
             Demand::Default | Demand::Error(_) => f64::INFINITY,
         };
         let frames = f64::from(self.bench.frames);
-        let (mut left_s, mut errors) = (limit_s, Vec::new());
+        let (mut left_s, mut courses) = (limit_s, Vec::new());
         for setting in setting::candidates(own, finest, most_ms, &model) {
             let expected_ms = model.frame_ms(setting);
             let mut candidate = Candidate { own: setting == own, ..Candidate::planned(setting, expected_ms) };
@@ -47,15 +69,15 @@ impl Trials<'_> {
                 self.done.push(candidate);
                 continue;
             }
+            let begun = Instant::now();
             let run = clock.stage(&format!("try {setting}"), self.bench.frames.into(), |progress| {
-                self.bench.run(setting, progress, |run| self.verdict(&mut candidate, run, &errors))
+                self.bench.run(setting, progress, |run| self.verdict(&mut candidate, run, &courses))
             });
-            // What explodes is a finding about the setting, unless it is the scene's own.
+            left_s -= begun.elapsed().as_secs_f64();
+            // What explodes is a finding about the setting, the scene's own among them.
             match run {
                 Ok(run) => {
-                    left_s -= 1e-3 * run.ms_per_frame * frames * run.fields.len() as f64
-                        / self.bench.moments().len() as f64;
-                    errors.push((run.ms_per_frame, self.errors(&run)));
+                    courses.push(self.course(setting, &run));
                     self.enter(&mut candidate, &run);
                 }
                 Err(Error::Solver(error @ cutis_solver::SolverError::NotFinite { .. })) => {
@@ -68,11 +90,14 @@ impl Trials<'_> {
         Ok(())
     }
 
-    /// Error at each moment that a run reached.
-    fn errors(&self, run: &Run) -> Vec<f64> {
-        let error =
-            |(found, reference): (&field::Field, &field::Field)| found.rms_to(reference) / reference.rms();
-        run.fields.iter().zip(&self.reference.fields).map(error).collect()
+    /// How far a run is off at each moment that it reached.
+    fn course(&self, setting: Setting, run: &Run) -> Course {
+        let error = |(found, reference): (&Field, &Field)| found.rms_to(reference) / reference.rms();
+        Course {
+            formulation: setting.formulation,
+            ms_per_frame: run.ms_per_frame,
+            errors: run.fields.iter().zip(&self.reference.fields).map(error).collect(),
+        }
     }
 
     /// Why a candidate need not be run, if one that is much cheaper meets the demand.
@@ -86,26 +111,24 @@ impl Trials<'_> {
     }
 
     /// Whether a candidate that is under way goes on.
-    fn verdict(&self, candidate: &mut Candidate, run: &Run, others: &[(f64, Vec<f64>)]) -> ControlFlow<()> {
+    fn verdict(&self, candidate: &mut Candidate, run: &Run, others: &[Course]) -> ControlFlow<()> {
         if candidate.own {
             return ControlFlow::Continue(());
         }
-        let errors = self.errors(run);
-        let moment = errors.len() - 1;
+        let course = self.course(candidate.setting, run);
+        let moment = course.errors.len() - 1;
         let share = format!("{} of {} frames", self.bench.moments()[moment], self.bench.frames);
         let over = match self.demand {
             Demand::BudgetMs(ms) => run.ms_per_frame > OVER_BUDGET * ms,
             Demand::Default | Demand::Error(_) => false,
         };
-        let nearer = others.iter().any(|(ms, other)| {
-            *ms <= run.ms_per_frame && other.get(moment).is_some_and(|e| *e < MUCH_NEARER * errors[moment])
-        });
+        let nearer = others.iter().any(|other| course.is_hopeless_beside(other));
         if over {
             candidate.abandoned = Some(format!("given up after {share}: over the budget"));
         } else if nearer {
             candidate.abandoned = Some(format!(
-                "given up after {share}: {:.1} % off by then, and a cheaper one much less",
-                100.0 * errors[moment]
+                "given up after {share}: {:.1} % off by then, and a cheaper one of its kind much less",
+                100.0 * course.errors[moment]
             ));
         }
         if over || nearer { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -117,12 +140,37 @@ impl Trials<'_> {
         if !run.finished() {
             return;
         }
-        candidate.error = self.errors(run).last().copied();
+        candidate.error = self.course(candidate.setting, run).errors.last().copied();
         candidate.wounds = run
             .growths_mm
             .iter()
             .zip(&self.reference.told.growths_mm)
             .map(|(&growth_mm, &expected_mm)| WoundError::of(growth_mm, expected_mm))
             .collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use FormulationChoice::{Vbd, Xpbd};
+
+    use super::*;
+
+    fn course(formulation: FormulationChoice, ms_per_frame: f64, errors: &[f64]) -> Course {
+        Course { formulation, ms_per_frame, errors: errors.to_vec() }
+    }
+
+    #[test]
+    fn only_a_cheaper_one_of_the_same_formulation_that_was_much_nearer_by_then_ends_a_trial() {
+        let halfway = course(Vbd, 2.0, &[0.9, 0.5]);
+        for (other, ends) in [
+            (course(Vbd, 1.0, &[0.9, 0.1, 0.1]), true),
+            (course(Vbd, 1.0, &[0.1, 0.4, 0.1]), false),
+            (course(Vbd, 1.0, &[0.1]), false),
+            (course(Vbd, 3.0, &[0.1, 0.1, 0.1]), false),
+            (course(Xpbd, 1.0, &[0.1, 0.1, 0.1]), false),
+        ] {
+            assert_eq!(halfway.is_hopeless_beside(&other), ends, "{:?}", other.errors);
+        }
     }
 }
