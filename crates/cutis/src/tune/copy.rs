@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use cutis_volume::PartialFile;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
 
 use crate::scene::{LoadedScene, Scene};
@@ -14,7 +15,8 @@ pub(super) struct Copy<'a> {
 }
 
 impl<'a> Copy<'a> {
-    /// Refuses a file that is there already, unless it may be replaced, and the scene's own file in any case.
+    /// Refuses a file that is there already, unless it may be replaced, the scene's own file in any case, a place that cannot be
+    /// written to, and a scene that cannot be edited.
     pub(super) fn to(path: &'a Path, overwrite: bool, loaded: &'a LoadedScene) -> Result<Self, Error> {
         let refuse = |why: &str| Error::Request { what: format!("{}", path.display()), why: why.into() };
         let same =
@@ -25,7 +27,11 @@ impl<'a> Copy<'a> {
         if path.exists() && !overwrite {
             return Err(refuse("is there already; --force replaces it, -o names another file"));
         }
-        Ok(Self { loaded, path })
+        // Gone again at once.
+        drop(PartialFile::create(path)?);
+        let copy = Self { loaded, path };
+        copy.text(&loaded.scene)?;
+        Ok(copy)
     }
 
     /// Writes the scene's file with whatever makes it `scene`, below a comment.
@@ -33,10 +39,13 @@ impl<'a> Copy<'a> {
     /// # Errors
     /// [`Error::File`] if it cannot be written.
     pub(super) fn write(&self, scene: &Scene, comment: &str) -> Result<(), Error> {
+        files::write(self.path, format!("# {comment}\n{}", self.text(scene)?).as_bytes())
+    }
+
+    fn text(&self, scene: &Scene) -> Result<String, Error> {
         let directory = self.path.parent().unwrap_or(Path::new(""));
-        let text = edited(self.loaded, scene, directory)
-            .map_err(|why| Error::Request { what: format!("{}", self.path.display()), why })?;
-        files::write(self.path, format!("# {comment}\n{text}").as_bytes())
+        edited(self.loaded, scene, directory)
+            .map_err(|why| Error::Request { what: format!("{}", self.path.display()), why })
     }
 }
 
@@ -170,6 +179,22 @@ frames = 3
         let set: Vec<Override> =
             set.iter().map(|&(key, value)| Override { key: key.into(), value: value.into() }).collect();
         Scene::parse(text, Path::new("here/scene.toml"), Path::new("here"), &set).unwrap()
+    }
+
+    #[test]
+    fn a_place_or_a_scene_that_will_not_do_is_refused_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let to = |path: &str, loaded: &LoadedScene| {
+            Copy::to(&folder.path().join(path), false, loaded).map(drop).map_err(|error| error.to_string())
+        };
+        assert_eq!(to("copy.toml", &loaded(TEXT, &[])), Ok(()));
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0, "nothing is left");
+        let error = to("nowhere/copy.toml", &loaded(TEXT, &[])).unwrap_err();
+        assert!(error.contains("nowhere") && error.contains("create"), "{error}");
+        // A text that is not that of the scene.
+        let spoilt = LoadedScene { text: "frames = ".into(), ..loaded(TEXT, &[]) };
+        let error = to("copy.toml", &spoilt).unwrap_err();
+        assert!(error.contains("copy.toml"), "{error}");
     }
 
     #[test]
