@@ -33,6 +33,9 @@ const VARIANTS: [(Option<&str>, Option<&str>); 15] = [
     (Some("{ around_mm = 120 }"), Some("{ around_mm = 40, growth = 1.5, coarsest = 4 }")),
 ];
 
+/// Frames of the second run of each, which is for the time only.
+const TIMED_FRAMES: &str = "10";
+
 const HEAD: &str = "scene,region,grading,vertices,tetrahedra,memory_mb,ms_per_frame_min,ms_per_frame_mean,growth_mm,growth_mid_mm,\
     error_percent,border_mm,largest_mm\n";
 
@@ -51,16 +54,22 @@ pub fn run(workspace: &Workspace) -> Result<()> {
                 continue;
             }
         };
-        let mut rows = Vec::new();
+        let (mut rows, mut runs) = (Vec::new(), Vec::new());
         for (region, grading) in VARIANTS {
             let mut set = vec!["output={report=true}".to_owned(), "solver.backend=cpu".to_owned()];
             set.extend(path.clone());
             set.extend(region.map(|region| format!("lattice.region={region}")));
             set.extend(grading.map(|grading| format!("lattice.grading={grading}")));
             println!("{scene} {}", set[2..].join(" "));
-            let report = simulate(workspace, scene, &set, &scratch)?;
+            let report = simulate(workspace, scene, &set, None, &scratch)?;
             machine = report["machine"].clone();
             rows.push(Row::of(region, grading, &report)?);
+            runs.push(set);
+        }
+        // Once more in the opposite order, for the time: what else the machine does then falls on others.
+        for (set, row) in runs.iter().zip(&mut rows).rev() {
+            let again = simulate(workspace, scene, set, Some(TIMED_FRAMES), &scratch)?;
+            row.ms_min = row.ms_min.min(number(&again, "/frames/ms_min")?);
         }
         check(scene, &rows)?;
         sections.push_str(&table(scene, &rows));
@@ -73,15 +82,26 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
-fn simulate(workspace: &Workspace, scene: &str, set: &[String], out: &Path) -> Result<Value> {
+fn simulate(
+    workspace: &Workspace,
+    scene: &str,
+    set: &[String],
+    frames: Option<&str>,
+    out: &Path,
+) -> Result<Value> {
     let mut command = workspace.command(workspace.program()?);
     command.arg("run").arg(format!("fixtures/scenes/{scene}.toml")).arg("--out").arg(out);
     command.args(set.iter().flat_map(|change| ["--set", change]));
+    command.args(frames.iter().flat_map(|frames| ["--frames", frames]));
     let output = command.output().context("cannot start the program")?;
     if !output.status.success() {
         bail!("{scene} failed: {}", String::from_utf8_lossy(&output.stderr).trim());
     }
     Ok(serde_json::from_slice(&fs::read(out.join("report.json"))?)?)
+}
+
+fn number(report: &Value, path: &str) -> Result<f64> {
+    report.pointer(path).and_then(Value::as_f64).with_context(|| format!("the report has no {path}"))
 }
 
 /// One run.
@@ -102,9 +122,7 @@ struct Row {
 
 impl Row {
     fn of(region: Option<&str>, grading: Option<&str>, report: &Value) -> Result<Self> {
-        let number = |path: &str| {
-            report.pointer(path).and_then(Value::as_f64).with_context(|| format!("the report has no {path}"))
-        };
+        let number = |path: &str| number(report, path);
         let bytes = report["memory"].as_array().context("the report has no memory")?;
         let text = |choice: Option<&str>| {
             choice.map_or("none", |text| text.trim_matches(['{', '}', ' '])).to_owned()
@@ -201,19 +219,19 @@ fn table(scene: &str, rows: &[Row]) -> String {
 }
 
 fn page(workspace: &Workspace, sections: &str, machine: &Value) -> Result<String> {
-    let commit = workspace.command("git").args(["rev-parse", "--short=12", "HEAD"]).output()?;
+    let commit = workspace.commit()?;
     Ok(format!(
         "# What leaving out saves, and what it costs\n\n\
          Written by `cargo xtask leaving-out` at commit {} on {} ({} cores, {}); CPU backend. All figures: \
          [leaving-out.csv](leaving-out.csv).\n\n\
          *Region*: `[lattice] region`, what lies beyond is frozen. *Grading*: `[lattice] grading`, cells grow away from a fine zone. \
-         *MB*: memory of the solver. *ms/frame*: the shortest frame, since the machine did other work too. *Growth*: what skin tension \
+         *MB*: memory of the solver. *ms/frame*: the shortest frame of two runs, taken in opposite orders, since the machine may have done other work too. *Growth*: what skin tension \
          opens the wound by; *error*: its difference from the whole body's. *At the border*: how far tissue moves next to where the \
          region ends, and the largest displacement anywhere: skin tension acts all over the skin in these scenes, so that all of the body \
          moves.\n\n{sections}\
          The error of a region is one of its size only: the lattice in it is that of the whole body, and so is the cut. That of a \
          grading is also one of the coarser lattice beside the zone, which has another surface there.\n",
-        String::from_utf8_lossy(&commit.stdout).trim(),
+        commit,
         machine["cpu"].as_str().unwrap_or("an unknown processor"),
         machine["cores"],
         machine["system"].as_str().unwrap_or_default(),

@@ -10,6 +10,7 @@ mod results;
 mod spdx;
 mod steps;
 mod tidy;
+mod tuning;
 mod vulkan;
 mod workspace;
 
@@ -38,6 +39,7 @@ usage: cargo xtask COMMAND
                       with a text only those whose description contains it, and nothing is written
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
   leaving-out         what a region or a graded lattice saves and costs, against the whole body: docs/results/
+  tuning              `cutis tune` on the demo, and whether a full run keeps what it promises: docs/results/
   publish --dry-run   packages every crate as for crates.io and builds it from the package";
 
 fn main() -> ExitCode {
@@ -76,6 +78,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["mutations", filter] => mutations::run(&workspace, filter),
         ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
         ["leaving-out"] => steps::build_program(&workspace).and_then(|()| leaving_out::run(&workspace)),
+        ["tuning"] => steps::build_program(&workspace).and_then(|()| tuning::run(&workspace)),
         ["publish", "--dry-run"] => publish::dry_run(&workspace),
         ["publish"] => bail!(
             "only `cargo xtask publish --dry-run` is offered; a release is made by `cargo publish --workspace`"

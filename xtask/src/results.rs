@@ -197,7 +197,7 @@ fn same_for_any_thread_count(
 }
 
 fn page(workspace: &Workspace, rows: &str, machine: &Value, notes: &[String]) -> Result<String> {
-    let commit = workspace.command("git").args(["rev-parse", "--short=12", "HEAD"]).output()?;
+    let commit = workspace.commit()?;
     let mut page = format!(
         "# The main job: with skin tension and without\n\n\
          Written by `cargo xtask results` at commit {} on {} ({} cores, {}).\n\
@@ -206,7 +206,7 @@ fn page(workspace: &Workspace, rows: &str, machine: &Value, notes: &[String]) ->
          scene with `--without stc`. Times are wall time on a machine that did other work too.\n\n\
          | scene | vertices | tetrahedra | opening, mm | growth | change | without | ms/frame | whole run, s | folds |\n\
          |---|---|---|---|---|---|---|---|---|---|\n{rows}\n",
-        String::from_utf8_lossy(&commit.stdout).trim(),
+        commit,
         machine["cpu"].as_str().unwrap_or("an unknown processor"),
         machine["cores"],
         machine["system"].as_str().unwrap_or_default(),

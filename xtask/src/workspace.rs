@@ -95,6 +95,13 @@ impl Workspace {
         serde_json::from_slice(&output.stdout).context("cargo metadata did not print JSON")
     }
 
+    /// The commit of the checkout, marked if there are changes since.
+    pub fn commit(&self) -> Result<String> {
+        let words = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"];
+        let output = self.command("git").args(words).output().context("cannot start git")?;
+        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    }
+
     /// The released `cutis` program.
     pub fn program(&self) -> Result<PathBuf> {
         self.built("release/cutis", "cargo build --release -p cutis-cli")

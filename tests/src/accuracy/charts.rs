@@ -16,7 +16,7 @@ pub fn chart(problem: &str, rows: &[Row], measure: Measure) -> Option<String> {
     let mut families: BTreeMap<(bool, String), Lines> = BTreeMap::new();
     let mut all = Vec::new();
     for row in rows {
-        let Some(error) = row.error(measure) else { continue };
+        let Some(error) = row.valid_error(measure) else { continue };
         let point = [row.ms_min, error];
         all.push(point);
         let family = families.entry((!row.is_usual(), row.family())).or_default();

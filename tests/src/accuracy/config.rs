@@ -9,6 +9,11 @@ use super::Failure;
 use super::cases::Case;
 use super::running::Running;
 
+/// Name of a GPU as a backend.
+pub const GPU: &str = "gpu f32";
+/// Name of one that computes on the CPU.
+pub const SOFTWARE_GPU: &str = "gpu f32 (software)";
+
 /// Where a configuration runs.
 #[derive(Clone)]
 pub enum Backend {
@@ -29,8 +34,8 @@ impl Backend {
             Self::Cpu => "cpu f32",
             Self::CpuDouble => "cpu f64",
             Self::Reference => "reference f64",
-            Self::Gpu(gpu) if is_software(gpu) => "gpu f32 (software)",
-            Self::Gpu(_) => "gpu f32",
+            Self::Gpu(gpu) if is_software(gpu) => SOFTWARE_GPU,
+            Self::Gpu(_) => GPU,
         }
     }
 

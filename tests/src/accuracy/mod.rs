@@ -50,16 +50,24 @@ pub type Failure = Box<dyn Error>;
 /// # Errors
 /// A problem that cannot be built, a search that does not converge, a file that cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    if options.write && !options.trials {
+        cases::scene::abdomen_scan().map_err(|reason| {
+            format!("--write needs all problems, else it would take figures away; --out FOLDER needs none. {reason}")
+        })?;
+    }
     let (start, load_before) = (Instant::now(), load());
     let gpu = if options.no_gpu || options.trials { None } else { config::first_gpu()? };
-    let (mut sections, mut tried, mut checks) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut sections, mut skipped, mut tried, mut checks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let wanted = |name: &&str| match &options.problem {
         Some(only) => only == name,
         None if options.trials => cases::TRIED.contains(name),
         None => !options.quick || cases::QUICK.contains(name),
     };
     for name in cases::NAMES.into_iter().filter(wanted) {
-        let Some(case) = cases::named(name, options.quick)? else { continue };
+        let Some(case) = cases::named(name, options.quick)? else {
+            skipped.push(name);
+            continue;
+        };
         if options.trials {
             let (found, held) = trials::run(&case)?;
             writeln!(out, "\n{}: {}\n\n{}", case.name, case.what, found.table())?;
@@ -90,6 +98,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
             load: [load_before, load()],
             gpu: gpu.as_ref().map_or_else(|| "none".into(), |gpu| gpu.adapter().name.clone()),
             took_s: start.elapsed().as_secs_f64(),
+            skipped,
         };
         match options.trials {
             true => write_trials(&origin, &tried, &folder)?,

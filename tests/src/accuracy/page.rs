@@ -8,8 +8,8 @@ use super::checks::Check;
 use super::front::pareto;
 use super::row::{Measure, Row};
 use super::words::{
-    LEVELS, against_iterating, cheapest, choice, method_by_method, methods, ms, pbd, percent, precision,
-    same_sweeps, stalls,
+    LEVELS, MOVES, against_iterating, cheapest, choice, method_by_method, methods, ms, pbd, percent,
+    precision, same_sweeps, stalls, told,
 };
 
 /// A problem that was run.
@@ -40,6 +40,8 @@ pub struct Origin {
     pub gpu: String,
     /// How long it took, s.
     pub took_s: f64,
+    /// Problems whose data are absent.
+    pub skipped: Vec<&'static str>,
 }
 
 const MEASURES: &str = "\
@@ -56,6 +58,9 @@ shortest and the middle one of all frames, in milliseconds; configurations took 
 - **E4**, residual: root mean square of `C` over rest size, less that of the equilibrium, constraint by constraint; the kind with
   the largest. The CSV has every kind, the residual itself and that of the equilibrium, at which constraints carry load and `C` is
   not zero.
+- A body that still moves by more than 5 % of its displacement in the second half of its frames has not come to rest: its E3,
+  E4, opening and stiffness, marked †, owe part of themselves to time. They are in the tables and the CSV (`unrest`), and
+  neither in a chart nor in a choice.
 - **Stiffness**: how stiff the settled body seems, over what its material says: by how much more load it would take to move it as
   far as the equilibrium, and where a handle pulls, the reaction on it over that at the equilibrium.
 
@@ -80,6 +85,12 @@ pub fn page(origin: &Origin, sections: &[Section], checks: &[Check]) -> String {
         load(&origin.load[1]),
         origin.gpu,
     );
+    for name in &origin.skipped {
+        let _ = writeln!(
+            text,
+            "\n`{name}` was left out: its scan is not part of the repository, and was not there."
+        );
+    }
     text += &summary(sections);
     for section in sections {
         text += &of_problem(section);
@@ -185,7 +196,7 @@ pub fn front_table(rows: &[Row]) -> String {
         .iter()
         .map(|&measure| {
             let points: Vec<[f64; 2]> =
-                rows.iter().map(|row| [row.ms_min, row.error(measure).unwrap_or(f64::NAN)]).collect();
+                rows.iter().map(|row| [row.ms_min, row.valid_error(measure).unwrap_or(f64::NAN)]).collect();
             pareto(&points)
         })
         .collect();
@@ -199,7 +210,7 @@ pub fn front_table(rows: &[Row]) -> String {
         let row = &rows[n];
         let _ = write!(text, "| {} | {} | {} |", row.name(), ms(row.ms_min), ms(row.ms_median));
         for (measure, front) in Measure::ALL.into_iter().zip(&fronts) {
-            let _ = match row.error(measure).map(percent) {
+            let _ = match told(row, measure) {
                 Some(error) if front.contains(&n) => write!(text, " **{error}** |"),
                 Some(error) => write!(text, " {error} |"),
                 None => write!(text, " |"),
@@ -207,7 +218,7 @@ pub fn front_table(rows: &[Row]) -> String {
         }
         for ratio in [row.opening, row.stiffness] {
             let _ = match ratio {
-                Some(ratio) => write!(text, " {ratio:.3} |"),
+                Some(ratio) => write!(text, " {ratio:.3}{} |", if row.still_moves() { MOVES } else { "" }),
                 None => write!(text, " |"),
             };
         }

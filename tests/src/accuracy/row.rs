@@ -6,6 +6,9 @@ use super::config::{Backend, Config, PBD};
 use super::errors::KindError;
 use super::words::ms;
 
+/// A body that moves by less than this share of its displacement in the second half of its frames has come to rest.
+pub const AT_REST: f64 = 0.05;
+
 /// A configuration's figures. What was not measured is absent: E1 and E2 of PBD, whose result has no limit in either; what
 /// belongs to rest where too many sweeps kept it from being waited for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,7 +39,7 @@ pub struct Row {
     pub e3: Option<f64>,
     /// The largest of `residuals`' errors.
     pub e4: Option<f64>,
-    /// Motion in the last round of frames, relative to the displacement of the equilibrium.
+    /// Motion in the second half of the frames over the displacement at their end: what E3 and E4 owe to time.
     pub unrest: Option<f64>,
     /// Opening of the wound over that of the equilibrium.
     pub opening: Option<f64>,
@@ -101,6 +104,17 @@ impl Row {
             Measure::E3 => self.e3,
             Measure::E4 => self.e4,
         }
+    }
+
+    /// Whether the body had not come to rest in its frames, so that E3 and E4 say something about time.
+    pub fn still_moves(&self) -> bool {
+        self.unrest.is_some_and(|unrest| unrest.is_nan() || unrest > AT_REST)
+    }
+
+    /// The error, unless it is one of a settled body and the body still moves.
+    pub fn valid_error(&self, measure: Measure) -> Option<f64> {
+        let valid = matches!(measure, Measure::E1 | Measure::E2) || !self.still_moves();
+        self.error(measure).filter(|_| valid)
     }
 }
 

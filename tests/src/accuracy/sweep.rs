@@ -12,8 +12,8 @@ use super::yardstick::Yardstick;
 
 /// Frames that a configuration runs before it is the next one's turn: load of the machine then falls on all alike.
 const ROUND: u32 = 5;
-/// A body that moves less in a round, relative to the displacement of its equilibrium, has settled.
-const AT_REST: f64 = 1e-6;
+/// A body that moves less in a round, relative to its displacement, needs no more frames.
+const STILL: f64 = 1e-6;
 
 /// A configuration at work.
 struct Entry<'a> {
@@ -24,7 +24,8 @@ struct Entry<'a> {
     frame: u32,
     last_frame: u32,
     before: Vec<Point3<f64>>,
-    unrest: f64,
+    halfway: Vec<Point3<f64>>,
+    moved: f64,
 }
 
 impl<'a> Entry<'a> {
@@ -37,12 +38,13 @@ impl<'a> Entry<'a> {
             frame: 0,
             last_frame: if config.settles { case.most_frames } else { case.compared_at },
             before: Vec::new(),
-            unrest: f64::INFINITY,
+            halfway: Vec::new(),
+            moved: f64::INFINITY,
         })
     }
 
     fn is_done(&self, case: &Case) -> bool {
-        let settled = self.unrest <= AT_REST && self.frame > 2 * case.compared_at;
+        let settled = self.moved <= STILL && self.frame > 2 * case.compared_at;
         self.row.failure.is_some() || self.frame >= self.last_frame || settled
     }
 
@@ -63,7 +65,10 @@ impl<'a> Entry<'a> {
         }
         let now = self.running.positions()?;
         if !self.before.is_empty() {
-            self.unrest = yardstick.moved(&now, &self.before);
+            self.moved = yardstick.moved(&now, &self.before);
+        }
+        if self.halfway.is_empty() && 2 * self.frame >= self.last_frame {
+            self.halfway.clone_from(&now);
         }
         self.before = now;
         Ok(())
@@ -78,7 +83,10 @@ impl<'a> Entry<'a> {
         if self.row.failure.is_none() && self.config.settles {
             let x = &self.before;
             self.row.e3 = Some(yardstick.e3(x));
-            self.row.unrest = Some(self.unrest);
+            self.row.unrest = Some(match self.halfway.is_empty() {
+                true => self.moved,
+                false => yardstick.moved(x, &self.halfway),
+            });
             self.row.stiffness = Some(yardstick.stiffness(x));
             self.row.opening = case.opening.as_ref().map(|(opening, _)| {
                 let open = |x: &[Point3<f64>]| opening(x) - opening(yardstick.rest());
@@ -96,10 +104,11 @@ fn e1(case: &Case, config: &Config, yardstick: &Yardstick) -> Result<Option<f64>
     if !config.has_material() {
         return Ok(None);
     }
-    let mut worst = f64::NEG_INFINITY;
+    let mut worst = 0.0f64;
     for (instant, state) in yardstick.states.iter().enumerate() {
         let found = substep(case, config, state)?;
-        worst = worst.max(yardstick.e1(&found, instant, config.substeps));
+        let error = yardstick.e1(&found, instant, config.substeps);
+        worst = if worst.is_nan() || error <= worst { worst } else { error };
     }
     Ok(Some(worst))
 }

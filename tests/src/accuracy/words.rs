@@ -8,15 +8,24 @@ pub const LEVELS: [f64; 3] = [0.1, 0.01, 0.001];
 /// An error that falls by less when the iterations are doubled has stalled.
 const STALLED: f64 = 0.9;
 
+/// Marks what belongs to rest and was measured on a body that still moved.
+pub const MOVES: &str = " †";
+
+/// An error in percent, marked if it belongs to rest and the body still moved.
+pub fn told(row: &Row, measure: Measure) -> Option<String> {
+    let mark = if row.valid_error(measure).is_none() { MOVES } else { "" };
+    row.error(measure).map(|error| percent(error) + mark)
+}
+
 /// The fastest of `rows` with an error of at most `level`.
 pub fn cheapest<'a>(rows: &[&'a Row], measure: Measure, level: f64) -> Option<&'a Row> {
-    let good = rows.iter().filter(|row| row.error(measure).is_some_and(|error| error <= level));
+    let good = rows.iter().filter(|row| row.valid_error(measure).is_some_and(|error| error <= level));
     good.min_by(|a, b| a.ms_min.total_cmp(&b.ms_min)).copied()
 }
 
 /// The row with the least error.
 pub fn best<'a>(rows: &[&'a Row], measure: Measure) -> Option<&'a Row> {
-    let error = |row: &Row| row.error(measure).filter(|error| error.is_finite());
+    let error = |row: &Row| row.valid_error(measure).filter(|error| error.is_finite());
     let known = rows.iter().filter(|row| error(row).is_some());
     known.min_by(|a, b| error(a).unwrap_or(f64::MAX).total_cmp(&error(b).unwrap_or(f64::MAX))).copied()
 }
@@ -40,7 +49,7 @@ pub fn stalls(rows: &[&Row], measure: Measure) -> Vec<String> {
         let mut line: Vec<(u32, f64)> = rows
             .iter()
             .filter(|row| row.substeps == s)
-            .filter_map(|row| Some((row.iterations, row.error(measure)?)))
+            .filter_map(|row| Some((row.iterations, row.valid_error(measure)?)))
             .collect();
         line.sort_by_key(|(iterations, _)| *iterations);
         let (Some(&(few, first)), Some(&(most, last))) = (line.first(), line.last()) else { continue };
@@ -165,8 +174,8 @@ pub fn same_sweeps(rows: &[&Row], sweeps: u32) -> Option<String> {
             "{} × {}: E2 {}, E3 {}",
             row.substeps,
             row.iterations,
-            row.e2.map_or_else(|| "none".into(), percent),
-            row.e3.map_or_else(|| "none".into(), percent)
+            told(row, Measure::E2).unwrap_or_else(|| "none".into()),
+            told(row, Measure::E3).unwrap_or_else(|| "none".into())
         )
     };
     Some(format!("With {sweeps} sweeps a frame: {}.", same.iter().map(entry).collect::<Vec<_>>().join("; ")))
@@ -208,7 +217,7 @@ pub fn pbd(rows: &[Row]) -> Option<String> {
     for row in settled {
         let opening =
             row.opening.map_or_else(String::new, |ratio| format!(", opening {ratio:.2} times as wide"));
-        let result = format!("E3 {}{opening}", percent(row.e3.unwrap_or(f64::NAN)));
+        let result = format!("E3 {}{opening}", told(row, Measure::E3).unwrap_or_default());
         let setting = format!("{} × {}", row.substeps, row.iterations);
         match entries.iter_mut().find(|(known, _)| *known == result) {
             Some((_, settings)) => settings.push(setting),
@@ -256,6 +265,18 @@ mod tests {
     fn row(substeps: u32, iterations: u32, ms_min: f64, e1: f64) -> Row {
         let (backend, formulation) = ("cpu f32", "xpbd");
         Row { backend, formulation, substeps, iterations, ms_min, e1: Some(e1), ..Row::default() }
+    }
+
+    #[test]
+    fn what_still_moves_is_marked_and_never_chosen() {
+        let at_rest = Row { e3: Some(0.01), unrest: Some(0.04), ms_min: 2.0, ..Row::default() };
+        let moving = Row { unrest: Some(0.06), ms_min: 1.0, ..at_rest.clone() };
+        let lost = Row { unrest: Some(f64::NAN), ..moving.clone() };
+        for row in [&moving, &lost] {
+            assert_eq!(told(row, Measure::E3).unwrap(), "1.0 % †");
+            assert_eq!(cheapest(&[row, &at_rest], Measure::E3, 0.02), Some(&at_rest));
+        }
+        assert_eq!(told(&at_rest, Measure::E3).unwrap(), "1.0 %");
     }
 
     #[test]

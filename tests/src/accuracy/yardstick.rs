@@ -157,11 +157,9 @@ impl Yardstick {
         residuals(&self.system, found, &self.equilibrium)
     }
 
-    /// How far the body moved between two states, relative to how far the equilibrium lies from rest.
+    /// How far the body moved between two states, relative to how far the present one lies from rest.
     pub fn moved(&self, now: &[Point3<f64>], before: &[Point3<f64>]) -> f64 {
-        let shifted: Vec<Point3<f64>> =
-            self.equilibrium.iter().zip(now.iter().zip(before)).map(|(x, (a, b))| x + (a - b)).collect();
-        self.error(&shifted, &self.equilibrium, &self.rest)
+        self.error(before, now, &self.rest)
     }
 
     /// Effective over material stiffness of the settled body: against the handle if there is one, else against the load.

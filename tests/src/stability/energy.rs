@@ -165,9 +165,9 @@ impl History {
             let total = energy.kinetic + energy.elastic + energy.gravity - self.lowest();
             let budget = self.budget(*work) + rounding;
             // Where nothing can move and no element counts, there is none of either.
-            if total == 0.0 && budget == 0.0 { 0.0 } else { (total / budget).max(0.0) }
+            if total == 0.0 && budget == 0.0 { 0.0 } else { total / budget }
         };
-        self.entries.iter().map(ratio).fold(0.0, |most, ratio| if ratio <= most { most } else { ratio })
+        self.entries.iter().map(ratio).fold(0.0, larger)
     }
 
     /// The first entry from which on the kinetic energy stays below `share` of what was there to be had.
@@ -177,6 +177,11 @@ impl History {
     }
 }
 
+/// The larger one; what is not a number is larger than any.
+fn larger(most: f64, ratio: f64) -> f64 {
+    if most.is_nan() || ratio <= most { most } else { ratio }
+}
+
 /// The first place after which `bad` holds nowhere; none if it holds at the last.
 pub fn after_last(bad: impl DoubleEndedIterator<Item = bool> + ExactSizeIterator) -> Option<usize> {
     let length = bad.len();
@@ -184,5 +189,22 @@ pub fn after_last(bad: impl DoubleEndedIterator<Item = bool> + ExactSizeIterator
         None => Some(0),
         Some(0) => None,
         Some(from_end) => Some(length - from_end),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_energy_that_is_not_a_number_is_the_worst() {
+        let still = Energy { kinetic: 0.0, elastic: 1.0, gravity: 0.0 };
+        let mut history = History::default();
+        history.add(still, 0.0);
+        history.add(Energy { kinetic: 1.0, ..still }, 0.0);
+        assert_eq!(history.worst_ratio(0.0), 2.0);
+        history.add(Energy { kinetic: f64::NAN, ..still }, 0.0);
+        history.add(still, 0.0);
+        assert!(history.worst_ratio(0.0).is_nan());
     }
 }

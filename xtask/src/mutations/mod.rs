@@ -94,9 +94,7 @@ impl Copy {
     }
 
     fn commit(&self) -> Result<String> {
-        let here = Workspace { root: self.root.clone(), ci: false };
-        let output = here.command("git").args(["rev-parse", "--short", "HEAD"]).output()?;
-        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+        Workspace { root: self.root.clone(), ci: false }.commit()
     }
 
     fn remove(&self, workspace: &Workspace) -> Result<()> {

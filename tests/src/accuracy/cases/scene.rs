@@ -18,22 +18,33 @@ pub fn incision(spacing_mm: f64) -> Result<Case, Failure> {
     of_scene("incision", what, "demo.toml", &[("lattice.spacing_mm", spacing_mm.to_string())])
 }
 
-/// A real abdomen, cut on the belly; none where the data are absent.
+/// The scan of [`abdomen`].
 ///
 /// # Errors
-/// What the pipeline refuses; absent data where `CI` is set.
-pub fn abdomen(spacing_mm: f64) -> Result<Option<Case>, Failure> {
+/// That it is absent.
+pub fn abdomen_scan() -> Result<PathBuf, Failure> {
     let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
     let data = PathBuf::from(std::env::var_os("CUTIS_TEST_DATA").unwrap_or_else(|| beside.into()));
     let path = data.join("ct/abdomen_ts_122x101x112.nii.gz");
-    if !path.is_file() {
-        let reason = format!("abdomen: there is no {} (set CUTIS_TEST_DATA)", path.display());
-        if std::env::var_os("CI").is_some() {
-            return Err(reason.into());
-        }
-        eprintln!("skipped: {reason}");
-        return Ok(None);
+    match path.is_file() {
+        true => Ok(path),
+        false => Err(format!("abdomen: there is no {} (set CUTIS_TEST_DATA)", path.display()).into()),
     }
+}
+
+/// A real abdomen, cut on the belly; none, with a printed reason, where its scan is absent.
+///
+/// # Errors
+/// What the pipeline refuses; an absent scan where `CI` is set.
+pub fn abdomen(spacing_mm: f64) -> Result<Option<Case>, Failure> {
+    let path = match abdomen_scan() {
+        Ok(path) => path,
+        Err(reason) if std::env::var_os("CI").is_some() => return Err(reason),
+        Err(reason) => {
+            eprintln!("skipped: {reason}");
+            return Ok(None);
+        }
+    };
     let what = format!(
         "a real abdomen on a lattice of {spacing_mm} mm, cut on the belly; skin tension opens the wound"
     );
