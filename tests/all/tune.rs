@@ -71,6 +71,9 @@ fn rms(a: &[Point3<f64>], b: &[Point3<f64>]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len() as f64).sqrt()
 }
 
+/// Times of the same work differ by this factor where other tests begin and end meanwhile.
+const BUSY: f64 = 3.0;
+
 fn near(found: f64, promised: f64) -> bool {
     (found - promised).abs() <= 0.2 * promised.abs()
 }
@@ -108,16 +111,17 @@ fn a_run_of_the_tuned_scene_confirms_what_was_promised() {
     let (_, before) = run(&loaded);
     assert!(!near(before, promised), "{before} {promised}");
 
-    // Time, as far as a machine that runs other tests beside can tell: if it is steady, it keeps the promise.
-    let times: Vec<f64> = (0..5).map(|_| run(&tuned).0.frames.ms_mean).collect();
+    // Time: what is promised is what the trial took, and what runs take, as far as a machine that runs other tests beside can tell.
     let promised = picked.ms_per_frame.unwrap();
+    let trial = tuning.stages.iter().find(|stage| stage.name == format!("try {}", picked.setting)).unwrap();
+    let frames = f64::from(tuning.frames);
+    assert!((0.8 * trial.ms..=trial.ms).contains(&(promised * frames)), "{promised} ms of {trial:?}");
+    let times: Vec<f64> = (0..5).map(|_| run(&tuned).0.frames.ms_mean).collect();
     let (least, most) = times.iter().fold((f64::MAX, 0.0), |(l, m), &t| (f64::min(l, t), f64::max(m, t)));
-    if !times.iter().any(|&ms| near(ms, promised)) {
-        assert!(most > 1.2 * least, "{promised} ms were promised, and the runs took {times:?}");
-        eprintln!(
-            "the machine is too busy to tell times: {promised} ms were promised, and the runs took {times:?}"
-        );
-    }
+    assert!(
+        (least / BUSY..=BUSY * most).contains(&promised),
+        "{promised} ms were promised, and the runs took {times:?}"
+    );
 }
 
 #[test]
@@ -168,7 +172,10 @@ fn what_can_be_left_out_is_measured() {
     let tuning = cutis::tune(&loaded, &options, &Silent).unwrap();
     let find = |what: &str| tuning.omissions.iter().find(|o| o.what.contains(what)).unwrap();
     let stc = find("stc");
-    assert!((stc.wounds[0].difference_percent + 100.0).abs() < 1.0, "without tension it stays shut: {stc:?}");
+    assert!(
+        (stc.wounds[0].difference_percent.unwrap() + 100.0).abs() < 1.0,
+        "without tension it stays shut: {stc:?}"
+    );
     assert!((stc.change.unwrap() - 1.0).abs() < 0.01);
     for kind in ["distance", "volume", "stc"] {
         let part = tuning.ledger.parts.iter().find(|part| part.part == kind).unwrap();

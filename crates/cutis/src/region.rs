@@ -72,21 +72,39 @@ pub(crate) fn mesh(
         return whole.mesh(hu).map_err(loaded.blame("tissue"));
     };
     let frame = cutis_mesh::Frame::center_of(whole.lattice().grid());
-    let near_handle = |mm: Point3<f64>, handle: &HandleSection, around: f64| {
-        distance(&mm, &Point3::from(handle.at_mm)) <= handle.radius_mm + around
-    };
     let holds = |mm: Point3<f64>| match zone {
         Zone::Box(min, max) => (0..3).all(|axis| (min[axis]..=max[axis]).contains(&mm[axis])),
-        Zone::Around(around) => {
-            let local = frame.to_local(mm);
-            slits.iter().any(|slit| slit.distance(local) * 1000.0 <= around)
-                || loaded.scene.handle.iter().any(|handle| near_handle(mm, handle, around))
-        }
+        Zone::Around(around) => near_action(&loaded.scene, slits, frame.to_local(mm), mm, around),
     };
     whole.mesh_within(hu, &whole.vertices_where(holds)).map_err(|error| match error {
         MeshError::RegionEmpty { .. } => key(loaded, "lattice.region", &shown(zone), &error.to_string()),
         other => loaded.blame("tissue")(other),
     })
+}
+
+/// Whether a place, given in the frame of the body and in mm, lies within `around` mm of an incision or of what a handle grabs.
+fn near_action(scene: &Scene, slits: &[Slit], local: Point3<f32>, mm: Point3<f64>, around: f64) -> bool {
+    let near =
+        |handle: &HandleSection| distance(&mm, &Point3::from(handle.at_mm)) <= handle.radius_mm + around;
+    slits.iter().any(|slit| slit.distance(local) * 1000.0 <= around) || scene.handle.iter().any(near)
+}
+
+/// The share of a body's tetrahedra that a region of `around` mm would hold.
+pub(crate) fn share_around(scene: &Scene, body: &Body, around: f64) -> f64 {
+    let mesh = &body.mesh;
+    let near =
+        |&local: &Point3<f32>| near_action(scene, &body.cut.slits, local, mesh.frame.to_mm(local), around);
+    let inside: Vec<bool> = mesh.positions.iter().map(near).collect();
+    let held = mesh.tets.iter().filter(|tet| tet.iter().any(|&vertex| inside[vertex as usize]));
+    held.count() as f64 / mesh.tets.len().max(1) as f64
+}
+
+/// Points along each axis that a lattice would have if it were as fine everywhere as it is in its fine zone.
+pub(crate) fn even_shape(lattice: &Lattice) -> [usize; 3] {
+    let even = |planes: &Planes| {
+        planes.axes().each_ref().map(|axis| axis.last().map_or(0, |last| *last as usize) + 1)
+    };
+    lattice.planes().map_or(lattice.grid().shape, even)
 }
 
 /// Names the key that leaves out what an incision cuts.
@@ -195,14 +213,13 @@ pub(crate) fn left_out(body: &Body, memory: &[MemoryPart], lines: &mut Vec<Strin
             bytes / 1e6
         ));
     }
-    if let Some(planes) = mesh.lattice.planes() {
-        let even = planes.axes().each_ref().map(|axis| axis.last().map_or(0, |last| *last as usize) + 1);
+    if mesh.lattice.planes().is_some() {
         let product = |shape: [usize; 3]| shape.iter().product::<usize>();
         let shape = mesh.lattice.grid().shape;
         lines.push(format!(
             "grading: the lattice has {} points instead of the {} that it would have if it were as fine everywhere",
             product(shape),
-            product(even)
+            product(even_shape(&mesh.lattice))
         ));
     }
 }
@@ -221,5 +238,34 @@ fn shown(zone: Zone) -> String {
     match zone {
         Zone::Around(around) => format!("{{ around_mm = {around} }}"),
         Zone::Box(min, max) => format!("{{ min_mm = {min:?}, max_mm = {max:?} }}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::source;
+
+    #[test]
+    fn the_share_that_a_region_would_hold_is_what_it_holds() {
+        let body = |around: Option<f64>| {
+            let region = around.map_or(String::new(), |mm| format!(", region = {{ around_mm = {mm} }}"));
+            let text = format!(
+                "volume = {{ phantom = {{ size = [32, 32, 24], seed = 1 }} }}\n\
+                 lattice = {{ spacing_mm = 12.0{region} }}\n\
+                 handle = [{{ at_mm = [-40, 100, 0], radius_mm = 30, move_mm = [0, 20, 5] }}]"
+            );
+            let loaded = Scene::parse(&text, Path::new("test"), Path::new(""), &[]).unwrap();
+            let body = Body::build(&loaded, &source::load(&loaded).unwrap().volume).unwrap();
+            (loaded.scene, body)
+        };
+        let (scene, whole) = body(None);
+        for around in [20.0, 60.0] {
+            let held = body(Some(around)).1.mesh.tets.len() as f64 / whole.mesh.tets.len() as f64;
+            assert!((0.01..0.9).contains(&held), "{held}");
+            assert_eq!(share_around(&scene, &whole, around), held);
+        }
     }
 }

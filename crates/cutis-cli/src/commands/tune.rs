@@ -104,19 +104,21 @@ fn candidate_row(candidate: &Candidate, tuning: &Tuning) -> String {
         &candidate.ms_per_frame.map(|ms| format!("{ms:.2}")).unwrap_or_default(),
         &candidate.error.map(|error| format!("{:.2} %", 100.0 * error)).unwrap_or_default(),
         &list(&|wound| format!("{:.3} mm", wound.growth_mm)),
-        &list(&|wound| format!("{:+.3} mm ({:+.1} %)", wound.difference_mm, wound.difference_percent)),
+        &list(&difference),
     )
+}
+
+/// How a wound differs; a dash where there is nothing to take a percentage of.
+fn difference(wound: &WoundError) -> String {
+    let percent = wound.difference_percent.map_or("-".into(), |percent| format!("{percent:+.1} %"));
+    format!("{:+.3} mm ({percent})", wound.difference_mm)
 }
 
 fn omission(omission: &Omission) -> String {
     if let Some(why) = &omission.skipped {
         return format!("  {:40} not measured: {why}", omission.what);
     }
-    let wounds: Vec<String> = omission
-        .wounds
-        .iter()
-        .map(|wound| format!("{:+.3} mm ({:+.1} %)", wound.difference_mm, wound.difference_percent))
-        .collect();
+    let wounds: Vec<String> = omission.wounds.iter().map(difference).collect();
     omission_row(
         &omission.what,
         &omission.saved_ms_per_frame.map(|ms| format!("{ms:.2}")).unwrap_or_default(),

@@ -85,3 +85,28 @@ fn it_ends_with_one_where_nothing_meets_the_demand_and_with_two_where_it_cannot_
     assert!(both.code == 2 && both.stderr.contains("--help"), "{}", both.stderr);
     assert_eq!(desk.names("."), ["scene.toml"]);
 }
+
+/// Where the tuned scene cannot be written, nothing is run first.
+#[test]
+fn a_folder_that_is_not_there_is_told_before_the_work() {
+    let desk = Desk::new();
+    tune(&desk, "-o nowhere/tuned.toml").expect_error(2, &["nowhere/tuned.toml", "cannot be written"]);
+    assert_eq!(desk.names("."), ["scene.toml"]);
+}
+
+/// What was measured is printed although the outputs could not be timed.
+#[cfg(unix)]
+#[test]
+fn a_temporary_folder_that_cannot_be_written_loses_nothing() {
+    let desk = Desk::new();
+    let call =
+        "TMPDIR=$PWD/nowhere $cutis tune scene.toml --set 'output={surface=true}' --minutes 0.5 --error 40";
+    let done = desk.script(call).expect_success();
+    let line =
+        |word: &str| done.stdout.lines().find(|line| line.trim_start().starts_with(word)).map(str::to_owned);
+    let outputs = line("outputs").unwrap();
+    assert!(outputs.contains("not measured") && outputs.contains("nowhere"), "{outputs}");
+    for word in ["distance", "volume", "written:"] {
+        assert!(line(word).is_some(), "no {word:?} in {}", done.stdout);
+    }
+}

@@ -27,8 +27,13 @@ impl<'a> Copy<'a> {
         if path.exists() && !overwrite {
             return Err(refuse("is there already; --force replaces it, -o names another file"));
         }
+        if path.is_dir() {
+            return Err(refuse("is a folder; -o names a file"));
+        }
         // Gone again at once.
-        drop(PartialFile::create(path)?);
+        PartialFile::create(path)
+            .map(drop)
+            .map_err(|error| refuse(&format!("cannot be written: {error}")))?;
         let copy = Self { loaded, path };
         copy.text(&loaded.scene)?;
         Ok(copy)
@@ -185,12 +190,17 @@ frames = 3
     fn a_place_or_a_scene_that_will_not_do_is_refused_before_the_work() {
         let folder = tempfile::tempdir().unwrap();
         let to = |path: &str, loaded: &LoadedScene| {
-            Copy::to(&folder.path().join(path), false, loaded).map(drop).map_err(|error| error.to_string())
+            let copy = Copy::to(&folder.path().join(path), path.is_empty(), loaded).map(drop);
+            copy.map_err(|error| {
+                assert!(error.is_bad_input());
+                error.to_string()
+            })
         };
         assert_eq!(to("copy.toml", &loaded(TEXT, &[])), Ok(()));
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0, "nothing is left");
         let error = to("nowhere/copy.toml", &loaded(TEXT, &[])).unwrap_err();
-        assert!(error.contains("nowhere") && error.contains("create"), "{error}");
+        assert!(error.contains("nowhere") && error.contains("cannot be written"), "{error}");
+        assert!(to("", &loaded(TEXT, &[])).unwrap_err().contains("is a folder"));
         // A text that is not that of the scene.
         let spoilt = LoadedScene { text: "frames = ".into(), ..loaded(TEXT, &[]) };
         let error = to("copy.toml", &spoilt).unwrap_err();

@@ -75,8 +75,8 @@ pub struct WoundError {
     pub growth_mm: f64,
     /// That, less what it opens by in the reference, mm.
     pub difference_mm: f64,
-    /// The same in percent of what it opens by in the reference.
-    pub difference_percent: f64,
+    /// The same in percent of what it opens by in the reference; none where that is nothing but rounding.
+    pub difference_percent: Option<f64>,
 }
 
 impl Candidate {
@@ -96,9 +96,12 @@ impl Candidate {
 }
 
 impl WoundError {
-    pub(super) fn of(growth_mm: f64, expected_mm: f64) -> Self {
+    /// Against what is expected; `rounding_mm` of it is nothing.
+    pub(super) fn of(growth_mm: f64, expected_mm: f64, rounding_mm: f64) -> Self {
         let difference_mm = growth_mm - expected_mm;
-        Self { growth_mm, difference_mm, difference_percent: 100.0 * difference_mm / expected_mm.abs() }
+        let opens = expected_mm.abs() > rounding_mm;
+        let difference_percent = opens.then(|| 100.0 * difference_mm / expected_mm.abs());
+        Self { growth_mm, difference_mm, difference_percent }
     }
 }
 
@@ -145,5 +148,21 @@ impl Tuning {
     /// JSON schema of a calibration.
     pub fn json_schema() -> serde_json::Value {
         schemars::schema_for!(Tuning).to_value()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wound_that_does_not_open_has_no_percentage() {
+        let percent = |growth, expected| WoundError::of(growth, expected, 1e-4).difference_percent;
+        assert_eq!(percent(1.5, -1.0), Some(250.0));
+        for expected in [0.0, 1e-5, -1e-5] {
+            assert_eq!((percent(0.5, expected), percent(0.0, expected)), (None, None));
+        }
+        let json = serde_json::to_value(WoundError::of(0.5, 0.0, 0.0)).unwrap();
+        assert!(json["difference_percent"].is_null() && json["difference_mm"] == 0.5, "{json}");
     }
 }

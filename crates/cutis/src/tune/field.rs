@@ -4,6 +4,9 @@ use cutis_constraints::Scalar;
 use cutis_solver::System;
 use nalgebra::{Point3, Vector3};
 
+/// Rounding, as a share of the body's extent.
+const ROUNDING: f64 = 1e-6;
+
 /// The vertices that can move, and where they are at rest, in local metres.
 pub(super) struct Movable {
     vertices: Vec<u32>,
@@ -31,13 +34,18 @@ impl Movable {
     }
 
     /// The longest side of their bounding box at rest, metres.
-    pub(super) fn extent(&self) -> f64 {
+    fn extent(&self) -> f64 {
         let side = |axis: usize| {
             let values = self.rest.iter().map(|position| position[axis]);
             let hull = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
             hull.1 - hull.0
         };
         (0..3).map(side).fold(0.0, f64::max)
+    }
+
+    /// Displacements of this length, metres, are made by the rounding of the rest shape to `f32`.
+    pub(super) fn rounding(&self) -> f64 {
+        ROUNDING * self.extent()
     }
 
     /// Their displacements at `positions`, one per vertex of the body.

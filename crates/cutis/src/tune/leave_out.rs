@@ -2,7 +2,9 @@
 //! needed, and what lies far from the action. Each is run without it and compared with the run that has it.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
+use cutis_mesh::Lattice;
 use cutis_volume::Volume;
 use nalgebra::Point3;
 use schemars::JsonSchema;
@@ -11,17 +13,17 @@ use serde::{Deserialize, Serialize};
 use super::bench::{Bench, Run};
 use super::field::Field;
 use super::sample::Sampler;
+use super::scratch::Scratch;
 use super::{Setting, WoundError};
 use crate::backend::{Chosen, Stages};
 use crate::body::Body;
 use crate::clock::Clock;
 use crate::dynamics::{self, Dynamics};
-use crate::files::RunFolder;
 use crate::output::{self, Outcome};
 use crate::report::{KindResidual, Stage};
 use crate::scene::{LatticeSection, LoadedScene, RegionSection, Scene};
 use crate::source::Source;
-use crate::{Error, Progress};
+use crate::{Error, Progress, region};
 
 /// How much coarser a lattice is tried.
 const COARSER: [f64; 3] = [1.25, 1.5, 2.0];
@@ -64,56 +66,60 @@ pub(super) struct Whole<'a> {
 
 impl Whole<'_> {
     /// Measures all of them, the kinds first, within about `limit_s` seconds.
-    pub(super) fn omissions(&self, limit_s: f64, clock: &mut Clock<'_>) -> Result<Vec<Omission>, Error> {
+    pub(super) fn omissions(&self, limit_s: f64, clock: &mut Clock<'_>) -> Vec<Omission> {
         let mut list = Vec::new();
         let mut left_s = limit_s;
         for variant in self.variants() {
             let whole_s = 1e-3 * self.run.ms_per_frame * f64::from(self.bench.frames);
             let named =
                 Omission { what: variant.what.clone(), how: variant.how.clone(), ..Omission::default() };
-            if whole_s * variant.share > left_s {
+            if whole_s * variant.body.share() > left_s {
                 list.push(Omission { skipped: Some("no time left; --minutes allows it".into()), ..named });
                 continue;
             }
             let name = format!("without {}", variant.what);
+            let begun = Instant::now();
             let measured =
                 clock.stage(&name, self.bench.frames.into(), |progress| self.measure(&variant, progress));
+            left_s -= begun.elapsed().as_secs_f64();
             list.push(match measured {
-                Ok((run_s, found)) => {
-                    left_s -= run_s;
-                    Omission { what: named.what, how: named.how, ..found }
-                }
+                Ok(found) => Omission { what: named.what, how: named.how, ..found },
                 // What a scene cannot do without is a finding.
                 Err(error) => Omission { skipped: Some(error.to_string()), ..named },
             });
         }
-        list.extend(self.outputs(clock)?);
-        Ok(list)
+        // What was measured so far is not lost to a temporary folder that is full or read-only.
+        list.extend(self.outputs(clock).unwrap_or_else(|error| {
+            vec![Omission { what: "outputs".into(), skipped: Some(error.to_string()), ..Omission::default() }]
+        }));
+        list
     }
 
     fn variants(&self) -> Vec<Variant> {
         let scene = &self.loaded.scene;
         let mut list = Vec::new();
-        let mut add = |what: String, how: String, share: f64, change: &dyn Fn(&mut Scene)| {
+        let mut add = |what: String, how: String, body: Reuse, change: &dyn Fn(&mut Scene)| {
             let mut scene = scene.clone();
             scene.solver = self.setting.applied_to(&scene.solver);
             change(&mut scene);
-            list.push(Variant { what, how, share, same_body: share == 1.0, scene });
+            list.push(Variant { what, how, body, scene });
         };
         let present = &scene.constraints;
         if present.distance.is_some() {
-            add("distance".into(), "--without distance".into(), 1.0, &|s| s.constraints.distance = None);
+            add("distance".into(), "--without distance".into(), Reuse::Same, &|s| {
+                s.constraints.distance = None
+            });
         }
         if present.volume.is_some() {
-            add("volume".into(), "--without volume".into(), 1.0, &|s| s.constraints.volume = None);
+            add("volume".into(), "--without volume".into(), Reuse::Same, &|s| s.constraints.volume = None);
         }
         if present.stc.is_some() {
-            add("stc".into(), "--without stc".into(), 1.0, &|s| s.constraints.stc = None);
+            add("stc".into(), "--without stc".into(), Reuse::Same, &|s| s.constraints.stc = None);
         }
         for factor in COARSER {
-            let (lattice, how) = self.coarser(factor);
+            let (lattice, how) = coarser(&scene.lattice, &self.body.mesh.lattice, factor);
             let what = format!("a lattice that fine ({factor} x coarser)");
-            add(what, how, factor.powi(-3), &|s| s.lattice = lattice.clone());
+            add(what, how, Reuse::Another { share: factor.powi(-3) }, &|s| s.lattice = lattice.clone());
         }
         if let (None, Some(length)) = (&scene.lattice.region, self.reach_mm()) {
             for share in AROUND {
@@ -121,28 +127,11 @@ impl Whole<'_> {
                 let region = RegionSection { around_mm: Some(around), min_mm: None, max_mm: None };
                 let what = format!("what is {around} mm and more from the action");
                 let how = format!("--set lattice.region.around_mm={around}");
-                add(what, how, 0.99, &|s| s.lattice.region = Some(region.clone()));
+                let body = Reuse::Another { share: region::share_around(scene, self.body, around) };
+                add(what, how, body, &|s| s.lattice.region = Some(region.clone()));
             }
         }
         list
-    }
-
-    /// The scene's lattice with steps longer by `factor`.
-    fn coarser(&self, factor: f64) -> (LatticeSection, String) {
-        let lattice = &self.loaded.scene.lattice;
-        match lattice.spacing_mm {
-            Some(spacing) => {
-                let spacing = spacing * factor;
-                let how = format!("--set lattice.spacing_mm={spacing}");
-                (LatticeSection { spacing_mm: Some(spacing), ..lattice.clone() }, how)
-            }
-            None => {
-                let steps = |n: usize| ((n - 1) as f64 / factor).round().max(1.0) as usize;
-                let vertices = self.body.mesh.lattice.grid().shape.map(|n| steps(n) + 1);
-                let how = format!("--set lattice.vertices={vertices:?}");
-                (LatticeSection { vertices: Some(vertices), ..lattice.clone() }, how)
-            }
-        }
     }
 
     /// Length of the longest incision, or twice the radius of the largest handle, mm.
@@ -156,12 +145,12 @@ impl Whole<'_> {
         incisions.chain(handles).reduce(f64::max)
     }
 
-    /// Runs a variant; also the seconds that its frames took.
-    fn measure(&self, variant: &Variant, progress: &dyn Progress) -> Result<(f64, Omission), Error> {
+    /// Runs a variant.
+    fn measure(&self, variant: &Variant, progress: &dyn Progress) -> Result<Omission, Error> {
         let loaded = LoadedScene { scene: variant.scene.clone(), ..self.loaded.clone() };
-        let other = match variant.same_body {
-            true => None,
-            false => Some(Body::build(&loaded, self.volume())?),
+        let other = match variant.body {
+            Reuse::Same => None,
+            Reuse::Another { .. } => Some(Body::build(&loaded, self.volume())?),
         };
         let body = other.as_ref().unwrap_or(self.body);
         let Dynamics { system, settings, .. } = dynamics::build(&loaded, body)?;
@@ -172,16 +161,16 @@ impl Whole<'_> {
             Some(other) => self.carried_over(other, &run.positions),
         };
         let whole = self.run.at_end();
-        let wound = |(&growth_mm, &with): (&f64, &f64)| WoundError::of(growth_mm, with);
-        let found = Omission {
+        let rounding_mm = 1e3 * self.bench.movable.rounding();
+        let wound = |(&growth_mm, &with): (&f64, &f64)| WoundError::of(growth_mm, with, rounding_mm);
+        Ok(Omission {
             saved_ms_per_frame: Some(self.run.ms_per_frame - run.ms_per_frame),
             saved_bytes: self.run.bytes as i64 - run.bytes as i64,
             change: Some(field.rms_to(whole) / whole.rms()),
             wounds: run.growths_mm.iter().zip(&self.run.growths_mm).map(wound).collect(),
             residuals: run.residuals.iter().map(KindResidual::from).collect(),
             ..Omission::default()
-        };
-        Ok((1e-3 * run.ms_per_frame * f64::from(bench.frames), found))
+        })
     }
 
     fn volume(&self) -> &Volume {
@@ -191,11 +180,8 @@ impl Whole<'_> {
     /// Displacements of another body at the vertices of this one that can move.
     fn carried_over(&self, other: &Body, deformed: &[Point3<f32>]) -> Field {
         let sampler = Sampler::new(&other.mesh, deformed);
-        let (here, there) = (&self.body.mesh, &other.mesh.frame);
-        let at = |&v: &u32| {
-            let mm = here.frame.to_mm(here.positions[v as usize]);
-            sampler.displacement(there.to_local(mm).cast())
-        };
+        let here = &self.body.mesh;
+        let at = |&v: &u32| sampler.displacement(here.frame.to_mm(here.positions[v as usize]));
         Field(self.bench.movable.vertices().iter().map(at).collect())
     }
 
@@ -205,7 +191,7 @@ impl Whole<'_> {
         if !(output.volume || output.surface || output.tissue || output.pictures) {
             return Ok(Vec::new());
         }
-        let scratch = Scratch::new()?;
+        let scratch = Scratch::new(&std::env::temp_dir())?;
         let outcome = Outcome {
             loaded: self.loaded,
             source: self.source,
@@ -255,27 +241,44 @@ impl Whole<'_> {
 struct Variant {
     what: String,
     how: String,
-    /// Of the time of the whole, as far as it can be guessed.
-    share: f64,
-    same_body: bool,
+    body: Reuse,
     scene: Scene,
 }
 
-/// A folder for outputs that nobody keeps.
-struct Scratch(RunFolder);
+/// Whether a variant is of the body that there is.
+#[derive(Clone, Copy)]
+enum Reuse {
+    Same,
+    /// Of one that has to be built, and takes this share of the time, as far as it can be guessed.
+    Another {
+        share: f64,
+    },
+}
 
-impl Scratch {
-    fn new() -> Result<Self, Error> {
-        let folder = std::env::temp_dir().join(format!("cutis-tune-{}", std::process::id()));
-        crate::files::create_folder(&folder)?;
-        Ok(Self(RunFolder(folder)))
+impl Reuse {
+    fn share(self) -> f64 {
+        match self {
+            Self::Same => 1.0,
+            Self::Another { share } => share,
+        }
     }
 }
 
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        // A folder that cannot be removed is the system's to clean up: it lies among its temporary files.
-        let _ = std::fs::remove_dir_all(&self.0.0);
+/// A lattice with steps longer by `factor`, and the option for it. `built` is what the section made of itself.
+fn coarser(section: &LatticeSection, built: &Lattice, factor: f64) -> (LatticeSection, String) {
+    match section.spacing_mm {
+        Some(spacing) => {
+            let spacing = spacing * factor;
+            let how = format!("--set lattice.spacing_mm={spacing}");
+            (LatticeSection { spacing_mm: Some(spacing), ..section.clone() }, how)
+        }
+        None => {
+            let steps = |n: usize| ((n - 1) as f64 / factor).round().max(1.0) as usize;
+            let vertices @ [nx, ny, nz] = region::even_shape(built).map(|n| steps(n) + 1);
+            // For any shell: no blanks, and brackets quoted.
+            let how = format!("--set \"lattice.vertices=[{nx},{ny},{nz}]\"");
+            (LatticeSection { vertices: Some(vertices), ..section.clone() }, how)
+        }
     }
 }
 
@@ -287,5 +290,38 @@ impl Chosen {
         settings: &cutis_solver::Settings,
     ) -> usize {
         self.device_memory(system, settings).iter().map(|part| part.bytes).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::scene::Override;
+    use crate::source;
+
+    /// A graded lattice is coarser where it is fine too, by as much as is said, and the option says the same to the program.
+    #[test]
+    fn a_coarser_lattice_is_coarser_by_as_much_with_grading_too() {
+        let text = "volume = { phantom = { size = [48, 48, 40], seed = 1 } }\n[lattice]\nvertices = [41, 41, 33]\n\
+                    grading = { min_mm = [20, 80, -20], max_mm = [50, 110, 20], growth = 1.5, coarsest = 4.0 }";
+        let built = |set: &[Override]| {
+            let loaded = Scene::parse(text, Path::new("test"), Path::new(""), set).unwrap();
+            let lattice = region::lattice(&loaded, &source::load(&loaded).unwrap().volume).unwrap();
+            (loaded.scene.lattice, lattice)
+        };
+        let (section, lattice) = built(&[]);
+        assert!(lattice.grid().shape[0] < 30, "{:?}", lattice.grid().shape);
+        for factor in COARSER {
+            let (coarser, how) = coarser(&section, &lattice, factor);
+            let option = how.strip_prefix("--set \"").and_then(|rest| rest.strip_suffix('"')).unwrap();
+            assert!(!option.contains(' '), "{option}");
+            let (key, value) = option.split_once('=').unwrap();
+            let (read, found) = built(&[Override { key: key.into(), value: value.into() }]);
+            assert_eq!(read, coarser);
+            let ratio = found.longest_step_mm() / lattice.longest_step_mm();
+            assert!((ratio / factor - 1.0).abs() < 0.03, "{ratio} and not {factor}");
+        }
     }
 }

@@ -26,8 +26,6 @@ const CONVERGES: f64 = 1.5;
 const HIGHEST_ORDER: f64 = 2.0;
 /// Differences that shrink by more than this are chance: something cancels in them.
 const CHANCE: f64 = 6.0;
-/// Displacements of this share of the body's extent are made by the rounding of its rest shape to `f32`.
-const ROUNDING: f64 = 1e-6;
 /// The fewest substeps of the first level: below, nothing is seen of a limit.
 const FEWEST: u32 = 4;
 /// Levels beyond this many substeps are not tried: the time step nears the resolution of the clock of the scene.
@@ -101,7 +99,7 @@ pub(super) fn run(
         let setting = Setting::xpbd(substeps);
         let run =
             clock.stage(&name, bench.frames.into(), |progress| bench.run_f64(&system, setting, progress))?;
-        if run.at_end().rms() <= ROUNDING * bench.movable.extent() {
+        if run.at_end().rms() <= bench.movable.rounding() {
             let why = "nothing moves in this scene beyond rounding, so that there is no error to be measured";
             return Err(Error::Request { what: "tuning".into(), why: why.into() });
         }

@@ -141,11 +141,12 @@ impl Trials<'_> {
             return;
         }
         candidate.error = self.course(candidate.setting, run).errors.last().copied();
+        let rounding_mm = 1e3 * self.bench.movable.rounding();
         candidate.wounds = run
             .growths_mm
             .iter()
             .zip(&self.reference.told.growths_mm)
-            .map(|(&growth_mm, &expected_mm)| WoundError::of(growth_mm, expected_mm))
+            .map(|(&growth_mm, &expected_mm)| WoundError::of(growth_mm, expected_mm, rounding_mm))
             .collect();
     }
 }
