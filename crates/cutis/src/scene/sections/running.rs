@@ -13,7 +13,8 @@ pub struct SolverSection {
     /// Which GPU, where one is used: a part of its name, or its index in `cutis devices`. Left out: the best one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adapter: Option<String>,
-    /// Position-based dynamics as in the paper, or its compliant form.
+    /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent: the same materials as `xpbd`, in equilibrium
+    /// where it comes to rest, whatever the substeps.
     pub formulation: FormulationChoice,
     /// Duration of a frame, s.
     pub dt_s: f64,
