@@ -163,8 +163,7 @@ fn energy_of_step(iterations: u32, relaxation: f64, amplification: f64) -> f64 {
 fn the_energy_of_a_step_falls_with_every_iteration() {
     // Of skin that is amplified so much the model has three quarters of the curvature: ω may be 1.5.
     for (relaxation, amplification) in [(0.7, 2.0), (1.0, 2.0), (1.4, 1e3)] {
-        let energies: Vec<f64> =
-            (1..=60).map(|n| energy_of_step(n, relaxation, amplification)).collect();
+        let energies: Vec<f64> = (1..=60).map(|n| energy_of_step(n, relaxation, amplification)).collect();
         for (n, pair) in energies.windows(2).enumerate() {
             assert!(pair[1] <= pair[0] * (1.0 + 1e-12), "iteration {}: {pair:?}, ω {relaxation}", n + 2);
         }
