@@ -7,3 +7,4 @@ pub mod lattice;
 pub mod parity;
 pub mod sheet;
 pub mod stability;
+mod worst;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use crate::workspace::Workspace;
@@ -89,14 +89,11 @@ fn simulate(
     frames: Option<&str>,
     out: &Path,
 ) -> Result<Value> {
-    let mut command = workspace.command(workspace.program()?);
-    command.arg("run").arg(format!("fixtures/scenes/{scene}.toml")).arg("--out").arg(out);
-    command.args(set.iter().flat_map(|change| ["--set", change]));
-    command.args(frames.iter().flat_map(|frames| ["--frames", frames]));
-    let output = command.output().context("cannot start the program")?;
-    if !output.status.success() {
-        bail!("{scene} failed: {}", String::from_utf8_lossy(&output.stderr).trim());
-    }
+    workspace.run_program(|command| {
+        command.arg("run").arg(format!("fixtures/scenes/{scene}.toml")).arg("--out").arg(out);
+        command.args(set.iter().flat_map(|change| ["--set", change]));
+        command.args(frames.iter().flat_map(|frames| ["--frames", frames]));
+    })?;
     Ok(serde_json::from_slice(&fs::read(out.join("report.json"))?)?)
 }
 

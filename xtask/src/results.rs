@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use crate::workspace::Workspace;
@@ -139,13 +139,10 @@ impl Outcome {
 }
 
 fn run_program(workspace: &Workspace, scene: &str, set: &[String], out: &Path) -> Result<()> {
-    let mut command: Command = workspace.command(workspace.program()?);
-    command.arg("run").arg(format!("fixtures/scenes/{scene}.toml")).args(set).arg("--out").arg(out);
-    let output = command.output().context("cannot start the program")?;
-    if !output.status.success() {
-        bail!("{scene} failed: {}", String::from_utf8_lossy(&output.stderr).trim());
-    }
-    Ok(())
+    let run = |command: &mut Command| {
+        command.arg("run").arg(format!("fixtures/scenes/{scene}.toml")).args(set).arg("--out").arg(out);
+    };
+    workspace.run_program(run).map(drop)
 }
 
 /// The opening of a scene's wound by the number of substeps: how far its own setting is from the limit.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use crate::workspace::Workspace;
@@ -20,7 +20,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     fs::create_dir_all(&scratch)?;
     let copy = scratch.join("demo-tuned.toml");
     println!("cutis tune {SCENE}");
-    let document = program(workspace, |command| {
+    let document = workspace.run_program(|command| {
         command.args(["tune", SCENE, "--json", "--force", "--out"]).arg(&copy);
     })?;
     let tuning: Value = serde_json::from_slice(&document).context("the calibration is no JSON")?;
@@ -50,7 +50,7 @@ struct Opening {
 
 impl Opening {
     fn of_run(workspace: &Workspace, scene: &Path, out: &Path, set: &[&str]) -> Result<Self> {
-        program(workspace, |command| {
+        workspace.run_program(|command| {
             command.arg("run").arg(scene).arg("--out").arg(out).args(["--set", "output={report=true}"]);
             command.args(set.iter().flat_map(|change| ["--set", change]));
         })?;
@@ -63,17 +63,6 @@ impl Opening {
         let near = |found: f64, promised: f64| (found / promised - 1.0).abs() <= KEPT;
         near(self.ms, promised.ms) && near(self.mm, promised.mm)
     }
-}
-
-/// What the program prints.
-fn program(workspace: &Workspace, arguments: impl FnOnce(&mut std::process::Command)) -> Result<Vec<u8>> {
-    let mut command = workspace.command(workspace.program()?);
-    arguments(&mut command);
-    let output = command.output().context("cannot start the program")?;
-    if !output.status.success() {
-        bail!("{command:?} failed: {}", String::from_utf8_lossy(&output.stderr).trim());
-    }
-    Ok(output.stdout)
 }
 
 fn number(value: &Value, path: &str) -> Result<f64> {

@@ -107,6 +107,17 @@ impl Workspace {
         self.built("release/cutis", "cargo build --release -p cutis-cli")
     }
 
+    /// Runs the released `cutis` program; what it prints, or an error with what it complains of.
+    pub fn run_program(&self, arguments: impl FnOnce(&mut Command)) -> Result<Vec<u8>> {
+        let mut command = self.command(self.program()?);
+        arguments(&mut command);
+        let output = command.output().context("cannot start the program")?;
+        if !output.status.success() {
+            bail!("{command:?} failed: {}", String::from_utf8_lossy(&output.stderr).trim());
+        }
+        Ok(output.stdout)
+    }
+
     /// The program that compares the backends, as the tests of the workspace leave it behind.
     pub fn parity(&self) -> Result<PathBuf> {
         self.built("debug/parity", "cargo test --workspace --no-run")

@@ -7,6 +7,7 @@ use super::row::{Measure, Row};
 use super::sweep::substep;
 use super::words::percent;
 use super::yardstick::Yardstick;
+use crate::worst::larger;
 
 /// With some setting VBD settles as near to the equilibrium as this, E3.
 const CONVERGED: f64 = 0.01;
@@ -114,8 +115,7 @@ fn apart(rows: &[Row], backend: &str, other: &str) -> Option<(usize, f64)> {
             Some((row.e1? - same.e1?).abs())
         })
         .collect();
-    let worst = |most: f64, error: f64| if most.is_nan() || error <= most { most } else { error };
-    (!ours.is_empty()).then(|| (differences.len(), differences.iter().copied().fold(0.0, worst)))
+    (!ours.is_empty()).then(|| (differences.len(), differences.iter().copied().fold(0.0, larger)))
 }
 
 #[cfg(test)]

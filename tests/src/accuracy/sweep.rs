@@ -9,6 +9,7 @@ use super::config::Config;
 use super::row::Row;
 use super::running::{Running, State};
 use super::yardstick::Yardstick;
+use crate::worst::larger;
 
 /// Frames that a configuration runs before it is the next one's turn: load of the machine then falls on all alike.
 const ROUND: u32 = 5;
@@ -107,8 +108,7 @@ fn e1(case: &Case, config: &Config, yardstick: &Yardstick) -> Result<Option<f64>
     let mut worst = 0.0f64;
     for (instant, state) in yardstick.states.iter().enumerate() {
         let found = substep(case, config, state)?;
-        let error = yardstick.e1(&found, instant, config.substeps);
-        worst = if worst.is_nan() || error <= worst { worst } else { error };
+        worst = larger(worst, yardstick.e1(&found, instant, config.substeps));
     }
     Ok(Some(worst))
 }

@@ -13,6 +13,8 @@ use cutis_constraints::Scalar;
 use cutis_solver::{Formulation, Settings, Stiffness, System};
 use nalgebra::{Point3, Vector3};
 
+use crate::worst::larger;
+
 /// The total energy may be so many times what was put in where a substep resolves the stiffness: it does not grow.
 pub const RESOLVED: f64 = 1.05;
 /// The same where it does not. The constraints of a vertex then move it one after the other, all within a substep; if they agree in
@@ -175,11 +177,6 @@ impl History {
         let moves = |(energy, work): &(Energy, f64)| energy.kinetic > share * (self.budget(*work) + rounding);
         after_last(self.entries.iter().map(moves))
     }
-}
-
-/// The larger one; what is not a number is larger than any.
-fn larger(most: f64, ratio: f64) -> f64 {
-    if most.is_nan() || ratio <= most { most } else { ratio }
 }
 
 /// The first place after which `bad` holds nowhere; none if it holds at the last.
