@@ -1,6 +1,7 @@
 //! `cargo xtask tuning`: `cutis tune` on the demo, and a full run of the tuned copy beside it. Writes `docs/results/tuning.md` and the
 //! calibration itself, `tuning.json`. Ends with an error if the run does not keep what was promised.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -107,17 +108,24 @@ fn page(
         finest.unwrap_or_default(),
         percent(&reference["error"]),
     );
+    let mut given_up: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for candidate in tuning["candidates"].as_array().into_iter().flatten() {
-        let own = if candidate["own"] == true { "the scene's own" } else { "" };
-        let note = candidate["abandoned"].as_str().unwrap_or(own);
+        if let Some(why) = candidate["abandoned"].as_str() {
+            given_up.entry(why).or_default().push(setting(candidate));
+            continue;
+        }
         let _ = writeln!(
             page,
-            "| {} | {} | {} | {} | {note} |",
+            "| {} | {} | {} | {} | {} |",
             setting(candidate),
             figure(&candidate["ms_per_frame"], 1),
             percent(&candidate["error"]),
             figure(&candidate["wounds"][0]["growth_mm"], 3),
+            if candidate["own"] == true { "the scene's own" } else { "" },
         );
+    }
+    for (why, settings) in given_up {
+        let _ = write!(page, "\nNot measured to the end ({why}): {}.\n", settings.join("; "));
     }
     page.push_str(
         "\n## What can be left out\n\nAt the setting picked.\n\n\
