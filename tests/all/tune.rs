@@ -233,3 +233,26 @@ fn a_demand_that_nothing_meets_is_told_and_writes_nothing() {
         assert!(error.contains(words), "no {words:?} in {error}");
     }
 }
+
+#[test]
+fn a_setting_that_is_the_best_there_was_time_for_says_what_would_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let tuned = |file: &str, substeps: &str, minutes: f64| {
+        let loaded = scene(&[("run.frames", "2"), ("solver.substeps", substeps)]);
+        let options = options(folder.path().join(file), Demand::Default);
+        cutis::tune(&loaded, &TuneOptions { minutes, omissions: false, ..options }, &Silent).unwrap()
+    };
+    let hurried = tuned("hurried.toml", "2", 1e-6);
+    let picked = hurried.picked.as_ref().unwrap();
+    assert!(picked.own && picked.error > Some(0.05), "{picked:?}");
+    let note = hurried.warnings.iter().find(|line| line.contains("not that near")).expect("no note");
+    for words in ["settings were not run for want of time (--minutes)", "5 %"] {
+        assert!(note.contains(words), "no {words:?} in {note}");
+    }
+    // What it says would do, does, as far as one can tell from a reference of few substeps.
+    let (_, rest) = note.split_once("needs about ").expect("no number of substeps");
+    let substeps = rest.split_whitespace().next().unwrap();
+    let enough = tuned("enough.toml", substeps, 0.1);
+    let own = enough.candidates.iter().find(|candidate| candidate.own).unwrap();
+    assert!((0.02..0.08).contains(&own.error.unwrap()), "{substeps} substeps: {own:?}");
+}

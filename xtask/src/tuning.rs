@@ -127,6 +127,9 @@ fn page(
     for (why, settings) in given_up {
         let _ = write!(page, "\nNot measured to the end ({why}): {}.\n", settings.join("; "));
     }
+    for warning in tuning["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+        let _ = write!(page, "\nThe program notes: {warning}.\n");
+    }
     page.push_str(
         "\n## What can be left out\n\nAt the setting picked.\n\n\
          | what | saves, ms/frame | saves, MB | changes displacements by | the wound then opens by, mm | |\n|---|---|---|---|---|---|\n",

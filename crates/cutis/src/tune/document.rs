@@ -11,6 +11,8 @@ use crate::{CostLedger, Error};
 
 /// Version of the layout of a calibration; the number grows when a key changes its meaning or goes.
 pub const SCHEMA: &str = "cutis-tune/1";
+/// Why a candidate was not run, if that is why.
+pub(super) const NO_TIME_LEFT: &str = "not run, no time left (--minutes)";
 
 /// A calibration.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -141,8 +143,29 @@ impl Tuning {
         });
         let own = self.candidates.iter().find(|candidate| candidate.own);
         let coarse = own.and_then(|own| self.reference.coarse(own.setting));
-        let nearest = coarse.map_or(nearest.clone(), |coarse| format!("{coarse}; {nearest}"));
-        self.picked.is_none().then(|| Error::NoSetting { demand: self.demand.to_string(), nearest })
+        let needed = self.needed();
+        let nearest: Vec<String> = coarse.into_iter().chain([nearest]).chain(needed).collect();
+        self.picked
+            .is_none()
+            .then(|| Error::NoSetting { demand: self.demand.to_string(), nearest: nearest.join("; ") })
+    }
+
+    /// Where the demand is an error and what was picked does not have it: what would.
+    pub(super) fn needed(&self) -> Option<String> {
+        let demanded = self.demand.error()?;
+        let error = self.picked.as_ref().and_then(|picked| picked.error);
+        let short = error.is_none_or(|error| error + self.reference.error > demanded);
+        let left_out = |candidate: &&Candidate| candidate.abandoned.as_deref() == Some(NO_TIME_LEFT);
+        let late = self.candidates.iter().filter(left_out).count();
+        let late = (late > 0).then(|| format!("{late} settings were not run for want of time (--minutes)"));
+        let substeps = self.reference.substeps_for(demanded).map(|substeps| {
+            format!(
+                "by the reference, xpbd with one iteration needs about {substeps} substeps a frame for an error of {} %",
+                100.0 * demanded
+            )
+        });
+        let lines: Vec<String> = substeps.into_iter().chain(late).collect();
+        (short && !lines.is_empty()).then(|| lines.join("; "))
     }
 
     /// JSON schema of a calibration.

@@ -112,6 +112,10 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         omissions: Vec::new(),
         stages: Vec::new(),
     };
+    if tuning.picked.is_some() {
+        let needed = tuning.needed().map(|needed| format!("the picked setting is not that near: {needed}"));
+        tuning.warnings.extend(needed);
+    }
     if let Some(picked) = &tuning.picked {
         let times = clock.stage("parts of a frame", 0, |_| bench.ledger(picked.setting))?;
         let how = "one frame of the picked setting, part by part";

@@ -77,6 +77,13 @@ impl ReferenceReport {
             )
         })
     }
+
+    /// Substeps with which XPBD, with one iteration each, may be expected to have this error: the limit's distance from the last run,
+    /// grown or shrunk by the order that was found. None if there was none.
+    pub(super) fn substeps_for(&self, error: f64) -> Option<u32> {
+        let finest = f64::from(*self.substeps.last()?);
+        Some((finest * (self.error / error).powf(1.0 / self.order?)).ceil() as u32)
+    }
 }
 
 /// Runs levels of twice the substeps each, until the error is below `enough` or the next level would take the whole beyond
@@ -210,6 +217,10 @@ mod tests {
             assert!((found.told.order.unwrap() - order).abs() < 1e-2);
             assert!(found.told.error < 1.1 * 5.0 / 64_f64.powf(order));
             assert!((found.told.growths_mm[0] - 3.0).abs() < 1e-4);
+            let (error, factor) = (found.told.error, 2_f64.powf(order));
+            for (error, substeps) in [(error, 64.0), (factor * error, 32.0), (error / factor, 128.0)] {
+                assert!((f64::from(found.told.substeps_for(error).unwrap()) - substeps).abs() <= 1.0);
+            }
             assert_eq!((found.told.differences.len(), found.told.substeps.len()), (3, 4));
         }
     }
@@ -245,7 +256,7 @@ mod tests {
     #[test]
     fn a_sequence_that_does_not_converge_is_not_extrapolated() {
         let found = limit(|s| [3.0 + 0.1 * s.log2(), 2.0, 1.0]);
-        assert_eq!(found.told.order, None);
+        assert_eq!((found.told.order, found.told.substeps_for(0.1)), (None, None));
         assert!((f64::from(found.fields[0].0[0].x) - 3.6).abs() < 1e-6);
         assert!((found.told.error - found.told.differences[2]).abs() < 1e-6 && found.told.error > 0.01);
     }

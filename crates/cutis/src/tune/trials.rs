@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::bench::{Bench, Run};
+use super::document::NO_TIME_LEFT;
 use super::field::Field;
 use super::reference::Reference;
 use super::{Candidate, Demand, Setting, WoundError, setting};
@@ -62,7 +63,7 @@ impl Trials<'_> {
             let expected_s = 1e-3 * expected_ms * frames;
             let why_not = self.not_needed(&candidate).or_else(|| {
                 let late = expected_s > left_s && !candidate.own;
-                late.then(|| "not run, no time left (--minutes)".to_owned())
+                late.then(|| NO_TIME_LEFT.to_owned())
             });
             if let Some(why) = why_not {
                 candidate.abandoned = Some(why);
