@@ -172,4 +172,16 @@ mod tests {
         }
         assert!(MUTATIONS.len() >= 20);
     }
+
+    /// The page in the repository was written after the last fault was added.
+    #[test]
+    fn the_page_names_every_fault() {
+        let text =
+            fs::read_to_string(Workspace::find().unwrap().root.join("docs/results/mutations.md")).unwrap();
+        let rows = text.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| |")).count();
+        assert_eq!(rows, all().count());
+        for mutation in all() {
+            assert!(text.contains(&format!("| {} |", mutation.fault)), "{}", mutation.fault);
+        }
+    }
 }
