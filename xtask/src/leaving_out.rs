@@ -76,8 +76,9 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         rows.iter().for_each(|row| csv.push_str(&row.csv(scene, &rows[0])));
     }
     fs::create_dir_all(&docs)?;
+    let page = page(workspace, &sections, &machine)?;
     fs::write(docs.join("leaving-out.csv"), csv)?;
-    fs::write(docs.join("leaving-out.md"), page(workspace, &sections, &machine)?)?;
+    fs::write(docs.join("leaving-out.md"), page)?;
     println!("written: {}", docs.join("leaving-out.md").display());
     Ok(())
 }

@@ -36,8 +36,9 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     ensure!(!control.keeps(&promised), "the comparison cannot fail: {control:?} keeps {promised:?} too");
 
     let docs = workspace.root.join("docs/results");
+    let page = page(workspace, &tuning, &promised, &found, &control)?;
     fs::write(docs.join("tuning.json"), &document)?;
-    fs::write(docs.join("tuning.md"), page(workspace, &tuning, &promised, &found, &control)?)?;
+    fs::write(docs.join("tuning.md"), page)?;
     println!("written: {}", docs.join("tuning.md").display());
     Ok(())
 }

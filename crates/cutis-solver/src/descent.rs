@@ -83,8 +83,10 @@ impl<T: Scalar> DescentStep<T> {
         }
     }
 
-    /// The vertex after its step: `x + ω·H⁻¹·f` by LDLᵀ. Each pivot of `H` is at least its inertia `m/h²`, in exact arithmetic;
-    /// rounding does not take it below.
+    /// The vertex after its step: `x + ω·H⁻¹·f` by LDLᵀ. In exact arithmetic each pivot of `H` is at least the inertia `m/h²`, and rounding
+    /// does not take it below. Where constraints are so stiff that the inertia is lost in the rounding of `H` itself, `H` counts it as
+    /// `4ε·tr H`: what is left of `f` across the constraints is rounding too, and would throw the vertex. A larger `H` shortens the
+    /// step; along the constraints it stays what it is.
     #[inline]
     pub(crate) fn moved(
         &self,
@@ -97,14 +99,17 @@ impl<T: Scalar> DescentStep<T> {
         let inertia = self.inverse_h_squared / vertex.inverse_mass();
         let target = previous + velocity * self.h + self.fall;
         let f = pull.force + (target - x) * inertia;
-        let a = pull.diagonal + Vector3::repeat(inertia);
+        let d = pull.diagonal;
+        let noise = T::constant(4.0) * T::simd_default_epsilon();
+        let least = ((d.x + d.y + d.z) * noise).simd_max(inertia);
+        let a = d + Vector3::repeat(least);
         let b = pull.mixed;
         let l21 = b.x / a.x;
         let l31 = b.y / a.x;
-        let d2 = (a.y - l21 * b.x).simd_max(inertia);
+        let d2 = (a.y - l21 * b.x).simd_max(least);
         let e = b.z - l21 * b.y;
         let l32 = e / d2;
-        let d3 = (a.z - l31 * b.y - l32 * e).simd_max(inertia);
+        let d3 = (a.z - l31 * b.y - l32 * e).simd_max(least);
         let y2 = f.y - l21 * f.x;
         let y3 = f.z - l31 * f.x - l32 * y2;
         let z3 = y3 / d3;

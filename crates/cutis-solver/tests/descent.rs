@@ -1,7 +1,7 @@
 //! Vertex block descent: the energy of a step falls, what rests is in equilibrium, and what cannot be solved is refused.
 
 use cutis_coloring::{Groups, greedy};
-use cutis_constraints::{Constraint, Distance, SkinTension, SkinTensionMaterial, Volume};
+use cutis_constraints::{Constraint, Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
 use cutis_solver::{
     Formulation, Pull, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
 };
@@ -194,6 +194,49 @@ fn the_model_of_a_stretched_edge_is_its_true_one() {
         let column = -(force(a + step).force - force(a - step).force) / (2.0 * shift);
         let expected = (model - surplus).column(axis).into_owned();
         assert!((column - expected).norm() < 1e-6 * model.norm(), "{column} {expected}");
+    }
+}
+
+/// How far the tip of a tetrahedron with half of its rest volume goes in a substep, over how far it has to go, at `10^stiff` times the
+/// stiffness that its inertia stands for.
+fn leap<T: Scalar>(stiff: i32) -> f64 {
+    let base = [[0.1, -0.7, 1.3], [1.2, -0.4, 0.9], [0.4, 0.6, 1.6]].map(|x| Point3::from(x));
+    let tip = Point3::new(0.8, 0.3, 2.1);
+    let middle = Point3::from((base[0].coords + base[1].coords + base[2].coords) / 3.0);
+    let positions = [base[0], base[1], base[2], middle + (tip - middle) * 0.5];
+    let settings = settings(Formulation::Vbd, 1, 4);
+    let h = settings.substep_s();
+    let params = Volume::from_rest::<T>(
+        &[base[0], base[1], base[2], tip].map(|p| p.map(T::constant)),
+        &Default::default(),
+    );
+    let eval = Volume::eval::<T>(&positions.map(|p| p.map(T::constant)), &params);
+    let gradient = eval.grad[3].norm().to_f64();
+    let compliance = gradient * gradient * h * h / 10_f64.powi(stiff);
+    let system = SystemBuilder::<T>::new(&positions, &[0.0, 0.0, 0.0, 1.0])
+        .unwrap()
+        .add::<Volume, 4>(
+            &[[0, 1, 2, 3]],
+            &[params],
+            Stiffness::compliance(T::constant(compliance)),
+            &greedy(&[[0, 1, 2, 3]], 4).unwrap(),
+        )
+        .unwrap()
+        .build();
+    let mut solver = SolverReference::new(system, Settings { gravity_m_s2: [0.0; 3], ..settings }).unwrap();
+    solver.step(1).unwrap();
+    let moved = solver.positions().unwrap()[3].map(T::to_f64) - positions[3];
+    moved.norm() * gradient / eval.c.to_f64().abs()
+}
+
+/// Where a constraint is stiffer than `1/ε` times the inertia, the inertia is lost in the rounding of the model's matrix.
+#[test]
+fn no_stiffness_throws_a_vertex() {
+    for stiff in 0..=30 {
+        for leap in [leap::<f32>(stiff), leap::<f64>(stiff)] {
+            let expected = 1.0 / (1.0 + 10_f64.powi(-stiff));
+            assert!((leap - expected).abs() < 0.01, "{leap} instead of {expected} at 1e{stiff}");
+        }
     }
 }
 

@@ -21,6 +21,9 @@ struct Descent {
 @group(0) @binding(4) var<uniform> descent: Descent;
 @group(1) @binding(0) var<storage, read> chosen: array<u32>;
 
+// Four times the machine epsilon: what rounding leaves of a matrix, over its trace.
+const NOISE: f32 = 0x1p-21f;
+
 fn finite_or_zero(value: f32) -> f32 {
     return select(0.0, value, is_finite(value));
 }
@@ -36,14 +39,16 @@ fn descend(@builtin(global_invocation_id) id: vec3u) {
     let inertia = descent.inverse_h_squared / vertex.w;
     let goal = (previous[v].xyz + velocities[v].xyz * descent.h) + descent.fall;
     let f = found.force.xyz + (goal - vertex.xyz) * inertia;
-    let a = found.diagonal.xyz + vec3f(inertia);
+    let d = found.diagonal.xyz;
+    let least = max((d.x + d.y + d.z) * NOISE, inertia);
+    let a = d + vec3f(least);
     let b = found.mixed.xyz;
     let l21 = b.x / a.x;
     let l31 = b.y / a.x;
-    let d2 = max(a.y - l21 * b.x, inertia);
+    let d2 = max(a.y - l21 * b.x, least);
     let e = b.z - l21 * b.y;
     let l32 = e / d2;
-    let d3 = max((a.z - l31 * b.y) - l32 * e, inertia);
+    let d3 = max((a.z - l31 * b.y) - l32 * e, least);
     let y2 = f.y - l21 * f.x;
     let y3 = (f.z - l31 * f.x) - l32 * y2;
     let z3 = y3 / d3;
