@@ -200,7 +200,7 @@ fn the_model_of_a_stretched_edge_is_its_true_one() {
 /// How far the tip of a tetrahedron with half of its rest volume goes in a substep, over how far it has to go, at `10^stiff` times the
 /// stiffness that its inertia stands for.
 fn leap<T: Scalar>(stiff: i32) -> f64 {
-    let base = [[0.1, -0.7, 1.3], [1.2, -0.4, 0.9], [0.4, 0.6, 1.6]].map(|x| Point3::from(x));
+    let base = [[0.1, -0.7, 1.3], [1.2, -0.4, 0.9], [0.4, 0.6, 1.6]].map(Point3::from);
     let tip = Point3::new(0.8, 0.3, 2.1);
     let middle = Point3::from((base[0].coords + base[1].coords + base[2].coords) / 3.0);
     let positions = [base[0], base[1], base[2], middle + (tip - middle) * 0.5];
