@@ -45,6 +45,11 @@ const LAYERS: &[Layer] = &[
             "cutis-shaders",
         ]),
     },
+    Layer {
+        name: "cutis-chainmail",
+        level: 3,
+        may_use: These(&["cutis-volume", "cutis-gpu", "cutis-shaders"]),
+    },
     Layer { name: "cutis-newton", level: 3, may_use: These(&["cutis-solver", "cutis-constraints"]) },
     Layer {
         name: "cutis-resample",

@@ -1,0 +1,58 @@
+//! A million elements: propagation, one thread and all, and a sweep of relaxation.
+
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use cutis_chainmail::{Chain, Drag, Material, Order};
+
+const SIDE: usize = 100;
+
+/// A cube of two materials in layers, bone between soft tissue if `mixed`.
+fn cube(mixed: bool) -> Chain {
+    let soft = Material::isotropic(0.9, 1.1, 0.1, 0.0);
+    let stiff = Material::isotropic(0.99, 1.01, 0.01, 0.0);
+    let material = |element: usize| u8::from(mixed && (element / SIDE % SIDE / 10) % 2 == 1);
+    Chain::new([SIDE; 3], [1.0; 3], &[soft, stiff], (0..SIDE.pow(3)).map(material).collect()).unwrap()
+}
+
+/// Moves all of it: a corner by more than the body gives way.
+fn pull(chain: &Chain) -> Drag {
+    let element = chain.element([0; 3]);
+    Drag { element, to: [-60.0, -50.0, -40.0] }
+}
+
+fn benches(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("million");
+    group.sample_size(10).throughput(Throughput::Elements(SIDE.pow(3) as u64));
+    for (name, mixed) in [("uniform", false), ("mixed", true)] {
+        let chain = cube(mixed);
+        for (kind, order) in [("fifo", Order::Fifo), ("slabs", Order::Slabs)] {
+            group.bench_function(format!("{kind}/{name}"), |bencher| {
+                bencher.iter_batched_ref(
+                    || chain.clone(),
+                    |chain| {
+                        let drag = pull(chain);
+                        let moved = chain.drag(&[drag], order).unwrap();
+                        assert_eq!(moved.elements, SIDE.pow(3));
+                        moved
+                    },
+                    BatchSize::LargeInput,
+                );
+            });
+        }
+        let mut dragged = chain.clone();
+        dragged.drag(&[pull(&chain)], Order::Fifo).unwrap();
+        group.bench_function(format!("classic/{name}"), |bencher| {
+            bencher.iter_batched_ref(
+                || chain.clone(),
+                |chain| chain.drag_classic(pull(chain)),
+                BatchSize::LargeInput,
+            );
+        });
+        group.bench_function(format!("sweep/{name}"), |bencher| {
+            bencher.iter_batched_ref(|| dragged.clone(), |chain| chain.relax(1, &[0]), BatchSize::LargeInput);
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(million, benches);
+criterion_main!(million);

@@ -1,0 +1,88 @@
+//! The bounds of every kind of link, in units.
+
+use crate::material::Material;
+use crate::units::{UNITS_PER_STEP, from_steps};
+
+/// Bounds on the difference of a coordinate between the ends of a link: that after, less that before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Bounds {
+    pub(crate) lo: i32,
+    pub(crate) hi: i32,
+}
+
+/// Bounds of links by coordinate, the materials at their ends, and axis.
+#[derive(Clone, Debug)]
+pub(crate) struct Limits {
+    bounds: [Vec<[Bounds; 3]>; 3],
+    /// By material, in units; 1 at the least.
+    k: Vec<i32>,
+    materials: usize,
+}
+
+impl Limits {
+    /// Of links between all pairs of `materials`, which are checked.
+    pub(crate) fn new(materials: &[Material], spacing_mm: [f64; 3]) -> Self {
+        let pairs = || materials.iter().flat_map(|a| materials.iter().map(move |b| (a, b)));
+        let bounds = [0, 1, 2].map(|coordinate| {
+            pairs().map(|(a, b)| [0, 1, 2].map(|axis| between(a, b, axis, coordinate, spacing_mm))).collect()
+        });
+        let units = |steps: f64| from_steps(steps).unwrap_or(i32::MAX).max(1);
+        Self { bounds, k: materials.iter().map(|m| units(m.k)).collect(), materials: materials.len() }
+    }
+
+    /// Those of a coordinate for links along an axis, by [`Limits::pair`].
+    #[inline]
+    pub(crate) fn of(&self, coordinate: usize, pair: usize, axis: usize) -> Bounds {
+        self.bounds[coordinate][pair][axis]
+    }
+
+    /// Number of a pair of materials.
+    #[inline]
+    pub(crate) fn pair(&self, a: u8, b: u8) -> usize {
+        usize::from(a) * self.materials + usize::from(b)
+    }
+
+    /// How near an element may be left to where its neighbours ask it to be, in units.
+    #[inline]
+    pub(crate) fn k(&self, material: u8) -> i32 {
+        self.k[usize::from(material)]
+    }
+}
+
+/// Half from each end, rounded inwards. A body at rest is within them: they hold the rest length, which is a whole number of units.
+fn between(a: &Material, b: &Material, axis: usize, coordinate: usize, spacing_mm: [f64; 3]) -> Bounds {
+    let one = f64::from(UNITS_PER_STEP);
+    if axis == coordinate {
+        let lo = 0.5 * (a.shortest[axis] + b.shortest[axis]);
+        let hi = 0.5 * (a.longest[axis] + b.longest[axis]);
+        Bounds { lo: (lo * one).ceil() as i32, hi: (hi * one).floor() as i32 }
+    } else {
+        let shear = 0.5 * (a.shear[axis] + b.shear[axis]) * spacing_mm[axis] / spacing_mm[coordinate];
+        let most = (shear * one).floor().min(f64::from(MOST_SHEAR)) as i32;
+        Bounds { lo: -most, hi: most }
+    }
+}
+
+/// A shear of so many units is none at all to a grid, and keeps sums within 32 bits.
+const MOST_SHEAR: i32 = 1 << 26;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_takes_half_of_its_limits_from_each_end() {
+        let soft = Material { shear: [0.5, 0.25, 0.125], ..Material::isotropic(0.5, 2.0, 0.0, 0.0) };
+        let limits = Limits::new(&[soft, Material::RIGID], [1.0, 2.0, 4.0]);
+        let of = |a, b, axis, coordinate| {
+            let Bounds { lo, hi } = limits.of(coordinate, limits.pair(a, b), axis);
+            [lo, hi].map(|units| f64::from(units) / f64::from(UNITS_PER_STEP))
+        };
+        assert_eq!(of(0, 0, 0, 0), [0.5, 2.0]);
+        assert_eq!((of(0, 1, 1, 1), of(1, 0, 1, 1)), ([0.75, 1.5], [0.75, 1.5]));
+        assert_eq!((of(1, 1, 2, 2), of(1, 1, 2, 0)), ([1.0, 1.0], [0.0, 0.0]));
+        // A link along y is 2 mm long; across it, a quarter of that is half a step along x.
+        assert_eq!((of(0, 0, 1, 0), of(0, 1, 1, 0)), ([-0.5, 0.5], [-0.25, 0.25]));
+        assert_eq!([0, 1].map(|material| limits.k(material)), [1, 1]);
+    }
+}

@@ -1,0 +1,106 @@
+//! How far links give way, and which material an HU stands for.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ChainError;
+
+/// Limits of the links of an element, along each axis of the grid, and how far it springs back.
+///
+/// Lengths are over the link's rest length. A link takes half of its limits from the material at each end, so that a link between
+/// bone and fat is half as stretchable as one within fat, and a link within bone keeps its length exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Shortest length of a link along each axis; 0 to 1.
+    pub shortest: [f64; 3],
+    /// Longest length of a link along each axis; 1 to 16.
+    pub longest: [f64; 3],
+    /// Farthest that the ends of a link along each axis move apart across it, in either direction; 0 to 16.
+    pub shear: [f64; 3],
+    /// Relaxation leaves an element alone that is nearer than this to where its neighbours ask it to be, in each coordinate, in steps
+    /// of the grid; 0 is fully elastic. From 0 to 4096.
+    pub k: f64,
+}
+
+impl Material {
+    /// What keeps its shape: bone.
+    pub const RIGID: Self = Self { shortest: [1.0; 3], longest: [1.0; 3], shear: [0.0; 3], k: 0.0 };
+
+    /// The same along every axis.
+    pub const fn isotropic(shortest: f64, longest: f64, shear: f64, k: f64) -> Self {
+        Self { shortest: [shortest; 3], longest: [longest; 3], shear: [shear; 3], k }
+    }
+
+    /// Refuses numbers that make no sense; `place` is that of the material in its list.
+    pub(crate) fn check(&self, place: usize) -> Result<(), ChainError> {
+        let wrong = |key, value, range| Err(ChainError::Material { material: place, key, value, range });
+        for axis in 0..3 {
+            let Self { shortest, longest, shear, .. } = *self;
+            if !(0.0..=1.0).contains(&shortest[axis]) {
+                return wrong("shortest", shortest[axis], "0 to 1");
+            }
+            if !(1.0..=16.0).contains(&longest[axis]) {
+                return wrong("longest", longest[axis], "1 to 16");
+            }
+            if !(0.0..=16.0).contains(&shear[axis]) {
+                return wrong("shear", shear[axis], "0 to 16");
+            }
+        }
+        if (0.0..=4096.0).contains(&self.k) { Ok(()) } else { wrong("k", self.k, "0 to 4096") }
+    }
+}
+
+/// Which material an HU stands for.
+///
+/// ```
+/// use cutis_chainmail::{Material, MaterialTable};
+/// let table = MaterialTable::new(&[(-449.0, Material::isotropic(0.6, 1.5, 0.5, 0.1)), (300.0, Material::RIGID)])?;
+/// assert_eq!([-1000.0, -449.0, 299.9, 300.0].map(|hu| table.at(hu)), [None, Some(0), Some(0), Some(1)]);
+/// # Ok::<(), cutis_chainmail::ChainError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialTable {
+    from_hu: Vec<f32>,
+    materials: Vec<Material>,
+}
+
+impl MaterialTable {
+    /// Each material from its HU up to the next one's; below the first there is nothing.
+    ///
+    /// # Errors
+    /// [`ChainError::MaterialCount`], [`ChainError::TableOrder`], [`ChainError::Material`].
+    pub fn new(entries: &[(f32, Material)]) -> Result<Self, ChainError> {
+        check_all(entries.iter().map(|(_, material)| material))?;
+        let rises = |n: usize| entries[n].0.is_finite() && (n == 0 || entries[n - 1].0 < entries[n].0);
+        if let Some(entry) = (0..entries.len()).find(|&n| !rises(n)) {
+            return Err(ChainError::TableOrder { entry, from_hu: entries[entry].0 });
+        }
+        let (from_hu, materials) = entries.iter().copied().unzip();
+        Ok(Self { from_hu, materials })
+    }
+
+    /// The materials, as elements number them.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    /// Number of the material at an HU; none below the first and for what is no number.
+    pub fn at(&self, hu: f32) -> Option<u8> {
+        let below = self.from_hu.iter().take_while(|&&from| from <= hu).count();
+        below.checked_sub(1).map(|place| place as u8)
+    }
+}
+
+/// Most materials: limits are tabulated for every pair.
+pub(crate) const MOST_MATERIALS: usize = 64;
+
+/// Refuses lists of materials that are empty, too long, or hold a wrong one.
+pub(crate) fn check_all<'a>(
+    materials: impl ExactSizeIterator<Item = &'a Material>,
+) -> Result<(), ChainError> {
+    let count = materials.len();
+    if !(1..=MOST_MATERIALS).contains(&count) {
+        return Err(ChainError::MaterialCount { count, most: MOST_MATERIALS });
+    }
+    materials.enumerate().try_for_each(|(place, material)| material.check(place))
+}

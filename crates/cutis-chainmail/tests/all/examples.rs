@@ -1,0 +1,198 @@
+//! The examples that the model was described with: rows and sheets, several materials, combs, bones.
+
+use cutis_chainmail::{Blade, Chain, ChainError, Drag, Material, NO_MATERIAL, Order};
+
+const SOFT: Material = Material::isotropic(0.5, 2.0, 0.25, 0.0);
+
+fn chain(shape: [usize; 3], materials: &[Material], of: impl Fn([usize; 3]) -> u8) -> Chain {
+    let [nx, ny, nz] = shape;
+    let places = (0..nx * ny * nz).map(|e| [e % nx, e / nx % ny, e / (nx * ny)]);
+    Chain::new(shape, [1.0; 3], materials, places.map(of).collect()).unwrap()
+}
+
+fn drag(chain: &mut Chain, place: [usize; 3], by: [f64; 3]) -> cutis_chainmail::Moved {
+    let element = chain.element(place);
+    let at = chain.position(element);
+    let to = [0, 1, 2].map(|c| at[c] + by[c]);
+    let moved = chain.drag(&[Drag { element, to }], Order::Fifo).unwrap();
+    assert_eq!(chain.position(element), to);
+    moved
+}
+
+/// Positions along x of the first row.
+fn row(chain: &Chain) -> Vec<f64> {
+    (0..chain.shape()[0]).map(|i| chain.position(i as u32)[0]).collect()
+}
+
+#[test]
+fn a_row_is_pulled_and_pushed_link_by_link() {
+    let mut row_of_six = chain([6, 1, 1], &[SOFT], |_| 0);
+    let moved = drag(&mut row_of_six, [5, 0, 0], [2.5, 0.0, 0.0]);
+    assert_eq!(row(&row_of_six), [0.0, 1.0, 2.0, 3.5, 5.5, 7.5]);
+    assert_eq!((moved.elements, row_of_six.violations().links), (3, 0));
+    drag(&mut row_of_six, [5, 0, 0], [-4.0, 0.0, 0.0]);
+    assert_eq!(row(&row_of_six), [0.0, 1.0, 2.0, 2.5, 3.0, 3.5]);
+}
+
+#[test]
+fn a_sheet_shears_and_moves_along() {
+    let mut sheet = chain([5, 5, 1], &[SOFT], |_| 0);
+    drag(&mut sheet, [0, 2, 0], [0.0, 1.0, 0.0]);
+    // Across the links along x, each neighbour may lag a quarter of a step behind.
+    let along =
+        |j: usize| (0..5).map(|i| sheet.displacement(sheet.element([i, j, 0]))[1]).collect::<Vec<_>>();
+    assert_eq!(along(2), [1.0, 0.75, 0.5, 0.25, 0.0]);
+    // Behind the one that was pushed links shorten by half a step, before it they lengthen by one.
+    assert_eq!(along(3), [0.5, 0.25, 0.0, 0.0, 0.0]);
+    assert_eq!(along(1), [0.0; 5]);
+}
+
+#[test]
+fn rigid_parts_move_as_a_whole() {
+    let mut bone_in_fat =
+        chain([7, 1, 1], &[SOFT, Material::RIGID], |[i, ..]| u8::from((2..=4).contains(&i)));
+    drag(&mut bone_in_fat, [6, 0, 0], [3.0, 0.0, 0.0]);
+    // Soft links give way by 1, those between soft and bone by 0.5, those in bone not at all.
+    assert_eq!(row(&bone_in_fat), [0.0, 2.0, 3.5, 4.5, 5.5, 7.0, 9.0]);
+}
+
+/// A sheet of two materials: what classic ChainMail leaves beyond its limits, and wave does not.
+#[test]
+fn classic_fails_with_several_materials_and_wave_does_not() {
+    let two = || {
+        chain([12, 12, 1], &[SOFT, Material::RIGID], |[i, j, _]| {
+            u8::from((4..8).contains(&i) && (4..8).contains(&j))
+        })
+    };
+    let (mut classic, mut wave) = (two(), two());
+    let element = classic.element([2, 2, 0]);
+    let to = [8.0, 9.0, 0.0];
+    classic.drag_classic(Drag { element, to }).unwrap();
+    wave.drag(&[Drag { element, to }], Order::Fifo).unwrap();
+    assert!(classic.violations().links > 0, "{:?}", classic.violations());
+    assert_eq!(wave.violations().links, 0);
+}
+
+/// A comb: teeth that hang together only at their back. Whether a tooth follows may depend on another one.
+#[test]
+fn classic_fails_where_links_are_missing_and_wave_does_not() {
+    let comb = || chain([9, 8, 1], &[SOFT], |[i, j, _]| if i % 2 == 0 || j == 7 { 0 } else { NO_MATERIAL });
+    let (mut classic, mut wave) = (comb(), comb());
+    let element = classic.element([0, 0, 0]);
+    let to = [0.0, -20.0, 0.0];
+    classic.drag_classic(Drag { element, to }).unwrap();
+    wave.drag(&[Drag { element, to }], Order::Fifo).unwrap();
+    assert!(classic.violations().links > 0, "{:?}", classic.violations());
+    assert_eq!(wave.violations().links, 0);
+}
+
+/// Where classic ChainMail is at home it agrees: a box of one material.
+#[test]
+fn classic_and_wave_agree_in_a_box_of_one_material() {
+    for by in [[3.0, 0.0, 0.0], [-2.5, 4.0, 0.0], [5.0, -6.0, 7.0]] {
+        let (mut classic, mut wave) = (chain([7, 6, 5], &[SOFT], |_| 0), chain([7, 6, 5], &[SOFT], |_| 0));
+        let element = wave.element([3, 2, 2]);
+        let to = [0, 1, 2].map(|c| wave.position(element)[c] + by[c]);
+        classic.drag_classic(Drag { element, to }).unwrap();
+        wave.drag(&[Drag { element, to }], Order::Fifo).unwrap();
+        for element in 0..wave.places() as u32 {
+            assert_eq!(classic.units(element), wave.units(element), "{by:?}: {element}");
+        }
+    }
+}
+
+#[test]
+fn bones_that_cannot_follow_are_reported_and_the_grabbed_element_goes_where_it_is_told() {
+    let mut bar = chain([5, 1, 1], &[Material::RIGID], |_| 0);
+    bar.fix(&[0]).unwrap();
+    let moved = drag(&mut bar, [4, 0, 0], [1.0, 0.0, 0.0]);
+    let [found] = moved.contradictions[..] else { panic!("{moved:?}") };
+    assert_eq!((found.held, found.fixed, found.other, found.axis, found.excess), (0, true, 1, 0, 1.0));
+    assert_eq!((row(&bar), bar.violations().links), (vec![0.0, 2.0, 3.0, 4.0, 5.0], 1));
+    // And back: the link that was torn is whole again.
+    let moved = drag(&mut bar, [4, 0, 0], [-1.0, 0.0, 0.0]);
+    assert!(moved.contradictions.is_empty() && bar.violations().links == 0);
+    assert_eq!(row(&bar), [0.0, 1.0, 2.0, 3.0, 4.0]);
+}
+
+#[test]
+fn a_cut_body_is_two_bodies() {
+    let mut body = chain([6, 4, 3], &[SOFT], |_| 0);
+    let blade = Blade { from: [2.5, -1.0, -1.0], to: [2.5, 5.0, -1.0], along: [0.0, 0.0, 5.0] };
+    assert_eq!((body.cut_with(&blade), body.cut_with(&blade)), (12, 0));
+    drag(&mut body, [3, 1, 1], [4.0, 0.0, 0.0]);
+    for element in 0..body.places() as u32 {
+        let left = element % 6 < 3;
+        assert!(!left || body.displacement(element) == [0.0; 3]);
+    }
+    let strained = body.energy_mm2();
+    assert!(body.relax(1000, &[]).settled && body.energy_mm2() < 1e-6 * strained, "{strained}");
+}
+
+#[test]
+fn relaxation_stops_at_k() {
+    let energy = |k: f64| {
+        let mut body = chain([20, 1, 1], &[Material { k, ..SOFT }], |_| 0);
+        drag(&mut body, [19, 0, 0], [8.0, 0.0, 0.0]);
+        let relaxed = body.relax(100_000, &[0, 19]);
+        assert!(relaxed.settled, "{relaxed:?}");
+        body.energy_mm2()
+    };
+    // Between two held ends, 19 springs share 8 steps.
+    assert!((energy(0.0) - 0.5 * 64.0 / 19.0).abs() < 1e-6);
+    let found = [0.0, 0.05, 0.2, 0.6].map(energy);
+    assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
+}
+
+/// Where all is of one material, eight elements are relaxed at once. Two materials with the same numbers, element by element, prevent it.
+#[test]
+fn elements_side_by_side_move_as_they_do_one_by_one() {
+    for k in [0.0, 0.01] {
+        let material = Material { shear: [0.3, 0.2, 0.25], k, ..Material::isotropic(0.7, 1.6, 0.0, 0.0) };
+        let body = |of: fn([usize; 3]) -> u8| chain([40, 9, 7], &[material, material], of);
+        let (mut eight, mut one) = (body(|_| 0), body(|[i, j, k]| ((i + j + k) % 2) as u8));
+        for chain in [&mut eight, &mut one] {
+            let grabbed = chain.element([20, 4, 3]);
+            drag(chain, [20, 4, 3], [9.0, -4.0, 6.5]);
+            let relaxed = chain.relax(25, &[grabbed, chain.element([0, 0, 0]), grabbed]);
+            assert!(relaxed.moves > 10_000, "{relaxed:?}");
+            // What is cut, fixed and let go after that counts the next time.
+            let blade =
+                Blade { from: [12.5, -20.0, -20.0], to: [12.5, 40.0, -20.0], along: [0.0, 0.0, 60.0] };
+            assert!(chain.cut_with(&blade) > 20);
+            chain.fix(&[chain.element([30, 4, 3])]).unwrap();
+            let fixed = chain.position(chain.element([30, 4, 3]));
+            assert!(chain.relax(25, &[]).moves > 10_000);
+            assert_eq!(chain.position(chain.element([30, 4, 3])), fixed);
+        }
+        for element in 0..eight.places() as u32 {
+            assert_eq!(eight.units(element), one.units(element), "{:?}", eight.position(element));
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_and_nothing_moves() {
+    let mut body = chain([3, 1, 1], &[SOFT], |[i, ..]| if i == 1 { NO_MATERIAL } else { 0 });
+    body.fix(&[0]).unwrap();
+    let mut refused = |drags: &[Drag]| body.drag(drags, Order::Fifo).unwrap_err();
+    let to = |element, x| Drag { element, to: [x, 0.0, 0.0] };
+    assert!(matches!(refused(&[to(2, 3.0), to(1, 0.0)]), ChainError::NoSuchElement { element: 1, .. }));
+    assert!(matches!(refused(&[to(2, 3.0), to(3, 0.0)]), ChainError::NoSuchElement { element: 3, .. }));
+    assert!(matches!(refused(&[to(2, f64::NAN)]), ChainError::TooFar { .. }));
+    assert!(matches!(refused(&[to(2, 1.0), to(0, 1.0)]), ChainError::NotFree { element: 0, .. }));
+    assert!(matches!(refused(&[to(2, 1.0), to(2, 2.0)]), ChainError::NotFree { element: 2, .. }));
+    assert_eq!(row(&body), [0.0, 1.0, 2.0]);
+    for (materials, of) in [(vec![], vec![0]), (vec![SOFT], vec![1]), (vec![SOFT], vec![0, 0])] {
+        assert!(Chain::new([1; 3], [1.0; 3], &materials, of).is_err());
+    }
+    for wrong in [
+        Material { shortest: [1.0, 1.1, 1.0], ..SOFT },
+        Material { longest: [f64::NAN; 3], ..SOFT },
+        Material { shear: [-1.0; 3], ..SOFT },
+        Material { k: f64::INFINITY, ..SOFT },
+    ] {
+        assert!(matches!(Chain::new([1; 3], [1.0; 3], &[wrong], vec![0]), Err(ChainError::Material { .. })));
+    }
+    assert!(Chain::new([1; 3], [0.0, 1.0, 1.0], &[SOFT], vec![0]).is_err());
+}

@@ -1,0 +1,123 @@
+//! What holds of every drag, cut and relaxation, for random bodies.
+
+use cutis_chainmail::{Chain, Drag, Moved, Order, UNITS_PER_STEP};
+use proptest::prelude::*;
+
+use crate::oracle;
+use crate::random::{Case, case};
+
+fn all_units(chain: &Chain) -> Vec<[i32; 3]> {
+    (0..chain.places() as u32).map(|element| chain.units(element)).collect()
+}
+
+fn target(drag: &Drag) -> [i32; 3] {
+    drag.to.map(|steps| (steps * f64::from(UNITS_PER_STEP)).round() as i32)
+}
+
+/// Links beyond their bounds, as pairs of elements.
+fn violated(chain: &Chain) -> Vec<(u32, u32)> {
+    let mut list = Vec::new();
+    for a in 0..chain.places() as u32 {
+        for axis in 0..3 {
+            let Some((b, bounds)) = chain.link(a, axis) else { continue };
+            let apart = [0, 1, 2].map(|c| chain.units(b)[c] - chain.units(a)[c]);
+            if (0..3).any(|c| apart[c] < bounds[c][0] || apart[c] > bounds[c][1]) {
+                list.push((a, b));
+            }
+        }
+    }
+    list
+}
+
+fn accused(moved: &Moved) -> Vec<(u32, u32)> {
+    let mut list: Vec<(u32, u32)> =
+        moved.contradictions.iter().map(|c| (c.held.min(c.other), c.held.max(c.other))).collect();
+    list.sort();
+    list.dedup();
+    list
+}
+
+/// What is linked with `from`, directly or not.
+fn part_of(chain: &Chain, from: u32) -> Vec<bool> {
+    let mut part = vec![false; chain.places()];
+    let mut open = vec![from];
+    part[from as usize] = true;
+    while let Some(element) = open.pop() {
+        for next in chain.neighbours(element) {
+            if !std::mem::replace(&mut part[next as usize], true) {
+                open.push(next);
+            }
+        }
+    }
+    part
+}
+
+fn check(case: &Case) -> Result<(), TestCaseError> {
+    let mut chain = case.chain();
+    let mut feasible = true;
+    for drags in case.drags(&chain) {
+        let before = all_units(&chain);
+        let least = oracle::least_move(&chain, &drags);
+        let mut rounds = chain.clone();
+        let moved = chain.drag(&drags, Order::Fifo).unwrap();
+        let after = all_units(&chain);
+
+        // Any order, the same bits.
+        let found = rounds.drag(&drags, Order::Slabs).unwrap();
+        prop_assert_eq!(&after, &all_units(&rounds));
+        prop_assert_eq!((moved.elements, &moved.contradictions), (found.elements, &found.contradictions));
+
+        // Told is told; fixed is fixed; what is apart stays apart.
+        for drag in &drags {
+            prop_assert_eq!(after[drag.element as usize], target(drag));
+        }
+        let parts: Vec<Vec<bool>> = drags.iter().map(|drag| part_of(&chain, drag.element)).collect();
+        for element in 0..before.len() {
+            let reached = parts.iter().any(|part| part[element]);
+            if chain.is_fixed(element as u32) || (feasible && !reached) {
+                prop_assert_eq!(after[element], before[element]);
+            }
+        }
+        let differ = (0..before.len()).filter(|&e| before[e] != after[e]).count();
+        prop_assert!(moved.elements == differ || (!feasible && moved.elements > differ));
+
+        // No link is violated that is not accused, and none is accused without reason.
+        let links = violated(&chain);
+        prop_assert_eq!(&accused(&moved), &links);
+        prop_assert_eq!(chain.violations().links, links.len());
+
+        // A state that has all that was told is found if there is one, also after a drag that had none; and it is the least move.
+        let holds = least.iter().all(Option::is_some);
+        prop_assert_eq!(moved.contradictions.is_empty(), holds);
+        for (coordinate, positions) in least.iter().enumerate().filter(|_| feasible) {
+            let Some(positions) = positions else { continue };
+            let found: Vec<i64> = after.iter().map(|units| i64::from(units[coordinate])).collect();
+            prop_assert_eq!(&found, positions);
+        }
+        feasible = feasible && holds;
+
+        // Relaxation never raises the energy, and leaves links alone that hold.
+        let held: Vec<u32> = drags.iter().map(|drag| drag.element).collect();
+        let mut energy = chain.energy_mm2();
+        for _ in 0..4 {
+            let relaxed = chain.relax(1, &held);
+            let now = chain.energy_mm2();
+            prop_assert!(if relaxed.moves == 0 { now == energy } else { now < energy }, "{energy} -> {now}");
+            prop_assert!(violated(&chain).iter().all(|link| links.contains(link)));
+            energy = now;
+        }
+        for drag in &drags {
+            prop_assert_eq!(chain.units(drag.element), target(drag));
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_drag_is_the_least_move_that_there_is(case in case()) {
+        check(&case)?;
+    }
+}

@@ -1,0 +1,6 @@
+//! What holds of every chain, and what the program's model does in the examples that it was described with.
+
+mod examples;
+mod invariants;
+mod oracle;
+mod random;
