@@ -19,7 +19,8 @@ const KEPT: f64 = 0.2;
 pub fn run(workspace: &Workspace) -> Result<()> {
     let scratch = workspace.target_dir()?.join("tuning");
     fs::create_dir_all(&scratch)?;
-    let copy = scratch.join("demo-tuned.toml");
+    // The program runs in the root; what it writes into the calibration is then no path of this machine.
+    let copy = scratch.strip_prefix(&workspace.root).unwrap_or(&scratch).join("demo-tuned.toml");
     println!("cutis tune {SCENE}");
     let document = workspace.run_program(|command| {
         command.args(["tune", SCENE, "--json", "--force", "--out"]).arg(&copy);

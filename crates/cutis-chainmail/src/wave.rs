@@ -60,8 +60,8 @@ pub struct Contradiction {
 }
 
 impl Chain {
-    /// Moves elements exactly where they are told, and others as little as their links allow. Whatever a drag before this one moved
-    /// stays grabbed no longer.
+    /// Moves elements exactly where they are told, and others as little as their links allow. What was grabbed by a drag before this one
+    /// is free again.
     ///
     /// # Errors
     /// [`ChainError::NoSuchElement`], [`ChainError::TooFar`], [`ChainError::NotFree`]; then nothing moves.
