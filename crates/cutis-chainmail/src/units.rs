@@ -28,7 +28,9 @@ mod tests {
         for units in [0, 1, -1, 12_345, FARTHEST, -FARTHEST] {
             assert_eq!(from_steps(to_steps(units)), Some(units));
         }
-        assert_eq!(from_steps(1.0 + 0.4 / f64::from(UNITS_PER_STEP)), Some(UNITS_PER_STEP));
+        for (beyond, units) in [(0.4, 0), (0.6, 1), (-0.4, 0), (-0.6, -1)] {
+            assert_eq!(from_steps(1.0 + beyond / f64::from(UNITS_PER_STEP)), Some(UNITS_PER_STEP + units));
+        }
         for wrong in [f64::NAN, f64::INFINITY, 4096.1, -1e9] {
             assert_eq!(from_steps(wrong), None);
         }
