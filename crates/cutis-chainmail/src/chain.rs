@@ -5,7 +5,8 @@ use crate::blade::Blade;
 use crate::limits::{Bounds, Limits};
 use crate::links::{Links, Neighbour};
 use crate::material::{self, Material};
-use crate::units::{UNITS_PER_STEP, to_steps};
+use crate::units::{FARTHEST_MOVED, UNITS_PER_STEP, to_steps};
+use crate::wide::Width;
 
 /// The material of a place of the grid where there is nothing.
 pub const NO_MATERIAL: u8 = u8::MAX;
@@ -23,8 +24,12 @@ pub struct Chain {
     pub(crate) flags: [Vec<u8>; 3],
     /// Fixed elements that a drag would have had to move: the next one begins with them too.
     pub(crate) strained: Vec<u32>,
-    /// What [`uniform`](crate::plane::uniform) says; empty where links or fixed elements have changed since.
-    pub(crate) uniform: Vec<u8>,
+    /// What [`census`](crate::census::census) says; empty where links or fixed elements have changed since.
+    pub(crate) census: Vec<u8>,
+    /// By row along the first axis: something in it may have changed since it was last relaxed.
+    pub(crate) changed: Vec<bool>,
+    /// What relaxation computes with; the outcome is the same.
+    pub(crate) width: Width,
 }
 
 /// What of a chain a drag does not change.
@@ -82,7 +87,9 @@ impl Chain {
             flags: [0, 1, 2].map(|_| vec![0; links.len()]),
             body: Body { links, limits: Limits::new(materials, spacing_mm), materials: element_materials },
             strained: Vec::new(),
-            uniform: Vec::new(),
+            census: Vec::new(),
+            changed: vec![false; shape[1] * shape[2]],
+            width: Width::widest(),
             spacing_mm,
         })
     }
@@ -132,7 +139,7 @@ impl Chain {
     pub fn fix(&mut self, elements: &[u32]) -> Result<(), ChainError> {
         elements.iter().try_for_each(|&element| self.check_element(element))?;
         elements.iter().for_each(|&element| self.body.links.set_fixed(element));
-        self.uniform.clear();
+        self.census.clear();
         Ok(())
     }
 
@@ -164,10 +171,11 @@ impl Chain {
                 let next = self.body.links.next(element, axis);
                 if next.is_some_and(|next| apart(self, element, next)) {
                     cut += usize::from(self.body.links.cut(element, axis));
+                    self.mark_changed(element);
                 }
             }
         }
-        self.uniform.clear();
+        self.census.clear();
         cut
     }
 
@@ -186,6 +194,68 @@ impl Chain {
             return Err(ChainError::Length { what: "mask of a cut", found, expected });
         }
         Ok(self.cut(|_, a, b| mask[a as usize] != mask[b as usize]))
+    }
+
+    /// Removes the links between pairs of elements; how many there were.
+    pub fn cut_links(&mut self, pairs: &[[u32; 2]]) -> usize {
+        let mut cut = 0;
+        for [a, b] in pairs.iter().map(|[a, b]| [*a.min(b), *a.max(b)]) {
+            let links = &mut self.body.links;
+            if (b as usize) < links.len()
+                && let Some(axis) = (0..3).find(|&axis| links.next(a, axis) == Some(b))
+            {
+                cut += usize::from(links.cut(a, axis));
+                self.mark_changed(a);
+            }
+        }
+        self.census.clear();
+        cut
+    }
+
+    /// Number of links.
+    pub fn links(&self) -> usize {
+        let next =
+            |element: u32| (0..3).filter(|&axis| self.body.links.next(element, axis).is_some()).count();
+        (0..self.places() as u32).map(next).sum()
+    }
+
+    /// Bytes that are stored once the chain has been relaxed, by part: coordinates, links with what is fixed, materials, and
+    /// what drags and relaxation note.
+    pub fn bytes(&self) -> [(&'static str, usize); 4] {
+        let count = self.places();
+        let coordinates = 3 * count * size_of::<i32>();
+        [("coordinates", coordinates), ("links", count), ("materials", count), ("marks", 4 * count)]
+    }
+
+    /// Fixed elements that the last drag would have had to move; what a saved state needs beside the positions.
+    pub fn strained(&self) -> &[u32] {
+        &self.strained
+    }
+
+    /// Goes on from a saved state: where elements are, in units, and what [`Chain::strained`] said. Other elements stay where they
+    /// are.
+    ///
+    /// # Errors
+    /// [`ChainError::NoSuchElement`], [`ChainError::TooFar`]; then nothing moves.
+    pub fn restore(&mut self, units: &[(u32, [i32; 3])], strained: &[u32]) -> Result<(), ChainError> {
+        for &(element, to) in units {
+            self.check_element(element)?;
+            if to.iter().any(|units| units.unsigned_abs() > FARTHEST_MOVED) {
+                return Err(ChainError::TooFar { element, to: to.map(to_steps) });
+            }
+        }
+        strained.iter().try_for_each(|&element| self.check_element(element))?;
+        for &(element, to) in units {
+            (0..3).for_each(|axis| self.positions[axis][element as usize] = to[axis]);
+        }
+        self.strained = strained.to_vec();
+        self.changed.fill(true);
+        Ok(())
+    }
+
+    /// Notes that relaxation has to look at an element's row and those beside it.
+    pub(crate) fn mark_changed(&mut self, element: u32) {
+        self.changed[element as usize / self.body.links.shape()[0]] = true;
     }
 
     pub(crate) fn check_element(&self, element: u32) -> Result<(), ChainError> {

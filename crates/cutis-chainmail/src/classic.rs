@@ -39,6 +39,7 @@ impl Chain {
         for (axis, to) in [x, y, z].into_iter().enumerate() {
             self.positions[axis][drag.element as usize] = to;
         }
+        self.changed.fill(true);
         let mut moved = ClassicMoved { moves: 1, visits: 0 };
         let mut queues: [VecDeque<(u32, u32)>; 6] = Default::default();
         self.offer(drag.element, None, &mut queues);

@@ -60,6 +60,14 @@ pub enum ChainError {
         /// HU from which it holds.
         from_hu: f32,
     },
+    /// No preset of that name.
+    #[error("there is no preset `{name}` of materials; expected {expected}")]
+    NoSuchPreset {
+        /// The name.
+        name: String,
+        /// Those that there are.
+        expected: String,
+    },
     /// An element names a material that does not exist.
     #[error(
         "element {element} is of material {material}, but there are {count} materials (0 to {count} - 1)"

@@ -37,9 +37,9 @@
 //!
 //! Coordinates are in steps of the grid along its axes, with 16 binary places in 32 bits ([`UNITS_PER_STEP`]): at 1 mm they
 //! are 15 nm apart. All arithmetic is exact, and what is told in steps is rounded once, on the way in.
-#![forbid(unsafe_code)]
 
 mod blade;
+mod census;
 mod chain;
 mod classic;
 mod energy;
@@ -52,6 +52,7 @@ mod plane;
 mod relax;
 mod units;
 mod wave;
+mod wide;
 
 pub use blade::Blade;
 pub use chain::{Chain, NO_MATERIAL};

@@ -4,8 +4,8 @@ use crate::ChainError;
 use crate::units::MOST_ELEMENTS;
 
 /// A bit for the link to the next element along each axis, and one for that to the one before.
-const NEXT: [u8; 3] = [1, 2, 4];
-const BEFORE: [u8; 3] = [8, 16, 32];
+pub(crate) const NEXT: [u8; 3] = [1, 2, 4];
+pub(crate) const BEFORE: [u8; 3] = [8, 16, 32];
 /// The element never moves.
 const FIXED: u8 = 64;
 /// The element is where it was told to be.
@@ -86,6 +86,12 @@ impl Links {
             });
             next.into_iter().chain(before)
         })
+    }
+
+    /// The byte of an element.
+    #[inline]
+    pub(crate) fn bits(&self, element: usize) -> u8 {
+        self.bits[element]
     }
 
     /// The element after, if it is linked along this axis.

@@ -79,6 +79,29 @@ impl MaterialTable {
         Ok(Self { from_hu, materials })
     }
 
+    /// Names of the presets, the default first.
+    pub const PRESETS: [&str; 2] = ["tissue", "uniform"];
+
+    /// A preset by name: `tissue` has fat, firmer soft tissue, and rigid bone; `uniform` is the firmer soft tissue everywhere. Their
+    /// limits are chosen, not measured: ChainMail has no physical moduli that they could be compared with.
+    ///
+    /// # Errors
+    /// [`ChainError::NoSuchPreset`].
+    pub fn preset(name: &str) -> Result<Self, ChainError> {
+        match name {
+            "tissue" => {
+                Self::new(&[(LOWEST_HU, FAT), (SOFT_ABOVE_HU, SOFT), (BONE_ABOVE_HU, Material::RIGID)])
+            }
+            "uniform" => Self::new(&[(LOWEST_HU, SOFT)]),
+            _ => Err(ChainError::NoSuchPreset { name: name.into(), expected: Self::PRESETS.join(" or ") }),
+        }
+    }
+
+    /// HU from which there is a material.
+    pub fn lowest_hu(&self) -> f32 {
+        self.from_hu[0]
+    }
+
     /// The materials, as elements number them.
     pub fn materials(&self) -> &[Material] {
         &self.materials
@@ -90,6 +113,15 @@ impl MaterialTable {
         below.checked_sub(1).map(|place| place as u8)
     }
 }
+
+/// Where the presets begin: air.
+const LOWEST_HU: f32 = -1024.0;
+/// Water and muscle from here, fat below (about −100 HU).
+const SOFT_ABOVE_HU: f32 = -30.0;
+/// Bone from here, as the scenes of this project fix it.
+const BONE_ABOVE_HU: f32 = 250.0;
+const FAT: Material = Material::isotropic(0.5, 1.6, 0.6, 0.02);
+const SOFT: Material = Material::isotropic(0.7, 1.3, 0.4, 0.02);
 
 /// Most materials: limits are tabulated for every pair.
 pub(crate) const MOST_MATERIALS: usize = 64;

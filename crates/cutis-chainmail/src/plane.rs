@@ -1,128 +1,142 @@
-//! Relaxation of the elements of a plane: one by one, and eight at a time where they and all around them are of one material.
+//! Relaxation of the elements of a plane: one by one, and many at a time where they and all around them are of one material.
 
-use crate::chain::{Body, NO_MATERIAL};
+use crate::census::{MIXED, STILL};
+use crate::chain::Body;
 use crate::limits::Bounds;
+use crate::links::{BEFORE, NEXT};
 use crate::units::UNITS_PER_STEP;
 
-/// Elements that are relaxed side by side.
-const LANES: usize = 8;
-/// From the first of them to the last, which are two apart.
-const SPAN: usize = 2 * LANES - 1;
+/// Elements of a row that are looked at side by side; half of them, of one colour of the checkerboard, may move.
+const BLOCK: usize = 64;
 
 /// A coordinate of the elements of a plane, and of the planes beside it.
 pub(crate) struct Plane<'a> {
     pub(crate) body: &'a Body,
-    pub(crate) uniform: &'a [u8],
+    /// Of all elements.
+    pub(crate) census: &'a [u8],
     pub(crate) coordinate: usize,
     pub(crate) k: usize,
     pub(crate) x: &'a mut [i32],
     pub(crate) below: &'a [i32],
     pub(crate) above: &'a [i32],
-}
-
-/// The material of elements that are free, linked with six neighbours, and of the same material as these; [`NO_MATERIAL`] for others.
-pub(crate) fn uniform(body: &Body) -> Vec<u8> {
-    let of = |element: u32| {
-        let material = body.materials[element as usize];
-        let alike = |neighbour: u32| body.materials[neighbour as usize] == material;
-        let same = material != NO_MATERIAL
-            && !body.links.is_held(element)
-            && body.links.of(element).filter(|n| alike(n.element)).count() == 6;
-        if same { material } else { NO_MATERIAL }
-    };
-    (0..body.materials.len() as u32).map(of).collect()
+    /// By row of the grid: something in it has changed since elements of this colour were last relaxed.
+    pub(crate) changed: &'a [bool],
+    /// By row of the plane: something in it moves now.
+    pub(crate) moved: &'a mut [bool],
 }
 
 impl Plane<'_> {
-    /// Moves the elements whose `i + j + k` is even, or odd; how many moved.
+    /// Moves the elements whose `i + j + k` is even, or odd; how many moved. Where nothing around a row has changed, nothing moves.
+    #[inline(always)]
     pub(crate) fn relax(&mut self, odd: usize) -> u64 {
-        let [nx, ny, _] = self.body.links.shape();
+        let rows = self.moved.len();
         let mut moves = 0;
-        for j in 0..ny {
-            let mut i = (odd + j + self.k) % 2;
-            while i < nx {
-                let place = j * nx + i;
-                if i + SPAN <= nx
-                    && let Some(material) = self.alike(place)
-                {
-                    moves += self.relax_eight(place, material);
-                    i += 2 * LANES;
-                } else {
-                    moves += u64::from(self.relax_one(place));
-                    i += 2;
+        for j in 0..rows {
+            let row_moves = if self.has_cause(j) { self.relax_row(j, (odd + j + self.k) % 2) } else { 0 };
+            self.moved[j] = row_moves > 0;
+            moves += row_moves;
+        }
+        moves
+    }
+
+    /// Whether a row or one beside it has changed.
+    fn has_cause(&self, j: usize) -> bool {
+        let (rows, at) = (self.moved.len(), |row: usize| self.changed.get(row).copied().unwrap_or_default());
+        let row = self.k * rows + j;
+        at(row)
+            || at(row + rows)
+            || row.checked_sub(rows).is_some_and(at)
+            || (j > 0 && at(row - 1))
+            || (j + 1 < rows && at(row + 1))
+    }
+
+    /// Moves the elements of a row whose `i` is even, or odd.
+    #[inline(always)]
+    fn relax_row(&mut self, j: usize, odd: usize) -> u64 {
+        let [nx, ny, _] = self.body.links.shape();
+        let (row, first) = (j * nx, self.k * self.x.len() + j * nx);
+        let census = &self.census[first..first + nx];
+        // Elsewhere no element has six neighbours.
+        let within = j > 0 && j + 1 < ny && !self.below.is_empty() && !self.above.is_empty();
+        let mut moves = 0;
+        for (part, i) in census.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
+            let (place, odd) = (row + i, (odd + i) % 2);
+            let differ = part.iter().fold(0, |differ, state| differ | (state ^ part[0]));
+            if differ == 0 && part[0] == STILL {
+                continue;
+            }
+            if within && differ == 0 && part[0] != MIXED {
+                moves += self.relax_alike(place, part, part[0], odd);
+                continue;
+            }
+            if within {
+                let there =
+                    part.iter().filter(|&&state| state < MIXED).fold(0_u64, |all, state| all | 1 << state);
+                for material in (0..MIXED).take_while(|&material| there >> material.min(63) != 0) {
+                    if there >> material & 1 == 1 {
+                        moves += self.relax_alike(place, part, material, odd);
+                    }
                 }
+            }
+            for lane in (odd..part.len()).step_by(2).filter(|&lane| part[lane] == MIXED) {
+                moves += u64::from(self.relax_one(place + lane));
             }
         }
         moves
     }
 
-    /// The material of eight elements from here, if it is the only one in and around them.
-    fn alike(&self, place: usize) -> Option<u8> {
-        let first = self.k * self.x.len() + place;
-        let eight = &self.uniform[first..first + SPAN];
-        let material = eight[0];
-        (material != NO_MATERIAL && eight.iter().step_by(2).all(|&other| other == material))
-            .then_some(material)
-    }
-
-    #[inline]
-    fn relax_eight(&mut self, place: usize, material: u8) -> u64 {
-        let limits = &self.body.limits;
+    /// Moves those of the elements from a place on that `census` says are of `material`.
+    #[inline(always)]
+    fn relax_alike(&mut self, place: usize, census: &[u8], material: u8, odd: usize) -> u64 {
+        let (limits, nx, count) = (&self.body.limits, self.body.links.shape()[0], census.len());
+        let mut around = [0; BLOCK + 2];
+        around[..count + 2].copy_from_slice(&self.x[place - 1..place + count + 1]);
+        let (before, at, after) = (&around[..count], &around[1..=count], &around[2..count + 2]);
+        let (left, right) = (&self.x[place - nx..][..count], &self.x[place + nx..][..count]);
+        let (below, above) = (&self.below[place..][..count], &self.above[place..][..count]);
         let (pair, k) = (limits.pair(material, material), limits.k(material));
-        let nx = self.body.links.shape()[0];
-        let at = |x: &[i32], place: usize| -> [i32; LANES] {
-            let x = &x[place..place + SPAN];
-            std::array::from_fn(|lane| x[2 * lane])
-        };
-        let x = at(self.x, place);
-        let pairs = [
-            [at(self.x, place - 1), at(self.x, place + 1)],
-            [at(self.x, place - nx), at(self.x, place + nx)],
-            [at(self.below, place), at(self.above, place)],
-        ];
-        // The rest lengths before and after cancel in the sum.
-        let (mut sum, mut lowest, mut highest) = ([0_i32; LANES], [i32::MIN; LANES], [i32::MAX; LANES]);
-        for (axis, [before, after]) in pairs.iter().enumerate() {
-            let Bounds { lo, hi } = limits.of(self.coordinate, pair, axis);
-            for lane in 0..LANES {
-                let (before, after) = (before[lane] - x[lane], after[lane] - x[lane]);
-                sum[lane] = sum[lane].wrapping_add(before).wrapping_add(after);
-                lowest[lane] = lowest[lane].max(before + lo).max(after - hi);
-                highest[lane] = highest[lane].min(before + hi).min(after - lo);
+        let bounds = [0, 1, 2].map(|axis| limits.of(self.coordinate, pair, axis));
+        let mut to = [0; BLOCK];
+        let to = &mut to[..count];
+        let mut moves = 0_u32;
+        for lane in 0..count {
+            let x = at[lane];
+            let pairs = [[before[lane], after[lane]], [left[lane], right[lane]], [below[lane], above[lane]]];
+            // The rest lengths before and after cancel in the sum.
+            let (mut sum, mut lowest, mut highest) = (0_i32, i32::MIN, i32::MAX);
+            for ([before, after], Bounds { lo, hi }) in pairs.into_iter().zip(bounds) {
+                sum = sum.wrapping_add(before).wrapping_add(after);
+                lowest = lowest.max(before + lo).max(after - hi);
+                highest = highest.min(before + hi).min(after - lo);
             }
+            let sum = sum.wrapping_sub(x.wrapping_mul(6));
+            let (lowest, highest) = (lowest - x, highest - x);
+            let size = ((2 * sum.unsigned_abs().min(MOST_ASKED) + 5) / 12) as i32;
+            let asked = if sum < 0 { -size } else { size };
+            let moves_here =
+                (census[lane] == material) & (lane % 2 == odd) & (size >= k) & (lowest <= 0) & (highest >= 0);
+            let by = if moves_here { asked.min(highest).max(lowest) } else { 0 };
+            moves += u32::from(by != 0);
+            to[lane] = x.wrapping_add(by);
         }
-        let by: [i32; LANES] = std::array::from_fn(|lane| {
-            let size = (2 * sum[lane].unsigned_abs().min(MOST_ASKED) + 5) / 12;
-            let asked = if sum[lane] < 0 { -(size as i32) } else { size as i32 };
-            let stays = (size as i32) < k || lowest[lane] > 0 || highest[lane] < 0;
-            if stays { 0 } else { asked.min(highest[lane]).max(lowest[lane]) }
-        });
-        let to = &mut self.x[place..place + SPAN];
-        (0..LANES).for_each(|lane| to[2 * lane] += by[lane]);
-        by.iter().map(|&by| u64::from(by != 0)).sum()
+        self.x[place..place + count].copy_from_slice(to);
+        u64::from(moves)
     }
 
-    /// Whether the element moved.
+    /// Whether the element moved, which is free.
     fn relax_one(&mut self, place: usize) -> bool {
-        let body = self.body;
-        let first = (self.k * self.x.len()) as u32;
-        let element = first + place as u32;
-        let material = body.materials[element as usize];
-        if material == NO_MATERIAL || body.links.is_held(element) {
-            return false;
-        }
+        let (body, nx) = (self.body, self.body.links.shape()[0]);
+        let element = self.k * self.x.len() + place;
+        let (material, bits) = (body.materials[element], body.links.bits(element));
+        let plane = self.x.len();
         let x = self.x[place];
-        let (mut count, mut sum, mut lowest, mut highest) = (0, 0_i32, i32::MIN, i32::MAX);
-        for neighbour in body.links.of(element) {
-            let there = match (neighbour.axis, neighbour.next) {
-                (2, false) => self.below[place],
-                (2, true) => self.above[place],
-                _ => self.x[(neighbour.element - first) as usize],
-            };
+        let (mut count, mut sum, mut lowest, mut highest) = (0_u32, 0_i32, i32::MIN, i32::MAX);
+        let mut ask = |axis: usize, next: bool, element: usize, there: i32| {
             let apart = there - x;
-            let Bounds { lo, hi } = body.bounds(element, neighbour, self.coordinate);
-            let rest = if neighbour.axis == self.coordinate { UNITS_PER_STEP } else { 0 };
-            let (asked, from, to) = if neighbour.next {
+            let Bounds { lo, hi } =
+                body.limits.of(self.coordinate, body.limits.pair(material, body.materials[element]), axis);
+            let rest = if axis == self.coordinate { UNITS_PER_STEP } else { 0 };
+            let (asked, from, to) = if next {
                 (apart - rest, apart - hi, apart - lo)
             } else {
                 (apart + rest, apart + lo, apart + hi)
@@ -130,6 +144,20 @@ impl Plane<'_> {
             count += 1;
             sum = sum.wrapping_add(asked);
             (lowest, highest) = (lowest.max(from), highest.min(to));
+        };
+        for (axis, stride) in [1, nx].into_iter().enumerate() {
+            if bits & NEXT[axis] != 0 {
+                ask(axis, true, element + stride, self.x[place + stride]);
+            }
+            if bits & BEFORE[axis] != 0 {
+                ask(axis, false, element - stride, self.x[place - stride]);
+            }
+        }
+        if bits & NEXT[2] != 0 {
+            ask(2, true, element + plane, self.above[place]);
+        }
+        if bits & BEFORE[2] != 0 {
+            ask(2, false, element - plane, self.below[place]);
         }
         // An element of a link that is beyond its bounds stays: a way that keeps the others may not be there.
         if count == 0 || lowest > 0 || highest < 0 {
@@ -147,7 +175,16 @@ const MOST_ASKED: u32 = 1 << 30;
 
 /// The nearest integer to a mean, of two that are equally near the one nearer to 0.
 fn mean(sum: i32, count: u32) -> i32 {
-    let size = (2 * sum.unsigned_abs().min(MOST_ASKED) + count - 1) / (2 * count);
+    let twice = 2 * sum.unsigned_abs().min(MOST_ASKED);
+    // Divisions by a number that is known beforehand are multiplications.
+    let size = match count {
+        6 => (twice + 5) / 12,
+        5 => (twice + 4) / 10,
+        4 => (twice + 3) / 8,
+        3 => (twice + 2) / 6,
+        2 => (twice + 1) / 4,
+        _ => twice / 2,
+    };
     size as i32 * sum.signum()
 }
 

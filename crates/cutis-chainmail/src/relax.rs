@@ -7,11 +7,15 @@
 //!
 //! An element that moves comes nearer to the one minimum of a parabola without passing it, so that every move lowers the energy, and
 //! relaxation ends: coordinates are integers, and there is no endless descent among them.
+//!
+//! An element that was looked at moves again only if a neighbour moved in between. So of each row of elements it is noted whether
+//! something in it changed, and rows that have nothing to answer to are passed by: relaxing after a local drag costs what moves.
 
 use rayon::prelude::*;
 
-use crate::chain::{Chain, NO_MATERIAL};
-use crate::plane::{self, Plane};
+use crate::census::{self, STILL};
+use crate::chain::Chain;
+use crate::plane::Plane;
 
 /// What relaxation did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,44 +32,63 @@ impl Chain {
     /// Sweeps until nothing moves, or `most` times. Fixed elements and those in `held` stay.
     pub fn relax(&mut self, most: u32, held: &[u32]) -> Relaxation {
         let held: Vec<u32> = held.iter().copied().filter(|&element| self.is_there(element)).collect();
-        let mut uniform = std::mem::take(&mut self.uniform);
-        if uniform.is_empty() {
-            uniform = plane::uniform(&self.body);
+        let mut census = std::mem::take(&mut self.census);
+        if census.is_empty() {
+            census = census::census(&self.body);
         }
-        let free: Vec<u8> = held.iter().map(|&element| uniform[element as usize]).collect();
-        for &element in &held {
-            self.body.links.set_grabbed(element, true);
-            uniform[element as usize] = NO_MATERIAL;
-        }
+        let free: Vec<u8> = held.iter().map(|&element| census[element as usize]).collect();
+        held.iter().for_each(|&element| census[element as usize] = STILL);
         let mut done = Relaxation::default();
+        let [_, ny, nz] = self.shape();
+        let rows = || [0, 1, 2].map(|_| vec![false; ny * nz]);
+        let (mut even, mut odd) = (rows(), [0, 1, 2].map(|_| self.changed.clone()));
         while !done.settled && done.sweeps < most {
-            let moves = self.sweep_half(0, &uniform) + self.sweep_half(1, &uniform);
+            let mut moves = self.sweep_half(0, &census, &odd, &mut even);
+            if done.sweeps == 0 {
+                let before = even.iter_mut().map(|rows| rows.iter_mut().zip(&self.changed));
+                before.flatten().for_each(|(row, changed)| *row |= changed);
+            }
+            moves += self.sweep_half(1, &census, &even, &mut odd);
             done.sweeps += 1;
             done.moves += moves;
             done.settled = moves == 0;
         }
-        for (&element, &material) in held.iter().zip(&free).rev() {
-            self.body.links.set_grabbed(element, false);
-            uniform[element as usize] = material;
+        if done.sweeps > 0 {
+            let moved = |row: usize| odd.iter().any(|rows| rows[row]);
+            self.changed = (0..ny * nz).map(moved).collect();
         }
-        self.uniform = uniform;
+        for (&element, &state) in held.iter().zip(&free).rev() {
+            census[element as usize] = state;
+            // Once it is let go, it may move.
+            self.mark_changed(element);
+        }
+        self.census = census;
         done
     }
 
     /// Moves the elements whose `i + j + k` is even, or odd: first those of every second plane, which see the planes between as they are,
-    /// then those of the planes between.
-    fn sweep_half(&mut self, odd: usize, uniform: &[u8]) -> u64 {
-        let Self { body, positions, .. } = self;
+    /// then those of the planes between. By coordinate and row of the grid: what changed before, what moves now.
+    fn sweep_half(
+        &mut self,
+        odd: usize,
+        census: &[u8],
+        changed: &[Vec<bool>; 3],
+        moved: &mut [Vec<bool>; 3],
+    ) -> u64 {
+        let Self { body, positions, width, .. } = self;
         let [nx, ny, nz] = body.links.shape();
         let mut moves = 0;
         for second in 0..2 {
             let mut planes = Vec::with_capacity(3 * nz.div_ceil(2));
-            for (coordinate, positions) in positions.iter_mut().enumerate() {
+            for (coordinate, (positions, moved)) in positions.iter_mut().zip(&mut *moved).enumerate() {
+                let changed = &changed[coordinate];
                 let mut between: Vec<&[i32]> = Vec::with_capacity(nz.div_ceil(2));
                 let first = planes.len();
-                for (k, x) in positions.chunks_mut(nx * ny).enumerate() {
+                let rows = moved.chunks_mut(ny);
+                for ((k, x), moved) in positions.chunks_mut(nx * ny).enumerate().zip(rows) {
                     if k % 2 == second {
-                        planes.push(Plane { body, uniform, coordinate, k, x, below: &[], above: &[] });
+                        let (below, above) = (&[][..], &[][..]);
+                        planes.push(Plane { body, census, coordinate, k, x, below, above, changed, moved });
                     } else {
                         between.push(x);
                     }
@@ -76,7 +99,8 @@ impl Chain {
                     plane.above = at(plane.k + 1);
                 }
             }
-            let moved: Vec<u64> = planes.into_par_iter().map(|mut plane| plane.relax(odd)).collect();
+            let moved: Vec<u64> =
+                planes.into_par_iter().map(|mut plane| width.relax(&mut plane, odd)).collect();
             moves += moved.iter().sum::<u64>();
         }
         moves

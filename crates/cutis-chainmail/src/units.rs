@@ -8,6 +8,9 @@ pub(crate) const MOST_ELEMENTS: usize = 4096;
 /// Farthest that an element can be told to go, in units.
 pub(crate) const FARTHEST: i32 = 1 << 28;
 
+/// Farthest that an element can come by following others, in units.
+pub(crate) const FARTHEST_MOVED: u32 = 1 << 29;
+
 /// The nearest coordinate in units; none if it is not finite or too far away.
 pub(crate) fn from_steps(steps: f64) -> Option<i32> {
     let units = (steps * f64::from(UNITS_PER_STEP)).round();

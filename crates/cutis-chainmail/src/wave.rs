@@ -91,6 +91,7 @@ impl Chain {
         elements.par_sort_unstable();
         elements.dedup();
         moved.elements = elements.len();
+        elements.iter().for_each(|&element| self.mark_changed(element));
         held.sort_unstable();
         held.dedup();
         moved.contradictions = held.iter().flat_map(|&element| self.contradictions(element)).collect();

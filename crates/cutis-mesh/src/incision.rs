@@ -47,8 +47,8 @@ pub struct Cut {
 pub struct Taken {
     /// The tets, in mesh vertices.
     pub tets: Vec<[u32; 4]>,
-    /// Number of edges.
-    pub edges: usize,
+    /// The edges, in mesh vertices.
+    pub edges: Vec<[u32; 2]>,
     /// Number of skin triangles.
     pub triangles: usize,
 }
@@ -102,13 +102,20 @@ impl Cut {
                 }
             }
         }
-        let (edges, faces) = (mesh.edges.len(), triangles.len());
-        mesh.edges.retain(|edge| !edge.iter().all(|&v| self.near[v as usize]) || held.contains(edge));
+        let faces = triangles.len();
+        let mut edges = Vec::new();
+        mesh.edges.retain(|edge| {
+            let stays = !edge.iter().all(|&v| self.near[v as usize]) || held.contains(edge);
+            if !stays {
+                edges.push(*edge);
+            }
+            stays
+        });
         let taken = mesh.tets.iter().zip(&kept).filter(|(_, kept)| !**kept).map(|(tet, _)| *tet).collect();
         let mut stays = kept.iter();
         mesh.tets.retain(|_| stays.next() != Some(&false));
         triangles.retain(|triangle| !self.takes(&mesh.positions, triangle));
-        Taken { tets: taken, edges: edges - mesh.edges.len(), triangles: faces - triangles.len() }
+        Taken { tets: taken, edges, triangles: faces - triangles.len() }
     }
 
     /// Distance from a position at rest (local metres) to the nearest slit, mm; infinite without slits.

@@ -1,8 +1,8 @@
 //! From the CT to a body that is ready to be simulated: lattice, tissue, skin, incisions, what is fixed.
 
 use cutis_mesh::{
-    Cut, HalfSpace, Incision, SkinMode, SkinOptions, SkinReport, Slit, StillSkin, TetMesh, Tissue, WholeBody,
-    skin,
+    Cut, HalfSpace, Incision, SkinMode, SkinOptions, SkinReport, Slit, StillSkin, Taken, TetMesh, Tissue,
+    WholeBody, skin,
 };
 use cutis_volume::{TableKind, Volume};
 
@@ -20,8 +20,8 @@ pub(crate) struct Body {
     pub(crate) still_hu: Vec<f32>,
     pub(crate) skin_report: Option<SkinReport>,
     pub(crate) cut: Cut,
-    /// Tetrahedra that the incisions took.
-    pub(crate) taken: Vec<[u32; 4]>,
+    /// What the incisions took.
+    pub(crate) taken: Taken,
     /// Lumped masses before the cut, kg.
     masses: Vec<f32>,
     /// Per lattice point: no tissue.
@@ -79,7 +79,7 @@ impl Body {
         let masses = mesh.masses(&|hu| density.at(hu));
         region::check_handles(loaded, &mesh)?;
         let cut = Cut::of_slits(&mesh, &triangles, slits).map_err(|e| region::name(loaded, e))?;
-        let taken = cut.apply(&mut mesh, &mut triangles).tets;
+        let taken = cut.apply(&mut mesh, &mut triangles);
         Ok(Self {
             mesh,
             skin: triangles,
@@ -175,7 +175,7 @@ impl From<&PlaneSection> for HalfSpace {
 
 impl From<&IncisionSection> for Incision {
     fn from(section: &IncisionSection) -> Self {
-        let IncisionSection { from_mm, to_mm, depth_mm, width_mm } = *section;
+        let IncisionSection { from_mm, to_mm, depth_mm, width_mm, at_s: _ } = *section;
         Self { from_mm, to_mm, depth_mm, width_mm }
     }
 }

@@ -1,11 +1,13 @@
 //! Checkpoints: the state from which `--resume` goes on, bit for bit.
 //!
 //! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32), vertex count (u64),
-//! positions and velocities (3 × f32 per vertex each, m and m/s, local frame), SHA-256 of all that (32).
+//! positions (3 × f32 per vertex, m, local frame), three words of 32 bits per vertex, more words, SHA-256 of all that (32). The words
+//! are velocities (f32, m/s) and no more with the model `pbd`; with `chainmail` coordinates (i32, units of the chain), then the
+//! elements that [`Chain::strained`](cutis_chainmail::Chain::strained) names.
 
 use std::path::Path;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use sha2::{Digest, Sha256};
 
 use crate::{Error, Scene, files};
@@ -21,8 +23,8 @@ pub struct Checkpoint {
     pub frame: u32,
     /// Local metres.
     pub positions: Vec<Point3<f32>>,
-    /// m/s.
-    pub velocities: Vec<Vector3<f32>>,
+    /// What the state consists of beside or instead of the positions; three for each vertex at the least.
+    pub words: Vec<u32>,
 }
 
 /// Identifies scene and volume, without what may change between two runs that continue each other (number of frames,
@@ -53,15 +55,14 @@ impl Checkpoint {
     /// # Errors
     /// [`Error::File`] if the file cannot be written.
     pub(crate) fn write(&self, path: &Path, fingerprint: &[u8; 32]) -> Result<(), Error> {
-        let mut bytes = Vec::with_capacity(HEADER + 24 * self.positions.len() + SEAL);
+        let mut bytes = Vec::with_capacity(HEADER + 12 * self.positions.len() + 4 * self.words.len() + SEAL);
         bytes.extend_from_slice(MAGIC);
         bytes.extend_from_slice(fingerprint);
         bytes.extend_from_slice(&self.frame.to_le_bytes());
         bytes.extend_from_slice(&(self.positions.len() as u64).to_le_bytes());
-        let positions = self.positions.iter().flat_map(|p| [p.x, p.y, p.z]);
-        let velocities = self.velocities.iter().flat_map(|v| [v.x, v.y, v.z]);
-        for value in positions.chain(velocities) {
-            bytes.extend_from_slice(&value.to_le_bytes());
+        let positions = self.positions.iter().flat_map(|p| [p.x, p.y, p.z]).map(f32::to_bits);
+        for word in positions.chain(self.words.iter().copied()) {
+            bytes.extend_from_slice(&word.to_le_bytes());
         }
         let seal = Sha256::digest(&bytes);
         bytes.extend_from_slice(&seal);
@@ -78,28 +79,25 @@ impl Checkpoint {
             return Err(fail("there is none; a run with run.checkpoint_every above 0 writes it".into()));
         }
         let bytes = files::read(path)?;
-        let expected = HEADER + 24 * vertices + SEAL;
+        let least = HEADER + 24 * vertices + SEAL;
         if bytes.len() < HEADER + SEAL || &bytes[..8] != MAGIC {
             return Err(fail("it does not begin as one".into()));
         }
         if bytes[8..40] != fingerprint[..] {
             return Err(fail("scene, volume or program version differ from those that wrote it".into()));
         }
-        if bytes.len() != expected {
-            return Err(fail(format!("it has {} bytes; {vertices} vertices need {expected}", bytes.len())));
+        if bytes.len() < least || bytes.len() % 4 != least % 4 {
+            return Err(fail(format!("it has {} bytes; {vertices} vertices need {least}", bytes.len())));
         }
         let (content, seal) = bytes.split_at(bytes.len() - SEAL);
         if Sha256::digest(content)[..] != *seal {
             return Err(fail("its checksum is wrong: the file is damaged".into()));
         }
         let frame = u32::from_le_bytes([content[40], content[41], content[42], content[43]]);
-        let values: Vec<f32> =
-            content[HEADER..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-        let (positions, velocities) = values.split_at(3 * vertices);
-        Ok(Self {
-            frame,
-            positions: positions.chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect(),
-            velocities: velocities.chunks_exact(3).map(|v| Vector3::new(v[0], v[1], v[2])).collect(),
-        })
+        let words = content[HEADER..].chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let mut words: Vec<u32> = words.collect();
+        let rest = words.split_off(3 * vertices);
+        let positions = words.chunks_exact(3).map(|p| Point3::from([p[0], p[1], p[2]].map(f32::from_bits)));
+        Ok(Self { frame, positions: positions.collect(), words: rest })
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use cutis_chainmail::ChainError;
 use cutis_coloring::ColoringError;
 use cutis_constraints::MaterialError;
 #[cfg(feature = "gpu")]
@@ -89,6 +90,9 @@ pub enum Error {
     /// The CPU backend.
     #[error(transparent)]
     Cpu(#[from] CpuError),
+    /// A chain, or what is asked of it.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
     /// A GPU that is there could not be opened, or did not take the body.
     #[cfg(feature = "gpu")]
     #[error("{0}; the backend \"cpu\" does without")]
@@ -156,6 +160,7 @@ impl Error {
             | Self::Backend { .. }
             | Self::Checkpoint { .. }
             | Self::Material(_)
+            | Self::Chain(_)
             | Self::Coloring(_) => true,
             Self::SceneSection { source, .. } => source.is_bad_input(),
             Self::Volume(e) | Self::Mesh(MeshError::File(e)) => {

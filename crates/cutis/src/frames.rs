@@ -5,17 +5,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use cutis_mesh::{Gape, WoundGape};
-use cutis_solver::{Ledger, Residual, Solver, SolverError};
-use nalgebra::Point3;
+use cutis_solver::{Ledger, SolverError};
 
-use crate::checkpoint::Checkpoint;
 use crate::files::{self, RunFolder};
+use crate::motion::{End, Motion};
 use crate::report::Frames;
 use crate::scene::RunSection;
 use crate::{CostLedger, Error, Progress};
-
-/// The value over rest size from which on a constraint that cannot act is told of.
-const VIOLATED: f64 = 0.01;
 
 /// One line of `frames.csv`.
 #[derive(Clone, Debug)]
@@ -26,7 +22,7 @@ pub(crate) struct FrameRow {
     pub(crate) gapes: Vec<WoundGape>,
 }
 
-/// What the frames need beside the solver.
+/// What the frames need beside the body in motion.
 pub(crate) struct Course<'a> {
     pub(crate) run: &'a RunSection,
     pub(crate) folder: &'a RunFolder,
@@ -78,11 +74,7 @@ impl Times {
 pub(crate) struct Finish {
     /// The state before the first frame, then one row per frame.
     pub(crate) rows: Vec<FrameRow>,
-    /// Local metres, one per vertex.
-    pub(crate) positions: Vec<Point3<f32>>,
-    pub(crate) residuals: Vec<Residual>,
-    /// Names an element that has collapsed and cannot act, if there is one.
-    pub(crate) collapsed: Option<String>,
+    pub(crate) end: End,
     pub(crate) times: Times,
 }
 
@@ -94,58 +86,52 @@ impl Course<'_> {
 
     /// Runs the frames. Of the state it reads the lips of the wounds after each frame, and all of it at a checkpoint and at
     /// the end.
-    pub(crate) fn run(&self, solver: &mut dyn Solver<f32>, progress: &dyn Progress) -> Result<Finish, Error> {
+    pub(crate) fn run(&self, motion: &mut dyn Motion, progress: &dyn Progress) -> Result<Finish, Error> {
         let mut at =
             Reached { frame: self.done(), saved: self.resumed.map(|n| (n, self.folder.checkpoint())) };
-        self.frames(solver, progress, &mut at).map_err(|error| at.name(error))
+        self.frames(motion, progress, &mut at).map_err(|error| at.name(error))
     }
 
     fn frames(
         &self,
-        solver: &mut dyn Solver<f32>,
+        motion: &mut dyn Motion,
         progress: &dyn Progress,
         at: &mut Reached,
     ) -> Result<Finish, Error> {
         let lips = Lips::new(self.gapes);
         let RunSection { frames, checkpoint_every: every } = *self.run;
-        let row = |solver: &mut dyn Solver<f32>, frame, ms| {
-            Ok::<_, Error>(FrameRow { frame, time_s: solver.time_s(), ms, gapes: lips.measure(solver)? })
+        let row = |motion: &mut dyn Motion, frame, ms| {
+            Ok::<_, Error>(FrameRow { frame, time_s: motion.time_s(), ms, gapes: lips.measure(motion)? })
         };
-        let mut rows = vec![row(solver, self.done(), 0.0)?];
+        let mut rows = vec![row(motion, self.done(), 0.0)?];
         let mut times = Times { ledger: Ledger::default(), frames: 0, timing: self.timing };
         for frame in self.done() + 1..=frames {
             at.frame = frame;
             let start = Instant::now();
             if self.timing == Timing::Throughout {
-                solver.step_timed(1, &mut times.ledger)?;
+                motion.step_timed(&mut times.ledger)?;
                 times.frames += 1;
             } else {
-                solver.step(1)?;
+                motion.step()?;
             }
             let ms = start.elapsed().as_secs_f64() * 1e3;
-            rows.push(row(solver, frame, ms)?);
+            rows.push(row(motion, frame, ms)?);
             if every > 0 && (frame % every == 0 || frame == frames) {
-                self.save(solver, frame)?;
+                self.save(motion, frame)?;
                 at.saved = Some((frame, self.folder.checkpoint()));
             }
             progress.advance(u64::from(frame - self.done()));
         }
-        // The whole body comes to the host for its positions: measured there, residuals cost a device nothing, and a lack of
-        // room on it cannot take a finished run.
-        let system = solver.system()?;
-        let (positions, residuals) = (system.positions(), system.residuals());
-        let collapsed = system.check_collapsed(VIOLATED).err().map(|error| error.to_string());
+        let end = motion.end()?;
         // What happens to the body from here on is nobody's business, and a failure no reason to lose the run.
-        if self.timing == Timing::OneMore && rows.len() > 1 && solver.step_timed(1, &mut times.ledger).is_ok()
-        {
+        if self.timing == Timing::OneMore && rows.len() > 1 && motion.step_timed(&mut times.ledger).is_ok() {
             times.frames = 1;
         }
-        Ok(Finish { rows, positions, residuals, collapsed, times })
+        Ok(Finish { rows, end, times })
     }
 
-    fn save(&self, solver: &mut dyn Solver<f32>, frame: u32) -> Result<(), Error> {
-        let (positions, velocities) = (solver.positions()?, solver.velocities()?.to_vec());
-        Checkpoint { frame, positions, velocities }.write(&self.folder.checkpoint(), &self.fingerprint)
+    fn save(&self, motion: &mut dyn Motion, frame: u32) -> Result<(), Error> {
+        motion.save(frame)?.write(&self.folder.checkpoint(), &self.fingerprint)
     }
 }
 
@@ -183,12 +169,12 @@ impl<'a> Lips<'a> {
         Self { gapes, vertices }
     }
 
-    /// Opening of each wound at the solver's present state.
-    fn measure(&self, solver: &mut dyn Solver<f32>) -> Result<Vec<WoundGape>, Error> {
+    /// Opening of each wound at the present state.
+    fn measure(&self, motion: &mut dyn Motion) -> Result<Vec<WoundGape>, Error> {
         if self.gapes.is_empty() {
             return Ok(Vec::new());
         }
-        let positions = solver.positions_of(&self.vertices)?;
+        let positions = motion.positions_of(&self.vertices)?;
         let position = |vertex: u32| {
             let place = self.vertices.partition_point(|&v| v < vertex);
             positions[place].cast()

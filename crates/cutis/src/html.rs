@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use base64::Engine;
 
 use crate::CostLedger;
-use crate::report::{Report, Wound};
+use crate::report::{ChainmailReport, Report, Wound};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
 h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse}\
@@ -92,7 +92,23 @@ fn tables(report: &Report) -> String {
             escape(&stage.on)
         );
     }
-    out.push_str("</table><h2>Constraints</h2><table><tr><th>kind</th><th>colours</th><th>RMS error / rest size</th><th>largest</th></tr>");
+    out.push_str("</table>");
+    out.push_str(&report.chainmail.as_ref().map_or_else(|| constraints(report), chainmail));
+    out.push_str(&costs(&report.ledger));
+    if let Some(r) = &report.resample {
+        let _ = write!(
+            out,
+            "<h2>Resampled CT</h2><p>{} voxels inside the deformed body, {} left as air, {} folds.</p>",
+            r.covered_voxels, r.vacated_voxels, r.folds
+        );
+    }
+    out
+}
+
+fn constraints(report: &Report) -> String {
+    let mut out = String::from(
+        "<h2>Constraints</h2><table><tr><th>kind</th><th>colours</th><th>RMS error / rest size</th><th>largest</th></tr>",
+    );
     for r in &report.residuals {
         let colors = report.colors.get(&r.kind).map(usize::to_string).unwrap_or_default();
         let _ = write!(
@@ -104,15 +120,22 @@ fn tables(report: &Report) -> String {
         );
     }
     out.push_str("</table>");
-    out.push_str(&costs(&report.ledger));
-    if let Some(r) = &report.resample {
-        let _ = write!(
-            out,
-            "<h2>Resampled CT</h2><p>{} voxels inside the deformed body, {} left as air, {} folds.</p>",
-            r.covered_voxels, r.vacated_voxels, r.folds
-        );
-    }
     out
+}
+
+fn chainmail(told: &ChainmailReport) -> String {
+    let rows = [
+        ("elements that moved", told.moved.to_string()),
+        ("links beyond their limits", told.violated_links.to_string()),
+        ("links cut", told.cut_links.to_string()),
+        ("system energy after the last drag", format!("{:.4e} mm²", told.energy_before)),
+        ("system energy at the end", format!("{:.4e} mm²", told.energy_after)),
+        ("sweeps of relaxation", told.relax_sweeps.to_string()),
+        ("relaxed to the end", if told.settled { "yes" } else { "no" }.into()),
+    ];
+    let row =
+        |(what, value): &(&str, String)| format!("<tr><td>{what}</td><td class=\"n\">{value}</td></tr>");
+    format!("<h2>ChainMail</h2><table>{}</table>", rows.iter().map(row).collect::<String>())
 }
 
 /// The cost ledger.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::backend::Chosen;
+use crate::motion::Motion;
 use crate::report::MemoryPart;
 
 /// Time after which the measurement of a plan ends, s; one substep is always measured.
@@ -111,6 +112,16 @@ pub(crate) fn of_substeps(
     }
     let how = format!("{done} substeps of the body at rest, on this machine as busy as it is now");
     Ok(bytes.with_times(&whole, f64::max(done, 1.0) / f64::from(settings.substeps), &how))
+}
+
+/// Measures the first frame of a body that is no longer needed.
+///
+/// # Errors
+/// As the frame gives them.
+pub(crate) fn of_first_frame(motion: &mut dyn Motion, bytes: CostLedger) -> Result<CostLedger, Error> {
+    let mut times = Ledger::default();
+    motion.step_timed(&mut times)?;
+    Ok(bytes.with_times(&times, 1.0, "the first frame, on this machine as busy as it is now"))
 }
 
 #[cfg(test)]

@@ -12,12 +12,13 @@
 //! ```
 //!
 //! The parts are crates of their own, re-exported here: [`volume`] (CT in and out), [`mesh`] (lattice, skin, incisions),
-//! [`constraints`], [`coloring`], [`solver`] and [`solver_cpu`], [`resample`] and [`render`]. This crate adds the scene file
+//! [`constraints`], [`coloring`], [`solver`] and [`solver_cpu`], [`chainmail`], [`resample`] and [`render`]. This crate adds the scene file
 //! ([`scene`]), the order of the stages, and what is written: a run folder with [`report::Report`].
 #![forbid(unsafe_code)]
 
 mod backend;
 mod body;
+mod chain;
 mod checkpoint;
 mod clock;
 mod demo;
@@ -31,6 +32,7 @@ mod frames;
 mod html;
 mod inspect;
 mod ledger;
+mod motion;
 mod output;
 mod pictures;
 mod plan;
@@ -43,6 +45,7 @@ mod source;
 mod system;
 pub mod tune;
 
+pub use cutis_chainmail as chainmail;
 pub use cutis_coloring as coloring;
 pub use cutis_constraints as constraints;
 #[cfg(feature = "gpu")]

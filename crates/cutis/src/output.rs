@@ -120,7 +120,7 @@ impl<'a> BodyWarp<'a> {
             tets: [mesh.tets.as_slice(), &shell.tets].concat(),
             rest: [mesh.positions.as_slice(), &shell.positions].concat(),
             deformed: [deformed, &followed].concat(),
-            removed: [body.taken.as_slice(), &shell.removed].concat(),
+            removed: [body.taken.tets.as_slice(), &shell.removed].concat(),
         })
     }
 

@@ -46,7 +46,7 @@ pub struct Report {
     pub stages: Vec<Stage>,
     /// Time per frame.
     pub frames: Frames,
-    /// Opening of each incision.
+    /// Opening of each incision; with one that is made later than at the start, `initial` is the body at rest.
     pub wounds: Vec<Wound>,
     /// Opening of the first incision, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -54,7 +54,10 @@ pub struct Report {
     /// The resampled CT, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resample: Option<Resample>,
-    /// Constraint errors at the end.
+    /// What ChainMail did, where it is the model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chainmail: Option<ChainmailReport>,
+    /// Constraint errors at the end; none with the model `chainmail`.
     pub residuals: Vec<KindResidual>,
     /// Largest distance that a vertex moved, mm.
     pub max_displacement_mm: f64,
@@ -233,6 +236,28 @@ pub struct Resample {
     pub folds: u64,
     /// Voxels that the body left or the incision took, now air.
     pub vacated_voxels: u64,
+}
+
+/// What ChainMail did. What its parts took is in the ledger.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChainmailReport {
+    /// Elements (vertices of the cut body) that are not where they rest.
+    pub moved: usize,
+    /// Links beyond their limits; 0 unless what must not move was pulled apart.
+    pub violated_links: usize,
+    /// Links that the incisions cut in this run.
+    pub cut_links: usize,
+    /// System energy after the last drag, before the relaxation that followed, mm²: half the sum of the squared differences of links
+    /// from rest.
+    pub energy_before: f64,
+    /// The same at the end, mm².
+    pub energy_after: f64,
+    /// Sweeps of relaxation in this run.
+    pub relax_sweeps: u64,
+    /// Times that relaxation changed a coordinate of an element.
+    pub relax_moves: u64,
+    /// Whether relaxation has come to its end.
+    pub settled: bool,
 }
 
 /// Error of one constraint kind.

@@ -4,14 +4,17 @@ use std::path::PathBuf;
 
 use cutis_mesh::WoundGape;
 
-use crate::backend::{Metered, Request, Stages};
+use crate::backend::{Chosen, Metered, Request, Stages};
+use crate::body::Body;
 use crate::checkpoint::{self, Checkpoint};
 use crate::clock::Clock;
+use crate::dynamics::Dynamics;
 use crate::files::RunFolder;
 use crate::frames::{Course, Finish, Timing, earlier_frames, frame_times, frames_csv};
+use crate::motion::{Chained, Motion, Stepped};
 use crate::output::{self, Outcome};
-use crate::plan::{self, Prepared};
-use crate::report::{KindResidual, Machine, Report, SCHEMA, Wound};
+use crate::plan::{self, Matter, Prepared};
+use crate::report::{Machine, Report, SCHEMA, Wound};
 use crate::scene::LoadedScene;
 use crate::{Error, Progress, files};
 
@@ -55,15 +58,9 @@ fn run_with(
 ) -> Result<Report, Error> {
     let mut clock = Clock::new(progress);
     let folder = RunFolder(options.out.clone());
-    let Prepared { source, body, dynamics, backend, mut plan } = plan::prepare(loaded, request, &mut clock)?;
-    let (system, settings) = (dynamics.system, dynamics.settings);
-    let mut running = if backend.on_gpu() {
-        clock
-            .stage_on("gpu", "start the GPU", 0, |_| backend.start(system, settings))
-            .map_err(loaded.blame("solver.backend"))?
-    } else {
-        backend.start(system, settings).map_err(loaded.blame("solver"))?
-    };
+    let Prepared { source, body, matter, backend, mut plan } = plan::prepare(loaded, request, &mut clock)?;
+    let (mut motion, device) = start(loaded, &body, matter, &backend, &mut clock)?;
+    let place = if device.is_some() { "gpu" } else { "cpu" };
     files::create_folder(&folder.0)?;
     plan.warnings.iter().for_each(|warning| progress.note(warning));
     let stale = folder.left_from_before(&loaded.scene.output);
@@ -86,10 +83,10 @@ fn run_with(
             let why = format!("it is at frame {}, and run.frames = {frames} lies before it", saved.frame);
             return Err(Error::Checkpoint { path: folder.checkpoint(), why });
         }
-        running.solver.restore(&saved.positions, &saved.velocities, u64::from(saved.frame))?;
+        motion.restore(&saved)?;
         resumed = Some(saved.frame);
     }
-    let timing = match (loaded.scene.output.report, running.place()) {
+    let timing = match (loaded.scene.output.report, place) {
         (false, _) => Timing::No,
         (true, "gpu") => Timing::OneMore,
         (true, _) => Timing::Throughout,
@@ -103,16 +100,15 @@ fn run_with(
         timing,
     };
     let todo = u64::from(frames.saturating_sub(course.done()));
-    let Finish { rows, positions: deformed, residuals, collapsed, times } =
-        clock.stage_on(running.place(), "simulate", todo, |progress| {
-            course.run(&mut *running.solver, progress)
-        })?;
-    collapsed.iter().for_each(|warning| progress.note(warning));
-    plan.warnings.extend(collapsed);
+    let Finish { rows, end, times } =
+        clock.stage_on(place, "simulate", todo, |progress| course.run(&mut *motion, progress))?;
+    // The body's memory on the device is free for the stages that follow.
+    drop(motion);
+    end.warnings.iter().for_each(|warning| progress.note(warning));
+    plan.warnings.extend(end.warnings);
+    let deformed = end.positions;
 
     let outcome = Outcome { loaded, source: &source, body: &body, deformed: &deformed, folder: &folder };
-    // The body's memory on the device is free for the stages that follow.
-    let device = running.into_device();
     let mut stages = Stages::on(device.as_ref().map(Metered::gpu));
     let products = output::write(&outcome, &mut stages, &mut clock)?;
     let at_rest: Vec<WoundGape> = body.cut.gapes.iter().map(|gape| gape.measure(rest)).collect();
@@ -148,7 +144,8 @@ fn run_with(
         wound: wounds.first().cloned(),
         wounds,
         resample: products.resample.clone(),
-        residuals: residuals.iter().map(KindResidual::from).collect(),
+        chainmail: end.chainmail,
+        residuals: end.residuals,
         max_displacement_mm,
         border_displacement_mm,
         left_out: plan.left_out,
@@ -161,6 +158,34 @@ fn run_with(
         report.write(&folder.report())?;
     }
     Ok(report)
+}
+
+/// Puts the body into motion; the device that it is on, if it is on one.
+fn start<'a>(
+    loaded: &LoadedScene,
+    body: &'a Body,
+    matter: Matter,
+    backend: &Chosen,
+    clock: &mut Clock<'_>,
+) -> Result<(Box<dyn Motion + 'a>, Option<Metered>), Error> {
+    match matter {
+        Matter::Chain(chain) => {
+            let chained = Chained::new(loaded, *chain, body, backend.chain_threads());
+            Ok((Box::new(chained.map_err(loaded.blame("solver.threads"))?), None))
+        }
+        Matter::Dynamics(dynamics) => {
+            let Dynamics { system, settings, .. } = *dynamics;
+            let running = if backend.on_gpu() {
+                clock
+                    .stage_on("gpu", "start the GPU", 0, |_| backend.start(system, settings))
+                    .map_err(loaded.blame("solver.backend"))?
+            } else {
+                backend.start(system, settings).map_err(loaded.blame("solver"))?
+            };
+            let (solver, device) = running.into_parts();
+            Ok((Box::new(Stepped(solver)), device))
+        }
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use cutis_mesh::Gape;
 use cutis_solver::{Settings, System};
 
 use crate::body::Body;
-use crate::scene::LoadedScene;
+use crate::scene::{LoadedScene, Model};
 use crate::{Error, dynamics, source};
 
 /// What a run of a scene steps, before its first frame.
@@ -33,10 +33,24 @@ pub struct SceneSystem {
 /// ```
 ///
 /// # Errors
-/// [`Error`] as a run of the scene would give it before its first frame.
+/// [`Error`] as a run of the scene would give it before its first frame; [`Error::SceneKey`] for a model without a system.
 pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
+    needs_system(loaded)?;
     let source = source::load(loaded)?;
     let body = Body::build(loaded, &source.volume)?;
     let dynamics = dynamics::build(loaded, &body)?;
     Ok(SceneSystem { system: dynamics.system, settings: dynamics.settings, gapes: body.cut.gapes })
+}
+
+/// Refuses a model that has no system of constraints.
+pub(crate) fn needs_system(loaded: &LoadedScene) -> Result<(), Error> {
+    if loaded.scene.model == Model::Pbd {
+        return Ok(());
+    }
+    Err(Error::SceneKey {
+        file: loaded.file.clone(),
+        key: "model".into(),
+        value: "\"chainmail\"".into(),
+        why: "has no constraints, substeps or iterations; this is for model = \"pbd\"".into(),
+    })
 }

@@ -1,6 +1,6 @@
 //! The examples that the model was described with: rows and sheets, several materials, combs, bones.
 
-use cutis_chainmail::{Blade, Chain, ChainError, Drag, Material, NO_MATERIAL, Order};
+use cutis_chainmail::{Blade, Chain, ChainError, Drag, Material, MaterialTable, NO_MATERIAL, Order};
 
 const SOFT: Material = Material::isotropic(0.5, 2.0, 0.25, 0.0);
 
@@ -192,4 +192,61 @@ fn what_cannot_be_done_is_refused_and_nothing_moves() {
         assert!(matches!(Chain::new([1; 3], [1.0; 3], &[wrong], vec![0]), Err(ChainError::Material { .. })));
     }
     assert!(Chain::new([1; 3], [0.0, 1.0, 1.0], &[SOFT], vec![0]).is_err());
+}
+
+/// A saved state goes on to the same bits, what could not follow included.
+#[test]
+fn a_restored_chain_goes_on_as_the_one_that_was_saved() {
+    let body = || {
+        let mut chain =
+            Chain::new([6, 3, 2], [1.0; 3], &[Material::isotropic(0.5, 1.5, 0.5, 0.0)], vec![0; 36]).unwrap();
+        chain.fix(&[0, 6]).unwrap();
+        chain
+    };
+    let pull = |x: f64| [Drag { element: 5, to: [x, 0.5, 0.0] }];
+    let mut saved = body();
+    saved.drag(&pull(20.0), Order::Fifo).unwrap();
+    saved.relax(2, &[5]);
+    assert!(!saved.strained().is_empty());
+    let units: Vec<(u32, [i32; 3])> = (0..36).map(|element| (element, saved.units(element))).collect();
+    let mut restored = body();
+    restored.restore(&units, saved.strained()).unwrap();
+    for chain in [&mut saved, &mut restored] {
+        chain.drag(&pull(7.0), Order::Slabs).unwrap();
+        assert_eq!(chain.violations().links, 0);
+        assert!(chain.relax(50, &[5]).moves > 0);
+    }
+    assert!((0..36).all(|element| saved.units(element) == restored.units(element)));
+
+    let wrong = |units: &[(u32, [i32; 3])], strained: &[u32]| body().restore(units, strained).unwrap_err();
+    assert!(matches!(wrong(&[(36, [0; 3])], &[]), ChainError::NoSuchElement { element: 36, .. }));
+    assert!(matches!(wrong(&[], &[99]), ChainError::NoSuchElement { element: 99, .. }));
+    assert!(matches!(wrong(&[(1, [0, i32::MIN, 0])], &[]), ChainError::TooFar { element: 1, .. }));
+}
+
+#[test]
+fn links_are_cut_by_name_as_by_asking() {
+    let body = || Chain::new([3, 3, 1], [1.0; 3], &[Material::RIGID], vec![0; 9]).unwrap();
+    let (mut named, mut asked) = (body(), body());
+    assert_eq!((named.links(), named.cut_links(&[[4, 1], [3, 4], [0, 4], [4, 77], [3, 4]])), (12, 2));
+    assert_eq!(asked.cut(|_, a, b| [[1, 4], [3, 4]].contains(&[a, b])), 2);
+    let neighbours =
+        |chain: &Chain| (0..9).map(|e| chain.neighbours(e).collect::<Vec<_>>()).collect::<Vec<_>>();
+    assert_eq!((neighbours(&named), named.links()), (neighbours(&asked), 10));
+}
+
+#[test]
+fn presets_begin_at_air_and_end_in_bone() {
+    for name in MaterialTable::PRESETS {
+        let table = MaterialTable::preset(name).unwrap();
+        assert!(table.lowest_hu() <= -1000.0 && table.at(-449.0).is_some());
+    }
+    let tissue = MaterialTable::preset("tissue").unwrap();
+    let at = |hu: f32| tissue.materials()[usize::from(tissue.at(hu).unwrap())];
+    assert_eq!(at(1000.0), Material::RIGID);
+    assert!(at(-100.0).longest[0] > at(40.0).longest[0] && at(40.0).longest[0] > 1.0);
+    let error = MaterialTable::preset("jelly").unwrap_err();
+    assert!(
+        matches!(error, ChainError::NoSuchPreset { .. }) && error.to_string().contains("tissue or uniform")
+    );
 }

@@ -43,3 +43,52 @@ pub fn least_move(chain: &Chain, drags: &[Drag]) -> [Option<Vec<i64>>; 3] {
         Some((0..count).map(|e| before[e].max(low[e]).min(high[e])).collect())
     })
 }
+
+/// Where elements must be after a sweep of relaxation, and how many coordinates change: every element is looked at, one after the
+/// other, in 64 bits. `k` is that of each element, in steps.
+pub fn sweep(chain: &Chain, k: impl Fn(u32) -> f64, held: &[u32]) -> (Vec<[i32; 3]>, u64) {
+    let count = chain.places() as u32;
+    let mut x: Vec<[i32; 3]> = (0..count).map(|element| chain.units(element)).collect();
+    let mut moves = 0;
+    let [nx, ny, _] = chain.shape().map(|n| n as u32);
+    let one = i64::from(UNITS_PER_STEP);
+    for odd in 0..2 {
+        for element in (0..count).filter(|e| (e % nx + e / nx % ny + e / (nx * ny)) % 2 == odd) {
+            if !chain.is_there(element) || chain.is_fixed(element) || held.contains(&element) {
+                continue;
+            }
+            for c in 0..3 {
+                let own = i64::from(x[element as usize][c]);
+                // Where each neighbour asks it to be, and from where to where it lets it be.
+                let mut asked = Vec::new();
+                for axis in 0..3 {
+                    let rest = if axis == c { one } else { 0 };
+                    if let Some((next, bounds)) = chain.link(element, axis) {
+                        let [lo, hi] = bounds[c].map(i64::from);
+                        let there = i64::from(x[next as usize][c]);
+                        asked.push((there - rest, there - hi, there - lo));
+                    }
+                    let stride = [1, nx, nx * ny][axis];
+                    let before = element.checked_sub(stride).and_then(|b| Some((b, chain.link(b, axis)?)));
+                    if let Some((before, (_, bounds))) = before.filter(|(_, (next, _))| *next == element) {
+                        let [lo, hi] = bounds[c].map(i64::from);
+                        let there = i64::from(x[before as usize][c]);
+                        asked.push((there + rest, there + lo, there + hi));
+                    }
+                }
+                if asked.is_empty() || asked.iter().any(|&(_, from, to)| own < from || own > to) {
+                    continue;
+                }
+                let sum: i64 = asked.iter().map(|(to, ..)| to - own).sum();
+                let mean = sum as f64 / asked.len() as f64;
+                let by = mean.signum() * (mean.abs() - 0.5).ceil().max(0.0);
+                let to = asked.iter().fold(own + by as i64, |to, &(_, from, most)| to.clamp(from, most));
+                if by.abs() >= (k(element) * one as f64).round().max(1.0) && to != own {
+                    x[element as usize][c] = to as i32;
+                    moves += 1;
+                }
+            }
+        }
+    }
+    (x, moves)
+}

@@ -52,6 +52,15 @@ fn summary(report: &Report, out: &Path) -> String {
             report.frames.ms_mean
         ),
     ];
+    lines.extend(report.chainmail.iter().map(|told| {
+        format!(
+            "chainmail: {} elements moved, {} links beyond their limits, {} sweeps of relaxation{}",
+            told.moved,
+            told.violated_links,
+            told.relax_sweeps,
+            if told.settled { " (settled)" } else { "" }
+        )
+    }));
     lines.extend(report.wounds.iter().map(|w| {
         format!("wound: {:.2} mm -> {:.2} mm ({:.2} mm in the middle)", w.initial_mm, w.final_mm, w.mid_mm)
     }));

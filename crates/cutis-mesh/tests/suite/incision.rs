@@ -66,7 +66,7 @@ fn removes_exactly_the_slit_and_parts_its_lips() {
         let (mut opened, mut skin) = (mesh.clone(), triangles.clone());
         let taken = cut.apply(&mut opened, &mut skin);
         assert_eq!(opened.tets.len() + taken.tets.len(), mesh.tets.len());
-        assert_eq!(opened.edges.len() + taken.edges, mesh.edges.len());
+        assert_eq!(opened.edges.len() + taken.edges.len(), mesh.edges.len());
         assert_eq!(skin.len() + taken.triangles, triangles.len());
         let gone = |v: &u32| cut.removed[*v as usize];
         assert!(!opened.tets.iter().flatten().any(gone) && !opened.edges.iter().flatten().any(gone));

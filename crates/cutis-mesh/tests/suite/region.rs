@@ -174,7 +174,13 @@ fn a_cut_in_a_region_is_the_cut_of_the_whole_body() {
         let taken = cut.apply(&mut mesh, &mut own);
         let lips: Vec<u32> = cut.gapes[0].left().iter().map(|&v| mesh.lattice_index[v as usize]).collect();
         let gape = cut.gapes[0].measure(&mesh.positions);
-        Ok::<_, MeshError>((points(&mesh, &taken.tets), taken.edges, taken.triangles, lips, gape))
+        Ok::<_, MeshError>((
+            points(&mesh, &taken.tets),
+            points(&mesh, &taken.edges),
+            taken.triangles,
+            lips,
+            gape,
+        ))
     };
     let all = body.mesh(&hu(body.lattice())).unwrap();
     let own = all.divide_skin(&skin).0;

@@ -121,7 +121,33 @@ impl Request {
     }
 }
 
+impl Request {
+    /// Settles what ChainMail runs on.
+    ///
+    /// # Errors
+    /// [`Error::Backend`] for a GPU.
+    pub(crate) fn settle_chain(self, loaded: &LoadedScene) -> Result<Chosen, Error> {
+        match self {
+            Self::Settled(chosen) if chosen.on_gpu() => {
+                let why = "ChainMail runs on the CPU; use \"cpu\" or \"auto\"".into();
+                Err(loaded.blame("solver.backend")(Error::Backend { backend: "gpu".into(), why }))
+            }
+            Self::Settled(chosen) => Ok(chosen),
+            Self::Auto => Ok(Chosen::cpu(loaded, "auto: ChainMail propagates on the CPU")),
+        }
+    }
+}
+
 impl Chosen {
+    /// Threads of ChainMail; none for one queue on one thread.
+    pub(crate) fn chain_threads(&self) -> Option<usize> {
+        match self.place {
+            Place::Reference => None,
+            Place::Cpu => Some(self.report.threads),
+            Place::Gpu(_) => Some(std::thread::available_parallelism().map_or(1, |n| n.get())),
+        }
+    }
+
     /// The CPU backend.
     fn cpu(loaded: &LoadedScene, reason: &str) -> Self {
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
@@ -191,14 +217,9 @@ impl Chosen {
 }
 
 impl Running {
-    /// Where it runs, for the stages of the report.
-    pub(crate) fn place(&self) -> &'static str {
-        if self.device.is_some() { "gpu" } else { "cpu" }
-    }
-
-    /// The device without the body.
-    pub(crate) fn into_device(self) -> Option<Metered> {
-        self.device
+    /// Body and device.
+    pub(crate) fn into_parts(self) -> (Box<dyn Solver<f32>>, Option<Metered>) {
+        (self.solver, self.device)
     }
 }
 

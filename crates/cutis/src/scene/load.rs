@@ -118,6 +118,9 @@ impl Scene {
                 why: e.inner().to_string().trim().replace('\n', " "),
             }
         })?;
+        if scene.model == super::Model::Chainmail {
+            scene.chainmail.get_or_insert_default();
+        }
         scene.validate(file)?;
         let overridden = overrides.iter().any(|o| o.key == "volume.path");
         if let Some(path) = scene.volume.path.as_mut()

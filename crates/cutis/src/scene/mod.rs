@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Deformation model; `"pbd"` is position-based dynamics.
+    /// Deformation model: position-based dynamics, or ChainMail.
     #[serde(default)]
     pub model: Model,
     /// Where the CT comes from.
@@ -36,10 +36,13 @@ pub struct Scene {
     /// The constraint kinds; a kind that is left out costs nothing.
     #[serde(default)]
     pub constraints: ConstraintsSection,
+    /// ChainMail, where it is the model. Left out: its defaults.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chainmail: Option<ChainmailSection>,
     /// What does not move.
     #[serde(default)]
     pub fixed: FixedSection,
-    /// Cuts, made before the first frame.
+    /// Cuts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incision: Vec<IncisionSection>,
     /// Spheres of tissue that are dragged along.

@@ -103,12 +103,14 @@ impl Scene {
     pub(super) fn validate(&self, file: &Path) -> Result<(), Error> {
         let check = Check { file };
         self.validate_body(&check)?;
+        self.validate_chainmail(&check)?;
         self.validate_constraints(&check)?;
         for (n, i) in self.incision.iter().enumerate() {
             check.point(&format!("incision[{n}].from_mm"), i.from_mm)?;
             check.point(&format!("incision[{n}].to_mm"), i.to_mm)?;
             check.positive(&format!("incision[{n}].depth_mm"), i.depth_mm)?;
             check.positive(&format!("incision[{n}].width_mm"), i.width_mm)?;
+            self.validate_time(&check, &format!("incision[{n}].at_s"), i.at_s)?;
             let to = format!("{:?}", i.to_mm);
             check.require(
                 i.from_mm != i.to_mm,
@@ -146,6 +148,25 @@ impl Scene {
         )?;
         check.point("solver.gravity_m_s2", s.gravity_m_s2)?;
         check.not_negative("solver.damping_per_s", s.damping_per_s)
+    }
+
+    /// The time of an incision: ChainMail alone can cut what has begun to move, and what is never cut is no incision.
+    fn validate_time(&self, check: &Check<'_>, key: &str, at_s: f64) -> Result<(), Error> {
+        check.not_negative(key, at_s)?;
+        let why = "must be 0 with model = \"pbd\", whose incisions are there from the start";
+        check.require(at_s == 0.0 || self.model == Model::Chainmail, key, at_s, why)?;
+        let last = f64::from(self.run.frames.saturating_sub(1)) * self.solver.dt_s;
+        let why = format!("must not lie after the beginning of the last frame, at {last} s (run.frames)");
+        check.require(at_s <= last || at_s == 0.0, key, at_s, &why)
+    }
+
+    fn validate_chainmail(&self, check: &Check<'_>) -> Result<(), Error> {
+        if let Some(chainmail) = &self.chainmail {
+            chainmail.table(check.file, &self.tissue)?;
+        }
+        let even = self.model != Model::Chainmail || self.lattice.grading.is_none();
+        let why = "must be left out with model = \"chainmail\", whose links all have the lattice's one step";
+        check.require(even, "lattice.grading", "", why)
     }
 
     fn validate_body(&self, check: &Check<'_>) -> Result<(), Error> {

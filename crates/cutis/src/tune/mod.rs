@@ -28,6 +28,7 @@ use crate::dynamics::{self, Dynamics};
 use crate::plan::{self, Prepared};
 use crate::report::Machine;
 use crate::scene::{FormulationChoice, LoadedScene};
+use crate::system::needs_system;
 use crate::{CostLedger, Error, Progress};
 
 use bench::Bench;
@@ -69,6 +70,7 @@ pub struct TuneOptions {
 /// [`Error::SceneKey`] and [`Error::Request`] for what cannot be tuned; others as a run of the scene would give them. That no
 /// setting meets the demand is none: see [`Tuning::unmet`].
 pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress) -> Result<Tuning, Error> {
+    needs_system(loaded)?;
     check(loaded, options)?;
     let copy = Copy::to(&options.out, options.overwrite, loaded)?;
     let mut clock = Clock::new(progress);

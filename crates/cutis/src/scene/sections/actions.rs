@@ -60,7 +60,7 @@ pub struct PlaneSection {
     pub normal: [f64; 3],
 }
 
-/// A static incision: the paper's, with a mid-surface that always parts the lips.
+/// An incision: the paper's, with a mid-surface that always parts the lips. It is placed on the body at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IncisionSection {
@@ -72,6 +72,9 @@ pub struct IncisionSection {
     pub depth_mm: f64,
     /// Width of the removed strip, mm.
     pub width_mm: f64,
+    /// Time from which on it is there, s; later than 0 with the model `chainmail` only.
+    #[serde(default)]
+    pub at_s: f64,
 }
 
 /// Tissue that is dragged along a straight line.

@@ -14,6 +14,8 @@ pub enum Model {
     /// Position-based dynamics over a tetrahedral lattice.
     #[default]
     Pbd,
+    /// ChainMail: links between the points of the lattice, which give way up to a limit.
+    Chainmail,
 }
 
 /// Where the CT comes from: exactly one of `path` and `phantom`.

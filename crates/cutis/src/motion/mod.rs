@@ -1,0 +1,48 @@
+//! What moves the body from frame to frame: one trait for all models.
+
+mod chained;
+mod stepped;
+
+use cutis_solver::Ledger;
+use nalgebra::Point3;
+
+use crate::Error;
+use crate::checkpoint::Checkpoint;
+use crate::report::{ChainmailReport, KindResidual};
+
+pub(crate) use chained::Chained;
+pub(crate) use stepped::Stepped;
+
+/// A body in motion.
+pub(crate) trait Motion {
+    /// Goes on from a saved state.
+    fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error>;
+
+    /// Runs a frame.
+    fn step(&mut self) -> Result<(), Error>;
+
+    /// As [`step`](Self::step), with the same bits, and enters how long each part took.
+    fn step_timed(&mut self, ledger: &mut Ledger) -> Result<(), Error>;
+
+    /// Time since the start of the first frame, s.
+    fn time_s(&self) -> f64;
+
+    /// Where chosen vertices are, in local metres.
+    fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error>;
+
+    /// The state after so many frames.
+    fn save(&mut self, frame: u32) -> Result<Checkpoint, Error>;
+
+    /// What is told of a finished run.
+    fn end(&mut self) -> Result<End, Error>;
+}
+
+/// The end of a run.
+#[derive(Default)]
+pub(crate) struct End {
+    /// Local metres, one per vertex.
+    pub(crate) positions: Vec<Point3<f32>>,
+    pub(crate) residuals: Vec<KindResidual>,
+    pub(crate) chainmail: Option<ChainmailReport>,
+    pub(crate) warnings: Vec<String>,
+}

@@ -1,0 +1,61 @@
+//! A body that a solver steps.
+
+use cutis_solver::{Ledger, Solver};
+use nalgebra::{Point3, Vector3};
+
+use super::{End, Motion};
+use crate::Error;
+use crate::checkpoint::Checkpoint;
+use crate::report::KindResidual;
+
+/// The value over rest size from which on a constraint that cannot act is told of.
+const VIOLATED: f64 = 0.01;
+
+/// A solver with a body in it.
+pub(crate) struct Stepped(pub(crate) Box<dyn Solver<f32>>);
+
+impl Motion for Stepped {
+    fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
+        let velocities: Vec<Vector3<f32>> = saved
+            .words
+            .chunks_exact(3)
+            .map(|v| Vector3::from_fn(|axis, _| f32::from_bits(v[axis])))
+            .collect();
+        Ok(self.0.restore(&saved.positions, &velocities, u64::from(saved.frame))?)
+    }
+
+    fn step(&mut self) -> Result<(), Error> {
+        Ok(self.0.step(1)?)
+    }
+
+    fn step_timed(&mut self, ledger: &mut Ledger) -> Result<(), Error> {
+        Ok(self.0.step_timed(1, ledger)?)
+    }
+
+    fn time_s(&self) -> f64 {
+        self.0.time_s()
+    }
+
+    fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error> {
+        Ok(self.0.positions_of(vertices)?)
+    }
+
+    fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {
+        let positions = self.0.positions()?;
+        let words = self.0.velocities()?.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits)).collect();
+        Ok(Checkpoint { frame, positions, words })
+    }
+
+    /// The whole body comes to the host for its positions: measured there, residuals cost a device nothing, and a lack of room on it
+    /// cannot take a finished run.
+    fn end(&mut self) -> Result<End, Error> {
+        let system = self.0.system()?;
+        let collapsed = system.check_collapsed(VIOLATED).err().map(|error| error.to_string());
+        Ok(End {
+            positions: system.positions(),
+            residuals: system.residuals().iter().map(KindResidual::from).collect(),
+            warnings: collapsed.into_iter().collect(),
+            chainmail: None,
+        })
+    }
+}
