@@ -36,6 +36,18 @@ impl Limits {
         self.bounds[coordinate][pair][axis]
     }
 
+    /// All of a coordinate: lowest and highest, by pair and axis.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn table(&self, coordinate: usize) -> Vec<[i32; 2]> {
+        self.bounds[coordinate].iter().flatten().map(|bounds| [bounds.lo, bounds.hi]).collect()
+    }
+
+    /// `k` of every material, in units.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn all_k(&self) -> &[i32] {
+        &self.k
+    }
+
     /// Number of a pair of materials.
     #[inline]
     pub(crate) fn pair(&self, a: u8, b: u8) -> usize {

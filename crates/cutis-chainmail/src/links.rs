@@ -58,6 +58,12 @@ impl Links {
         self.shape
     }
 
+    /// A byte for each element, as the kernels of a GPU read it.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bits(&self) -> &[u8] {
+        &self.bits
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.bits.len()
     }
