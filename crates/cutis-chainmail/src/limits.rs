@@ -97,4 +97,13 @@ mod tests {
         assert_eq!((of(0, 0, 1, 0), of(0, 1, 1, 0)), ([-0.5, 0.5], [-0.25, 0.25]));
         assert_eq!([0, 1].map(|material| limits.k(material)), [1, 1]);
     }
+
+    /// A unit more would be beyond what the material allows.
+    #[test]
+    fn limits_are_rounded_inwards() {
+        let odd = Material { shear: [0.1, 0.1, 0.1], ..Material::isotropic(0.7, 1.1, 0.0, 0.0) };
+        let limits = Limits::new(&[odd], [1.0; 3]);
+        assert_eq!(limits.of(0, 0, 0), Bounds { lo: 45_876, hi: 72_089 }, "0.7 and 1.1 of 65536");
+        assert_eq!(limits.of(1, 0, 0), Bounds { lo: -6_553, hi: 6_553 });
+    }
 }
