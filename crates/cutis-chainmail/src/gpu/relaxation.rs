@@ -17,6 +17,24 @@ const ELEMENTS_AT_ONCE: usize = 1 << 28;
 /// Relaxation on a GPU, for chains of one shape and number of materials.
 ///
 /// 14 bytes on the device for each place of the grid, in buffers of whole planes that fit its limits; see [`RelaxGpu::bytes`].
+///
+/// ```
+/// use cutis_chainmail::{Chain, Drag, Material, Order, RelaxGpu};
+/// use cutis_gpu::{Gpu, GpuError, GpuOptions};
+///
+/// let gpu = match Gpu::open(&GpuOptions::default()) {
+///     Err(GpuError::NoAdapter) => return Ok(()), // nothing to run on
+///     opened => opened?,
+/// };
+/// let soft = Material::isotropic(0.5, 2.0, 0.5, 0.0);
+/// let mut chain = Chain::new([9, 1, 1], [1.0; 3], &[soft], vec![0; 9])?;
+/// chain.drag(&[Drag { element: 8, to: [12.0, 0.0, 0.0] }], Order::Fifo)?;
+/// let mut same = chain.clone();
+/// let relaxed = RelaxGpu::new(&gpu, &chain)?.relax(&mut chain, 1000, &[8])?;
+/// assert_eq!(relaxed, same.relax(1000, &[8]));
+/// assert_eq!(chain.units(4), same.units(4));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct RelaxGpu {
     gpu: Gpu,
     kernel: Kernel,
