@@ -52,7 +52,7 @@ fn many_sweeps_are_one_submit_and_one_readback() {
 
     let none = during(&gpu, || assert_eq!(device.relax(&mut bar, 0, &[]).unwrap().sweeps, 0));
     assert_eq!((none.writes, none.submits, none.readbacks), (0, 0, 0));
-    let settled = device.relax(&mut bar, u32::MAX, &[]).unwrap();
+    let settled = device.relax(&mut bar, 20_000, &[]).unwrap();
     assert!(settled.settled && settled.sweeps > 64, "{settled:?}");
     let still = during(&gpu, || assert_eq!(device.relax(&mut bar, 9, &[]).unwrap().sweeps, 1));
     assert_eq!(still.readbacks, 1, "what did not move is not read");
