@@ -4,6 +4,7 @@
 //! choice of parts, not a condition inside one.
 #![forbid(unsafe_code)]
 
+pub mod chainmail;
 pub mod constraints;
 pub mod render;
 pub mod resample;

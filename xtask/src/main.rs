@@ -17,6 +17,7 @@ mod workspace;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
+use mutations::Choice;
 use workspace::Workspace;
 
 const USAGE: &str = "\
@@ -36,7 +37,8 @@ usage: cargo xtask COMMAND
   accuracy [OPTIONS]  error against run time, for each problem and setting, against direct solutions in f64; `accuracy --help`
                       lists the options, --write writes docs/results/accuracy.md
   mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
-                      with a text only those whose description contains it, and nothing is written
+                      with a text only those whose description contains it, and nothing is written; with --suite NAME
+                      those that one suite of tests must see, and only its section is written
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
   leaving-out         what a region or a graded lattice saves and costs, against the whole body: docs/results/
   tuning              `cutis tune` on the demo, and whether a full run keeps what it promises: docs/results/
@@ -74,8 +76,9 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
             return workspace::exit_code(&mut steps::accuracy_command(&workspace, arguments));
         }
         ["parity-page"] => parity::run(&workspace),
-        ["mutations"] => mutations::run(&workspace, ""),
-        ["mutations", filter] => mutations::run(&workspace, filter),
+        ["mutations"] => mutations::run(&workspace, Choice::All),
+        ["mutations", "--suite", name] => mutations::run(&workspace, Choice::Suite(name)),
+        ["mutations", text] => mutations::run(&workspace, Choice::Containing(text)),
         ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
         ["leaving-out"] => steps::build_program(&workspace).and_then(|()| leaving_out::run(&workspace)),
         ["tuning"] => steps::build_program(&workspace).and_then(|()| tuning::run(&workspace)),

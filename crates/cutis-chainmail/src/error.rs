@@ -108,4 +108,23 @@ pub enum ChainError {
         /// Where it was told to go, in steps.
         to: [f64; 3],
     },
+    /// A chain of another shape, or of another number of materials, than the device was prepared for.
+    #[cfg(feature = "gpu")]
+    #[error(
+        "the GPU was prepared for a chain of {of_shape:?} elements and {of_materials} materials, and this one has {shape:?} and {materials}"
+    )]
+    OtherChain {
+        /// Elements along each axis.
+        shape: [usize; 3],
+        /// Number of materials.
+        materials: usize,
+        /// Elements along each axis of the chain that the device was prepared for.
+        of_shape: [usize; 3],
+        /// Number of its materials.
+        of_materials: usize,
+    },
+    /// The GPU refused or failed.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] cutis_gpu::GpuError),
 }

@@ -37,6 +37,8 @@
 //!
 //! Coordinates are in steps of the grid along its axes, with 16 binary places in 32 bits ([`UNITS_PER_STEP`]): at 1 mm they
 //! are 15 nm apart. All arithmetic is exact, and what is told in steps is rounded once, on the way in.
+//!
+//! With the feature `gpu` a GPU relaxes a chain, to the same bits: `RelaxGpu`.
 
 mod blade;
 mod census;
@@ -44,6 +46,8 @@ mod chain;
 mod classic;
 mod energy;
 mod error;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod limits;
 mod links;
 mod material;
@@ -59,6 +63,8 @@ pub use chain::{Chain, NO_MATERIAL};
 pub use classic::ClassicMoved;
 pub use energy::{LinkViolation, Violations};
 pub use error::ChainError;
+#[cfg(feature = "gpu")]
+pub use gpu::RelaxGpu;
 pub use material::{Material, MaterialTable};
 pub use relax::Relaxation;
 pub use units::UNITS_PER_STEP;

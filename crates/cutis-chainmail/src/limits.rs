@@ -36,6 +36,18 @@ impl Limits {
         self.bounds[coordinate][pair][axis]
     }
 
+    /// All of a coordinate: lowest and highest, by pair and axis.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn table(&self, coordinate: usize) -> Vec<[i32; 2]> {
+        self.bounds[coordinate].iter().flatten().map(|bounds| [bounds.lo, bounds.hi]).collect()
+    }
+
+    /// `k` of every material, in units.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn all_k(&self) -> &[i32] {
+        &self.k
+    }
+
     /// Number of a pair of materials.
     #[inline]
     pub(crate) fn pair(&self, a: u8, b: u8) -> usize {
@@ -84,5 +96,14 @@ mod tests {
         // A link along y is 2 mm long; across it, a quarter of that is half a step along x.
         assert_eq!((of(0, 0, 1, 0), of(0, 1, 1, 0)), ([-0.5, 0.5], [-0.25, 0.25]));
         assert_eq!([0, 1].map(|material| limits.k(material)), [1, 1]);
+    }
+
+    /// A unit more would be beyond what the material allows.
+    #[test]
+    fn limits_are_rounded_inwards() {
+        let odd = Material { shear: [0.1, 0.1, 0.1], ..Material::isotropic(0.7, 1.1, 0.0, 0.0) };
+        let limits = Limits::new(&[odd], [1.0; 3]);
+        assert_eq!(limits.of(0, 0, 0), Bounds { lo: 45_876, hi: 72_089 }, "0.7 and 1.1 of 65536");
+        assert_eq!(limits.of(1, 0, 0), Bounds { lo: -6_553, hi: 6_553 });
     }
 }

@@ -58,6 +58,12 @@ impl Links {
         self.shape
     }
 
+    /// A byte for each element, as the kernels of a GPU read it.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bits(&self) -> &[u8] {
+        &self.bits
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.bits.len()
     }
@@ -90,7 +96,7 @@ impl Links {
 
     /// The byte of an element.
     #[inline]
-    pub(crate) fn bits(&self, element: usize) -> u8 {
+    pub(crate) fn bits_of(&self, element: usize) -> u8 {
         self.bits[element]
     }
 

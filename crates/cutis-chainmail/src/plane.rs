@@ -127,7 +127,7 @@ impl Plane<'_> {
     fn relax_one(&mut self, place: usize) -> bool {
         let (body, nx) = (self.body, self.body.links.shape()[0]);
         let element = self.k * self.x.len() + place;
-        let (material, bits) = (body.materials[element], body.links.bits(element));
+        let (material, bits) = (body.materials[element], body.links.bits_of(element));
         let plane = self.x.len();
         let x = self.x[place];
         let (mut count, mut sum, mut lowest, mut highest) = (0_u32, 0_i32, i32::MIN, i32::MAX);

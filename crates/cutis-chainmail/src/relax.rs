@@ -57,13 +57,15 @@ impl Chain {
             let moved = |row: usize| odd.iter().any(|rows| rows[row]);
             self.changed = (0..ny * nz).map(moved).collect();
         }
-        for (&element, &state) in held.iter().zip(&free).rev() {
-            census[element as usize] = state;
-            // Once it is let go, it may move.
-            self.mark_changed(element);
-        }
+        held.iter().zip(&free).rev().for_each(|(&element, &state)| census[element as usize] = state);
+        self.mark_held(&held);
         self.census = census;
         done
+    }
+
+    /// Notes what was held by a relaxation: once it is let go, it may move.
+    pub(crate) fn mark_held(&mut self, held: &[u32]) {
+        held.iter().for_each(|&element| self.mark_changed(element));
     }
 
     /// Moves the elements whose `i + j + k` is even, or odd: first those of every second plane, which see the planes between as they are,

@@ -86,10 +86,10 @@ fn run_with(
         motion.restore(&saved)?;
         resumed = Some(saved.frame);
     }
-    let timing = match (loaded.scene.output.report, place) {
+    let timing = match (loaded.scene.output.report, motion.waits()) {
         (false, _) => Timing::No,
-        (true, "gpu") => Timing::OneMore,
-        (true, _) => Timing::Throughout,
+        (true, true) => Timing::Throughout,
+        (true, false) => Timing::OneMore,
     };
     let course = Course {
         run: &loaded.scene.run,
@@ -170,8 +170,15 @@ fn start<'a>(
 ) -> Result<(Box<dyn Motion + 'a>, Option<Metered>), Error> {
     match matter {
         Matter::Chain(chain) => {
-            let chained = Chained::new(loaded, *chain, body, backend.chain_threads());
-            Ok((Box::new(chained.map_err(loaded.blame("solver.threads"))?), None))
+            let started = if backend.on_gpu() {
+                let start = |_: &dyn Progress| backend.start_chain(&chain.chain);
+                clock.stage_on("gpu", "start the GPU", 0, start).map_err(loaded.blame("solver.backend"))?
+            } else {
+                None
+            };
+            let (relaxer, device) = started.unzip();
+            let chained = Chained::new(loaded, *chain, body, backend.chain_threads(), relaxer);
+            Ok((Box::new(chained.map_err(loaded.blame("solver.threads"))?), device))
         }
         Matter::Dynamics(dynamics) => {
             let Dynamics { system, settings, .. } = *dynamics;
@@ -183,7 +190,7 @@ fn start<'a>(
                 backend.start(system, settings).map_err(loaded.blame("solver"))?
             };
             let (solver, device) = running.into_parts();
-            Ok((Box::new(Stepped(solver)), device))
+            Ok((Box::new(Stepped { solver, on_device: device.is_some() }), device))
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Every joined source is valid WGSL within WebGPU's baseline.
 
+mod chainmail;
 mod render;
 mod resample;
 mod solver;

@@ -27,11 +27,25 @@ pub enum Suite {
     Problems,
     /// The quick part of the stability suite, on the CPU and on a GPU.
     Stability,
+    /// ChainMail, on the CPU and on a GPU.
+    ChainMail,
 }
 
 impl Suite {
-    pub const ALL: [Self; 5] =
-        [Self::Conformance, Self::Solver, Self::Resample, Self::Problems, Self::Stability];
+    pub const ALL: [Self; 6] =
+        [Self::Conformance, Self::Solver, Self::Resample, Self::Problems, Self::Stability, Self::ChainMail];
+
+    /// As on the command line and in the page.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Conformance => "conformance",
+            Self::Solver => "solver",
+            Self::Resample => "resample",
+            Self::Problems => "problems",
+            Self::Stability => "stability",
+            Self::ChainMail => "chainmail",
+        }
+    }
 
     /// Arguments of `cargo test`.
     pub fn arguments(self) -> &'static [&'static str] {
@@ -41,6 +55,7 @@ impl Suite {
             Self::Resample => &["-p", "cutis-resample", "--features", "gpu", "--test", "gpu"],
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],
             Self::Stability => &["-p", "cutis-tests", "--test", "all", "stability::"],
+            Self::ChainMail => &["-p", "cutis-chainmail", "--features", "gpu", "--tests"],
         }
     }
 }

@@ -1,81 +1,86 @@
 //! `cargo xtask mutations`: faults put in on purpose, one at a time, in a copy of the checkout; each must make a test fail.
 //! Writes which test saw which fault to `docs/results/mutations.md`.
 
+mod chainmail;
 mod list;
+mod page;
 mod stability;
 
-use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 
+use self::chainmail::CHAINMAIL;
 use self::list::{MUTATIONS, Mutation, Suite};
+use self::page::{Section, row};
 use self::stability::STABILITY;
 use crate::vulkan;
 use crate::workspace::{Workspace, execute};
 
-/// Names of tests that stand in the table for one fault; the others are counted.
-const NAMED: usize = 2;
+/// Where the page lies.
+const PAGE: &str = "docs/results/mutations.md";
 
 /// Every fault.
 fn all() -> impl Iterator<Item = &'static Mutation> {
-    MUTATIONS.iter().chain(STABILITY)
+    MUTATIONS.iter().chain(STABILITY).chain(CHAINMAIL)
 }
 
-/// Tries every fault whose description contains `filter`; writes the page only when all were tried.
-pub fn run(workspace: &Workspace, filter: &str) -> Result<()> {
+/// Which faults are tried.
+#[derive(Clone, Copy, Debug)]
+pub enum Choice<'a> {
+    /// All of them.
+    All,
+    /// Those of the suite of this name.
+    Suite(&'a str),
+    /// Those whose description contains this.
+    Containing(&'a str),
+}
+
+impl Choice<'_> {
+    fn takes(self, mutation: &Mutation) -> bool {
+        match self {
+            Self::All => true,
+            Self::Suite(name) => mutation.suite.name() == name,
+            Self::Containing(text) => mutation.fault.contains(text),
+        }
+    }
+}
+
+/// Tries the faults; writes the sections of the page whose suites were tried as a whole by name.
+pub fn run(workspace: &Workspace, choice: Choice<'_>) -> Result<()> {
+    let chosen: Vec<&Mutation> = all().filter(|mutation| choice.takes(mutation)).collect();
+    ensure!(!chosen.is_empty(), "there is no fault of this kind: {choice:?}");
     let adapters = vulkan::require(workspace)?;
     let copy = Copy::new(workspace)?;
-    let chosen: Vec<&Mutation> = all().filter(|mutation| mutation.fault.contains(filter)).collect();
-    ensure!(!chosen.is_empty(), "no fault's description contains `{filter}`");
-    for suite in Suite::ALL.into_iter().filter(|suite| chosen.iter().any(|m| m.suite == *suite)) {
+    let suites = Suite::ALL.into_iter().filter(|suite| chosen.iter().any(|m| m.suite == *suite));
+    let (mut sections, mut unseen, mut tried) = (Vec::new(), Vec::new(), 0);
+    for suite in suites {
         let failed = copy.failing_tests(suite)?;
         ensure!(failed.is_empty(), "{suite:?} fails without any fault: {}", failed.join(", "));
-    }
-    let (mut rows, mut unseen) = (String::new(), Vec::new());
-    for (number, mutation) in (1..).zip(&chosen) {
-        let failed = copy.with(mutation, || copy.failing_tests(mutation.suite))?;
-        println!("{number}/{} {}: {} tests failed", chosen.len(), mutation.fault, failed.len());
-        if failed.is_empty() {
-            unseen.push(mutation.fault);
+        let mut rows = Vec::new();
+        for mutation in chosen.iter().filter(|mutation| mutation.suite == suite) {
+            let failed = copy.with(mutation, || copy.failing_tests(suite))?;
+            tried += 1;
+            println!("{tried}/{} {}: {} tests failed", chosen.len(), mutation.fault, failed.len());
+            if failed.is_empty() {
+                unseen.push(mutation.fault);
+            }
+            rows.push(row(rows.len() + 1, mutation, &failed));
         }
-        writeln!(rows, "{}", row(number, mutation, &failed))?;
+        sections.push(Section::new(suite, &rows, &copy.commit()?, &adapters));
     }
-    let commit = copy.commit()?;
     copy.remove(workspace)?;
     if !unseen.is_empty() {
         bail!("no test saw: {}", unseen.join("; "));
     }
-    if filter.is_empty() {
-        let path = workspace.root.join("docs/results/mutations.md");
-        fs::write(&path, page(&rows, chosen.len(), &commit, &adapters))?;
+    if !matches!(choice, Choice::Containing(_)) {
+        let path = workspace.root.join(PAGE);
+        let before = if path.exists() { fs::read_to_string(&path)? } else { String::new() };
+        fs::write(&path, page::with(&before, &sections)?)?;
         println!("written: {}", path.display());
     }
     Ok(())
-}
-
-fn row(number: usize, mutation: &Mutation, failed: &[String]) -> String {
-    let names: Vec<String> = failed.iter().take(NAMED).map(|name| format!("`{name}`")).collect();
-    let more = match failed.len().saturating_sub(NAMED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|");
-    let code = |text: &str| format!("`{}`", words(text));
-    let file = Path::new(mutation.file).file_name().unwrap_or_default().to_string_lossy();
-    let (fault, from, to) = (mutation.fault, code(mutation.from), code(mutation.to));
-    format!("| {number} | {fault} | {file}: {from} → {to} | {}{more} |", names.join(", "))
-}
-
-fn page(rows: &str, count: usize, commit: &str, adapters: &str) -> String {
-    format!(
-        "# Mutations\n\n\
-         {count} faults, put in one at a time; each made at least one test fail. Without a fault all of these tests passed in the same\n\
-         run. Written by `cargo xtask mutations` at commit {commit}; adapters: {adapters}. The lists are\n\
-         in `xtask/src/mutations/`.\n\n\
-         | | fault | change | seen by |\n|---|---|---|---|\n{rows}"
-    )
 }
 
 /// A copy of the last commit, with a folder of builds of its own.
@@ -152,15 +157,6 @@ mod tests {
         assert!(failed_tests("test result: FAILED. 2 passed").is_empty());
     }
 
-    #[test]
-    fn the_page_says_where_it_was_written() {
-        let text = page("| 1 |\n", 1, "0123abc", "card (driver 1.0)");
-        assert!(
-            text.contains("commit 0123abc; adapters: card (driver 1.0).") && text.ends_with("| 1 |\n"),
-            "{text}"
-        );
-    }
-
     /// Every fault can be put in: its text stands in its file exactly once, and the change is one.
     #[test]
     fn every_fault_has_its_place() {
@@ -170,14 +166,13 @@ mod tests {
             assert_eq!(text.matches(mutation.from).count(), 1, "{}: {}", mutation.file, mutation.from);
             assert_ne!(mutation.from, mutation.to, "{}", mutation.fault);
         }
-        assert!(MUTATIONS.len() >= 20);
+        assert!(MUTATIONS.len() >= 20 && CHAINMAIL.len() >= 14);
     }
 
     /// The page in the repository was written after the last fault was added.
     #[test]
     fn the_page_names_every_fault() {
-        let text =
-            fs::read_to_string(Workspace::find().unwrap().root.join("docs/results/mutations.md")).unwrap();
+        let text = fs::read_to_string(Workspace::find().unwrap().root.join(PAGE)).unwrap();
         let rows = text.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| |")).count();
         assert_eq!(rows, all().count());
         for mutation in all() {

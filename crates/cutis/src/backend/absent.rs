@@ -1,11 +1,12 @@
 //! A build without the feature `gpu`: a GPU is refused by name, and `auto` takes the CPU and says why.
 
+use cutis_chainmail::{Chain, ChainError, Relaxation};
 use cutis_render::{Image, RenderError, View};
 use cutis_resample::{ResampleError, ResampleReport, Warp};
 use cutis_solver::{Settings, System};
 use cutis_volume::Volume;
 
-use super::{Chosen, Running, Work};
+use super::{Chosen, Metered, Running, Work};
 use crate::report::{DeviceWork, MemoryPart};
 use crate::scene::LoadedScene;
 use crate::{Devices, Error};
@@ -51,6 +52,23 @@ pub(super) fn open(device: &Device) -> Result<Gpu, Error> {
 }
 
 pub(super) fn start(device: &Device, _: System<f32>, _: Settings) -> Result<Running, Error> {
+    match *device {}
+}
+
+/// Relaxation on no device.
+pub(crate) enum Relaxer {}
+
+impl Relaxer {
+    pub(crate) fn relax(&mut self, _: &mut Chain, _: u32, _: &[u32]) -> Result<Relaxation, ChainError> {
+        match *self {}
+    }
+}
+
+pub(super) fn start_chain(device: &Device, _: &Chain) -> Result<(Relaxer, Metered), Error> {
+    match *device {}
+}
+
+pub(super) fn chain_memory(device: &Device, _: &Chain) -> Vec<MemoryPart> {
     match *device {}
 }
 

@@ -1,5 +1,6 @@
 //! GPUs: which adapter a scene means, which there are, and opening one.
 
+use cutis_chainmail::{Chain, ChainError};
 use cutis_gpu::{Adapter, AdapterKind, GpuError, GpuOptions, Select, adapters};
 use cutis_render::RenderError;
 use cutis_resample::ResampleError;
@@ -13,6 +14,7 @@ use crate::report::{Backend, DeviceWork, MemoryPart};
 use crate::scene::LoadedScene;
 use crate::{Devices, Error};
 
+pub(crate) use cutis_chainmail::RelaxGpu as Relaxer;
 pub(crate) use cutis_gpu::Gpu;
 pub(super) use cutis_render::raymarch_gpu as raymarch;
 pub(super) use cutis_resample::resample_gpu as resample;
@@ -166,6 +168,21 @@ pub(super) fn start(device: &Device, system: System<f32>, settings: Settings) ->
         other => Error::Backend { backend: "gpu".into(), why: other.to_string() },
     })?;
     Ok(Running { solver: Box::new(solver), device: Some(Metered { gpu, before }) })
+}
+
+/// Opens the device and makes room for a chain.
+pub(super) fn start_chain(device: &Device, chain: &Chain) -> Result<(Relaxer, Metered), Error> {
+    let gpu = open(device)?;
+    let before = work(&gpu);
+    let relaxer = Relaxer::new(&gpu, chain).map_err(|error| match error {
+        ChainError::Gpu(error) => Error::Gpu(error),
+        other => Error::Chain(other),
+    })?;
+    Ok((relaxer, Metered { gpu, before }))
+}
+
+pub(super) fn chain_memory(_: &Device, chain: &Chain) -> Vec<MemoryPart> {
+    vec![MemoryPart { part: "relaxation".into(), bytes: Relaxer::BYTES_PER_PLACE * chain.places() }]
 }
 
 /// Whether a stage failed for want of room or of the device, as against a fault of a kernel.

@@ -10,6 +10,7 @@ mod auto;
 mod gpu;
 mod stages;
 
+use cutis_chainmail::Chain;
 use cutis_solver::{Settings, Solver, SolverReference, System};
 use cutis_solver_cpu::SolverCpu;
 
@@ -18,7 +19,7 @@ use crate::report::{Backend, DeviceWork, MemoryPart};
 use crate::scene::{BackendChoice, LoadedScene};
 use gpu::Gpu;
 
-pub(crate) use gpu::{ABSENT, devices};
+pub(crate) use gpu::{ABSENT, Relaxer, devices};
 pub(crate) use stages::Stages;
 
 /// What a scene asks for, as far as it can be settled without a body.
@@ -122,29 +123,40 @@ impl Request {
 }
 
 impl Request {
-    /// Settles what ChainMail runs on.
-    ///
-    /// # Errors
-    /// [`Error::Backend`] for a GPU.
-    pub(crate) fn settle_chain(self, loaded: &LoadedScene) -> Result<Chosen, Error> {
+    /// Settles what ChainMail relaxes on; it propagates on the CPU.
+    pub(crate) fn settle_chain(self, loaded: &LoadedScene) -> Chosen {
         match self {
-            Self::Settled(chosen) if chosen.on_gpu() => {
-                let why = "ChainMail runs on the CPU; use \"cpu\" or \"auto\"".into();
-                Err(loaded.blame("solver.backend")(Error::Backend { backend: "gpu".into(), why }))
+            Self::Settled(chosen) => chosen,
+            Self::Auto => {
+                let why = "auto: ChainMail propagates on the CPU, and on no GPU was it measured that relaxation there pays";
+                Chosen::cpu(loaded, why)
             }
-            Self::Settled(chosen) => Ok(chosen),
-            Self::Auto => Ok(Chosen::cpu(loaded, "auto: ChainMail propagates on the CPU")),
         }
     }
 }
 
 impl Chosen {
-    /// Threads of ChainMail; none for one queue on one thread.
+    /// Threads of ChainMail on the host; none for one queue on one thread.
     pub(crate) fn chain_threads(&self) -> Option<usize> {
-        match self.place {
-            Place::Reference => None,
-            Place::Cpu => Some(self.report.threads),
-            Place::Gpu(_) => Some(std::thread::available_parallelism().map_or(1, |n| n.get())),
+        (!matches!(self.place, Place::Reference)).then(|| self.host_threads())
+    }
+
+    /// Opens the device that a chain relaxes on, if there is one.
+    ///
+    /// # Errors
+    /// As the device gives them.
+    pub(crate) fn start_chain(&self, chain: &Chain) -> Result<Option<(Relaxer, Metered)>, Error> {
+        match &self.place {
+            Place::Gpu(device) => gpu::start_chain(device, chain).map(Some),
+            Place::Cpu | Place::Reference => Ok(None),
+        }
+    }
+
+    /// Memory that a chain takes on the device, by part; nothing on the host's backends.
+    pub(crate) fn chain_memory(&self, chain: &Chain) -> Vec<MemoryPart> {
+        match &self.place {
+            Place::Gpu(device) => gpu::chain_memory(device, chain),
+            Place::Cpu | Place::Reference => Vec::new(),
         }
     }
 

@@ -1,13 +1,14 @@
 //! A body that follows as a chain.
 
 use cutis_chainmail::{Contradiction, Drag, Order};
-use cutis_solver::Ledger;
+use cutis_solver::{Ledger, SolverError};
 use cutis_solver_cpu::CpuError;
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{End, Motion};
 use crate::Error;
+use crate::backend::Relaxer;
 use crate::body::Body;
 use crate::chain::{ChainBody, ChainHandle};
 use crate::checkpoint::Checkpoint;
@@ -28,6 +29,8 @@ pub(crate) struct Chained<'a> {
     dt_s: f64,
     order: Order,
     pool: ThreadPool,
+    /// Relaxation on a device.
+    relaxer: Option<Relaxer>,
     /// Every element that a handle grabs.
     held: Vec<u32>,
     frame: u32,
@@ -49,6 +52,7 @@ impl<'a> Chained<'a> {
         chain: ChainBody,
         body: &'a Body,
         threads: Option<usize>,
+        relaxer: Option<Relaxer>,
     ) -> Result<Self, Error> {
         let count = threads.unwrap_or(1);
         let pool = ThreadPoolBuilder::new()
@@ -71,6 +75,7 @@ impl<'a> Chained<'a> {
             body,
             dt_s,
             pool,
+            relaxer,
             frame: 0,
             cuts_made: 0,
             settled: false,
@@ -117,12 +122,19 @@ impl<'a> Chained<'a> {
         self.pool.install(|| self.chain.chain.energy_mm2())
     }
 
-    fn relax(&mut self) {
-        let Self { chain: ChainBody { chain, relax_per_frame, .. }, pool, held, .. } = self;
-        let done = pool.install(|| chain.relax(*relax_per_frame, held));
+    fn relax(&mut self) -> Result<(), Error> {
+        let time_s = self.time_s();
+        let Self { chain: ChainBody { chain, relax_per_frame, .. }, pool, relaxer, held, .. } = self;
+        let done = match relaxer {
+            None => pool.install(|| chain.relax(*relax_per_frame, held)),
+            Some(relaxer) => relaxer.relax(chain, *relax_per_frame, held).map_err(|error| {
+                Error::Solver(SolverError::Device { backend: "gpu", time_s, reason: error.to_string() })
+            })?,
+        };
         self.told.relax_sweeps += u64::from(done.sweeps);
         self.told.relax_moves += done.moves;
         self.settled = done.settled;
+        Ok(())
     }
 
     /// Where a vertex is: exactly where it was, unless it moved.
@@ -204,9 +216,13 @@ impl Motion for Chained<'_> {
         }
         self.settled &= !changed;
         if self.chain.relax_per_frame > 0 && !self.settled {
-            ledger.time(RELAXATION, || self.relax());
+            ledger.time(RELAXATION, || self.relax())?;
         }
         Ok(())
+    }
+
+    fn waits(&self) -> bool {
+        true
     }
 
     fn time_s(&self) -> f64 {

@@ -24,6 +24,9 @@ pub(crate) trait Motion {
     /// As [`step`](Self::step), with the same bits, and enters how long each part took.
     fn step_timed(&mut self, ledger: &mut Ledger) -> Result<(), Error>;
 
+    /// Whether each part of a frame is over before the next one begins, so that to time them costs nothing.
+    fn waits(&self) -> bool;
+
     /// Time since the start of the first frame, s.
     fn time_s(&self) -> f64;
 

@@ -12,7 +12,11 @@ use crate::report::KindResidual;
 const VIOLATED: f64 = 0.01;
 
 /// A solver with a body in it.
-pub(crate) struct Stepped(pub(crate) Box<dyn Solver<f32>>);
+pub(crate) struct Stepped {
+    pub(crate) solver: Box<dyn Solver<f32>>,
+    /// Whether it runs on a device.
+    pub(crate) on_device: bool,
+}
 
 impl Motion for Stepped {
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
@@ -21,35 +25,40 @@ impl Motion for Stepped {
             .chunks_exact(3)
             .map(|v| Vector3::from_fn(|axis, _| f32::from_bits(v[axis])))
             .collect();
-        Ok(self.0.restore(&saved.positions, &velocities, u64::from(saved.frame))?)
+        Ok(self.solver.restore(&saved.positions, &velocities, u64::from(saved.frame))?)
     }
 
     fn step(&mut self) -> Result<(), Error> {
-        Ok(self.0.step(1)?)
+        Ok(self.solver.step(1)?)
     }
 
     fn step_timed(&mut self, ledger: &mut Ledger) -> Result<(), Error> {
-        Ok(self.0.step_timed(1, ledger)?)
+        Ok(self.solver.step_timed(1, ledger)?)
+    }
+
+    fn waits(&self) -> bool {
+        !self.on_device
     }
 
     fn time_s(&self) -> f64 {
-        self.0.time_s()
+        self.solver.time_s()
     }
 
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error> {
-        Ok(self.0.positions_of(vertices)?)
+        Ok(self.solver.positions_of(vertices)?)
     }
 
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {
-        let positions = self.0.positions()?;
-        let words = self.0.velocities()?.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits)).collect();
+        let positions = self.solver.positions()?;
+        let words =
+            self.solver.velocities()?.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits)).collect();
         Ok(Checkpoint { frame, positions, words })
     }
 
     /// The whole body comes to the host for its positions: measured there, residuals cost a device nothing, and a lack of room on it
     /// cannot take a finished run.
     fn end(&mut self) -> Result<End, Error> {
-        let system = self.0.system()?;
+        let system = self.solver.system()?;
         let collapsed = system.check_collapsed(VIOLATED).err().map(|error| error.to_string());
         Ok(End {
             positions: system.positions(),

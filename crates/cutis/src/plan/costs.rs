@@ -65,12 +65,7 @@ pub(super) fn of_dynamics(
 }
 
 /// Of ChainMail.
-pub(super) fn of_chain(
-    loaded: &LoadedScene,
-    body: &Body,
-    chain: &ChainBody,
-    request: Request,
-) -> Result<Costs, Error> {
+pub(super) fn of_chain(loaded: &LoadedScene, body: &Body, chain: &ChainBody, request: Request) -> Costs {
     let scene = &loaded.scene;
     let part = |(part, bytes): (&str, usize)| MemoryPart { part: part.into(), bytes };
     let visits = [chain.relax_per_frame, scene.run.frames]
@@ -90,16 +85,17 @@ pub(super) fn of_chain(
     if scene.solver.gravity_m_s2 != [0.0; 3] {
         warnings.push("solver.gravity_m_s2 has no effect with model = \"chainmail\"".to_owned());
     }
-    Ok(Costs {
-        backend: request.settle_chain(loaded)?,
+    let backend = request.settle_chain(loaded);
+    Costs {
+        device_memory: backend.chain_memory(&chain.chain),
+        backend,
         sizes: Sizes { edges: chain.chain.links(), ..sizes(body, removed(body), chain.fixed) },
         colors: BTreeMap::new(),
         memory: chain.chain.bytes().map(part).into(),
-        device_memory: Vec::new(),
         projections: visits,
         left_out: named(&absent),
         warnings,
-    })
+    }
 }
 
 /// Says so if skin tension is stiffer than the substeps can follow. One projection per substep moves a vertex as far as

@@ -84,7 +84,7 @@ pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Erro
                 .map_err(loaded.blame("solver"))?
         }
         Matter::Chain(chain) => clock.stage("time a frame", 0, |_| {
-            let mut motion = Chained::new(loaded, *chain, &body, backend.chain_threads())?;
+            let mut motion = Chained::new(loaded, *chain, &body, backend.chain_threads(), None)?;
             ledger::of_first_frame(&mut motion, plan.ledger)
         })?,
     };
@@ -127,7 +127,7 @@ pub(crate) fn prepare(
     warnings.extend(region::idle(&body));
     let costs = match &matter {
         Matter::Dynamics(dynamics) => costs::of_dynamics(loaded, &body, dynamics, request)?,
-        Matter::Chain(chain) => costs::of_chain(loaded, &body, chain, request)?,
+        Matter::Chain(chain) => costs::of_chain(loaded, &body, chain, request),
     };
     let Costs { backend, sizes, colors, memory, device_memory, projections, left_out, warnings: more } =
         costs;

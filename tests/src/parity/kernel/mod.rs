@@ -4,6 +4,7 @@ mod descent;
 mod handles;
 mod raymarch;
 mod reduction;
+mod relax;
 mod resample;
 mod sweep;
 mod vertices;
@@ -18,7 +19,8 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     handles::run(bench)?;
     reduction::run(bench)?;
     resample::run(bench)?;
-    raymarch::run(bench)
+    raymarch::run(bench)?;
+    relax::run(bench)
 }
 
 /// A shader's source with one part, which must occur, replaced by another.

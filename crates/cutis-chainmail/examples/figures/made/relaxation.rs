@@ -15,7 +15,7 @@ pub fn figure() -> Result<String, ChainError> {
         let lowest: Vec<u32> = (0..16).map(|i| sheet.chain.element([i, 0, 0])).collect();
         sheet.chain.fix(&lowest)?;
         sheet.pull([10, 7], [1.5, 4.0])?;
-        Ok(sheet)
+        Ok::<_, ChainError>(sheet)
     };
     let wave: Body = dragged(0.0)?;
     let energy = format!("Energy {:.2} mm²", wave.chain.energy_mm2());
