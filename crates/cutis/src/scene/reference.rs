@@ -44,10 +44,12 @@ struct Section<'a> {
 impl Page {
     /// A heading, what the section is for, its keys, then the sections inside it.
     fn write_section(&self, out: &mut String, path: &str, property: &Value, required: bool) {
-        let Some(Section { definition, list }) = self.section(property) else { return };
+        let Some(Section { definition, list }) = self.section_within(property) else { return };
+        // Where it is one choice of several, the property's text is about all of them.
+        let described = if self.section(property).is_some() { property } else { definition };
         let heading = if list { format!("[[{path}]]") } else { format!("[{path}]") };
         let level = 2 + path.matches('.').count();
-        let _ = write!(out, "\n{} `{heading}`\n\n{}", "#".repeat(level), text(property, definition));
+        let _ = write!(out, "\n{} `{heading}`\n\n{}", "#".repeat(level), text(described, definition));
         out.push_str(if required { " Required.\n" } else { "\n" });
         let keys = properties(definition);
         self.table(out, definition, &keys);
@@ -109,6 +111,13 @@ impl Page {
         definition["properties"]
             .is_object()
             .then_some(Section { definition, list: whole.get("items").is_some() })
+    }
+
+    /// The section that a property stands for, or may stand for beside something else.
+    fn section_within<'a>(&'a self, property: &'a Value) -> Option<Section<'a>> {
+        let choices = self.definition(property)["anyOf"].as_array();
+        self.section(property)
+            .or_else(|| choices.into_iter().flatten().find_map(|choice| self.section(choice)))
     }
 
     /// The definition that a property points to, through `$ref` and an optional's `anyOf`.
