@@ -2,8 +2,10 @@
 
 pub mod accuracy;
 pub mod cantilever;
+pub mod chainmail;
 #[path = "../../crates/cutis-solver-cpu/tests/lattice/mod.rs"]
 pub mod lattice;
+mod origin;
 pub mod parity;
 pub mod sheet;
 pub mod stability;

@@ -36,6 +36,8 @@ usage: cargo xtask COMMAND
                       --write: docs/results/stability.md; the exit code says whether every case ended as it must
   accuracy [OPTIONS]  error against run time, for each problem and setting, against direct solutions in f64; `accuracy --help`
                       lists the options, --write writes docs/results/accuracy.md
+  chainmail [OPTIONS] ChainMail on scans, and beside position-based dynamics; --write writes docs/results/chainmail.md; the exit code
+                      says whether all checks hold
   mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
                       with a text only those whose description contains it, and nothing is written; with --suite NAME
                       those that one suite of tests must see, and only its section is written
@@ -74,6 +76,9 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         }
         ["accuracy", arguments @ ..] => {
             return workspace::exit_code(&mut steps::accuracy_command(&workspace, arguments));
+        }
+        ["chainmail", arguments @ ..] => {
+            return workspace::exit_code(&mut steps::chainmail_command(&workspace, arguments));
         }
         ["parity-page"] => parity::run(&workspace),
         ["mutations"] => mutations::run(&workspace, Choice::All),

@@ -150,9 +150,19 @@ pub fn stability_command(workspace: &Workspace, arguments: &[&str]) -> Command {
 
 /// The measurement of error against run time that `cargo xtask accuracy` runs: released, since it takes times.
 pub fn accuracy_command(workspace: &Workspace, arguments: &[&str]) -> Command {
+    released(workspace, "accuracy", arguments)
+}
+
+/// ChainMail on scans that `cargo xtask chainmail` runs: released, since it takes times.
+pub fn chainmail_command(workspace: &Workspace, arguments: &[&str]) -> Command {
+    released(workspace, "chainmail", arguments)
+}
+
+/// A program of `cutis-tests` that takes times.
+fn released(workspace: &Workspace, program: &str, arguments: &[&str]) -> Command {
     let mut command = workspace.cargo("run");
-    let program = ["--quiet", "--release", "--package", "cutis-tests", "--bin", "accuracy", "--"];
-    command.args(program).args(arguments);
+    let build = ["--quiet", "--release", "--package", "cutis-tests", "--bin", program, "--"];
+    command.args(build).args(arguments);
     vulkan::for_gpu_tests(&mut command);
     command
 }

@@ -120,8 +120,8 @@ const LOWEST_HU: f32 = -1024.0;
 const SOFT_ABOVE_HU: f32 = -30.0;
 /// Bone from here, as the scenes of this project fix it.
 const BONE_ABOVE_HU: f32 = 250.0;
-const FAT: Material = Material::isotropic(0.5, 1.6, 0.6, 0.02);
-const SOFT: Material = Material::isotropic(0.7, 1.3, 0.4, 0.02);
+const FAT: Material = Material::isotropic(0.4, 1.8, 0.8, 0.02);
+const SOFT: Material = Material::isotropic(0.6, 1.4, 0.6, 0.02);
 
 /// Most materials: limits are tabulated for every pair.
 pub(crate) const MOST_MATERIALS: usize = 64;

@@ -29,13 +29,13 @@ use std::error::Error;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 use cutis_gpu::Gpu;
 
 pub use options::Options;
 
+use crate::origin::{commit, load};
 use cases::Case;
 use checks::Check;
 use page::{Origin, Section};
@@ -168,17 +168,4 @@ fn write_trials(origin: &Origin, tried: &[trials::Tried], folder: &Path) -> Resu
     fs::write(folder.join("accelerations.csv"), trials::csv(tried))?;
     fs::write(folder.join("accelerations.md"), trials::page(origin, tried))?;
     Ok(())
-}
-
-/// Average number of processes at work in the last minute, where the system says so.
-fn load() -> Option<String> {
-    fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next().map(str::to_owned)
-}
-
-/// The commit of the checkout, marked if there are changes since.
-fn commit() -> Option<String> {
-    let words = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"];
-    let output = Command::new("git").current_dir(env!("CARGO_MANIFEST_DIR")).args(words).output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    output.status.success().then(|| text.trim().to_owned())
 }

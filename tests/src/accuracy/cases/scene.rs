@@ -6,6 +6,7 @@ use cutis::{Override, Scene, SceneSystem};
 use nalgebra::Point3;
 
 use super::{Case, Failure, Measure};
+use crate::origin::scan;
 
 /// The phantom of the demo, cut on the belly, on a lattice of `spacing_mm`.
 ///
@@ -23,13 +24,7 @@ pub fn incision(spacing_mm: f64) -> Result<Case, Failure> {
 /// # Errors
 /// That it is absent.
 pub fn abdomen_scan() -> Result<PathBuf, Failure> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let data = PathBuf::from(std::env::var_os("CUTIS_TEST_DATA").unwrap_or_else(|| beside.into()));
-    let path = data.join("ct/abdomen_ts_122x101x112.nii.gz");
-    match path.is_file() {
-        true => Ok(path),
-        false => Err(format!("abdomen: there is no {} (set CUTIS_TEST_DATA)", path.display()).into()),
-    }
+    scan("abdomen_ts_122x101x112.nii.gz").map_err(|reason| format!("abdomen: {reason}").into())
 }
 
 /// A real abdomen, cut on the belly; none, with a printed reason, where its scan is absent.

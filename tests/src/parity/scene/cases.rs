@@ -1,10 +1,11 @@
 //! The scenes of the outer ring.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cutis::scene::{FormulationChoice, HandleSection, OutputSection, StcForm};
 use cutis::{LoadedScene, Override, Scene};
 
+use crate::origin::scan;
 use crate::parity::bench::{Effort, Failure};
 
 /// A scene with a name.
@@ -49,13 +50,10 @@ pub fn all(effort: Effort) -> Result<Vec<Case>, Failure> {
 
 /// The cut abdomen of the CT, or of the phantom where there is no CT.
 fn abdomen(quick: bool, frames: u32) -> Result<Case, Failure> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let data = PathBuf::from(std::env::var_os("CUTIS_TEST_DATA").unwrap_or_else(|| beside.into()));
-    let ct = data.join("ct/abdomen_ts_122x101x112.nii.gz");
-    if !ct.is_file() {
+    let Ok(ct) = scan("abdomen_ts_122x101x112.nii.gz") else {
         let loaded = fixture("phantom-small.toml", &[])?;
         return Ok(Case::new("abdomen (phantom: no CT at hand)", loaded, frames, true));
-    }
+    };
     let path = ct.to_string_lossy();
     let spacing = if quick { "15.0" } else { "9.0" };
     let overrides =
