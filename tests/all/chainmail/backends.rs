@@ -46,7 +46,7 @@ fn a_gpu_gives_the_same_bits() {
     let cpu = Run::of(&loaded);
     let report = run_on(&gpu, folder.path(), &loaded, false).unwrap();
     assert_eq!((report.backend.name.as_str(), &report.chainmail), ("gpu", &cpu.report.chainmail));
-    assert!(report.device.is_some_and(|device| device.submits > 0) && report.device_memory.len() == 1);
+    assert_eq!(report.device_memory.len(), 1);
     let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
     for file in ["checkpoint.bin", "skin.vtu"] {
         assert!(cpu.bytes(file) == read(file), "{file}");
@@ -54,9 +54,12 @@ fn a_gpu_gives_the_same_bits() {
     // Which voxel belongs to which tetrahedron is looked up in single precision there.
     let found = nifti::read(folder.path().join("deformed.nii.gz")).unwrap().volume;
     assert!(share_differing(cpu.deformed().voxels(), found.voxels()) < 1e-4);
-    // Half of the run there, half of it here.
+    // Half of the run there, half of it here; with nothing to be resampled the device relaxes and does nothing else.
     let other = tempfile::tempdir().unwrap();
-    run_on(&gpu, other.path(), &first(3, &loaded), false).unwrap();
+    let mut half = first(3, &loaded);
+    half.scene.output.volume = false;
+    let report = run_on(&gpu, other.path(), &half, false).unwrap();
+    assert!(report.device.is_some_and(|device| device.submits > 0));
     scenes::run_in(other.path(), &loaded, true).unwrap();
     assert!(std::fs::read(other.path().join("checkpoint.bin")).unwrap() == cpu.bytes("checkpoint.bin"));
 }

@@ -1,7 +1,10 @@
 //! What handles drag, and what stays.
 
+use std::f64::consts::FRAC_PI_2;
+
 use cutis::report::ChainmailReport;
-use nalgebra::Vector3;
+use cutis::volume::{Affine, Grid, Volume};
+use nalgebra::{Matrix4, Rotation3};
 
 use super::*;
 
@@ -89,6 +92,45 @@ fn links_are_edges_within_their_limits() {
         let told = ended.told().energy_after;
         assert!((told / energy - 1.0).abs() < 1e-4, "{told} mm², and by the positions {energy}");
     }
+}
+
+/// What lies beyond a region stays, and what borders on it is fixed.
+#[test]
+fn a_region_is_fixed_where_it_ends() {
+    let region = ("lattice.region", "{ around_mm = 60 }");
+    let ended = Ended::of(&chain(&[HANDLE, region, ("fixed", "{}")]));
+    let sizes = &ended.run.report.sizes;
+    let still = ended.twin.still.iter().filter(|still| **still).count();
+    assert!(sizes.frozen_vertices > 1000 && still > 50 && sizes.fixed_vertices == still, "{sizes:?}");
+    assert!(ended.by.iter().zip(&ended.twin.still).all(|(by, still)| !still || *by == Vector3::zeros()));
+    assert_eq!(sizes.edges, ended.twin.links.len());
+    assert!(ended.told().moved > ended.twin.held[0].len());
+}
+
+/// A CT that is turned and stored along other axes: the same drag, as seen from there.
+#[test]
+fn the_axes_of_the_ct_may_lie_anyhow() {
+    let turn =
+        Rotation3::from_euler_angles(0.0, 0.0, 0.5) * Rotation3::from_euler_angles(0.0, FRAC_PI_2, 0.0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("turned.nii");
+    let upright = original();
+    let rows = upright.grid().affine.rows();
+    let rows = turn.to_homogeneous() * Matrix4::from_fn(|row, column| rows[row][column]);
+    let affine = Affine::from_rows(rows.transpose().into()).unwrap();
+    let grid = Grid { affine, ..*upright.grid() };
+    nifti::write(&path, &Volume::new(grid, upright.voxels().to_vec(), 1.0, 0.0).unwrap()).unwrap();
+    let run = |volume: &str, turn: Rotation3<f64>| {
+        let [at, by] =
+            [[-40.0, 100.0, 0.0], [-7.0, 20.0, 5.0]].map(|v| <[f64; 3]>::from(turn * Vector3::from(v)));
+        let handle = format!("[{{ at_mm = {at:?}, radius_mm = 15, move_mm = {by:?}, over_s = 0.5 }}]");
+        let fixed = "{ bone_above_hu = 250, end_layers = [\"k\"] }";
+        Ended::of(&chain(&[("volume", volume), ("handle", &handle), ("fixed", fixed), UNIFORM, UNRELAXED]))
+    };
+    let turned = run(&format!("{{ path = {path:?} }}"), turn);
+    let upright = run(&CT_FILE, Rotation3::identity());
+    assert!(turned.told().moved == upright.told().moved && turned.moved() > 100);
+    assert!(turned.by.iter().zip(&upright.by).all(|(a, b)| (a - turn * b).norm() < 2.0 * EXACT_MM));
 }
 
 #[test]
