@@ -8,7 +8,7 @@ use cutis::{Error, Scene, Silent};
 use crate::scenes::{SMALL, folder, overrides, run_in};
 
 /// The error of a scene, which must be the scene's fault.
-fn refused(set: &[(&str, &str)]) -> Error {
+pub fn refused(set: &[(&str, &str)]) -> Error {
     let loaded = Scene::load(&folder().join(SMALL), &overrides(set));
     let checked = loaded.and_then(|loaded| cutis::check(&loaded, &Silent));
     let Err(error) = checked else { panic!("{set:?} was accepted") };

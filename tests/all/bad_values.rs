@@ -9,9 +9,11 @@ use crate::scenes::overrides;
 
 /// A scene that has every section, so that any key can be set alone.
 const EVERYTHING: &str = r#"
+model = "chainmail"
 [volume]
 phantom = { size = [8, 8, 8] }
 [tissue]
+air_below_hu = 2
 cut_planes = [{ point_mm = [0, 0, 0], normal = [0, 0, 1] }]
 [constraints.distance]
 youngs_modulus_pa = 1e4
@@ -20,6 +22,8 @@ bulk_modulus_pa = 1e5
 [constraints.stc]
 area_modulus_n_per_m = 50
 near_incision = { radius_mm = 10 }
+[chainmail]
+materials = [{ from_hu = -1024, shortest = 0.5, longest = 1.5, shear = 0.5 }]
 [fixed]
 boxes = [{ min_mm = [0, 0, 0], max_mm = [1, 1, 1] }]
 planes = [{ point_mm = [0, 0, 0], normal = [0, 0, 1] }]
@@ -32,6 +36,8 @@ width_mm = 1
 at_mm = [0, 0, 0]
 radius_mm = 1
 move_mm = [1, 0, 0]
+[solver]
+dt_s = 0.1
 "#;
 
 fn parse(set: &[(&str, &str)]) -> Result<LoadedScene, Error> {
@@ -95,6 +101,9 @@ fn no_number_may_be_nan_or_infinite_and_no_value_of_another_type() {
     for (key, name, kind) in keys() {
         let values: &[&str] = match kind.as_str() {
             "number" => &["nan", "inf", "-inf", "\"text\"", "true", "[1.0]", "{ a = 1 }"],
+            "number or [number, number, number]" => {
+                &["nan", "-0.1", "inf", "[1, nan, 1]", "[1, 1, -0.1]", "[1, 1]", "\"text\"", "true"]
+            }
             "[number, number, number]" => {
                 &["[nan, 0, 0]", "[0, inf, 0]", "[0, 0, -inf]", "[1, 2]", "[1, 2, 3, 4]", "1.0", "\"text\""]
             }
@@ -148,6 +157,16 @@ fn numbers_out_of_range_are_refused() {
         ("incision.0.to_mm", "[0, 0, 0]"),
         ("tissue.air_below_hu", "1e300"),
         ("fixed.bone_above_hu", "-1e300"),
+        ("incision.0.at_s", "-0.1"),
+        ("incision.0.at_s", "6"),
+        ("chainmail.materials", "[]"),
+        ("chainmail.materials.0.from_hu", "3"),
+        ("chainmail.materials.0.shortest", "1.1"),
+        ("chainmail.materials.0.longest", "[2, 2, 0.9]"),
+        ("chainmail.materials.0.longest", "17"),
+        ("chainmail.materials.0.shear", "[17, 1, 1]"),
+        ("chainmail.materials.0.k_steps", "-1"),
+        ("chainmail.materials.0.k_steps", "5000"),
     ];
     let rows = positive.iter().flat_map(|&key| [(key, "0"), (key, "-1.5")]);
     let rows = rows.chain(shares.iter().flat_map(|&key| [(key, "-0.1"), (key, "1.1")])).chain(others);

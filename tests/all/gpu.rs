@@ -18,7 +18,7 @@ fn scene(set: &[(&str, &str)]) -> LoadedScene {
 }
 
 /// The first adapter, opened. None: a failure where tests may not be skipped, else a printed reason.
-fn gpu() -> Option<Gpu> {
+pub fn gpu() -> Option<Gpu> {
     match Gpu::open(&GpuOptions::default()) {
         Ok(gpu) => Some(gpu),
         Err(error @ GpuError::NoAdapter) => {
@@ -32,7 +32,7 @@ fn gpu() -> Option<Gpu> {
 }
 
 /// Runs a scene on an opened device.
-fn run_on(gpu: &Gpu, folder: &Path, loaded: &LoadedScene, resume: bool) -> Result<Report, Error> {
+pub fn run_on(gpu: &Gpu, folder: &Path, loaded: &LoadedScene, resume: bool) -> Result<Report, Error> {
     cutis::run_on(gpu, loaded, &RunOptions { out: folder.into(), resume }, &Silent)
 }
 
@@ -220,7 +220,7 @@ fn deformed(folder: &Path) -> Vec<i16> {
 }
 
 /// Share of the voxels that differ by more than rounding does.
-fn share_differing(first: &[i16], second: &[i16]) -> f64 {
+pub fn share_differing(first: &[i16], second: &[i16]) -> f64 {
     let differing = first.iter().zip(second).filter(|(a, b)| a.abs_diff(**b) > 1).count();
     differing as f64 / first.len() as f64
 }

@@ -1,6 +1,6 @@
 //! Where nothing moves, the CT that comes out is the CT that went in, voxel for voxel and at the same millimetres.
 
-use cutis::volume::{AIR_HU, Volume, nifti, phantom::Phantom};
+use cutis::volume::{AIR_HU, Volume, phantom::Phantom};
 
 use crate::scenes::{Run, SMALL, scene};
 
@@ -8,13 +8,11 @@ const VOLUME_ONLY: (&str, &str) = ("output", "{ volume = true }");
 const UNCUT: (&str, &str) = ("incision", "[]");
 
 fn deformed(set: &[(&str, &str)]) -> Volume {
-    let run = Run::of(&scene(SMALL, set));
-    let read = nifti::read(run.path("deformed.nii.gz")).unwrap();
-    assert!(read.warnings.is_empty(), "{:?}", read.warnings);
-    read.volume
+    Run::of(&scene(SMALL, set)).deformed()
 }
 
-fn original() -> Volume {
+/// The CT of the small phantom.
+pub fn original() -> Volume {
     Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap()
 }
 

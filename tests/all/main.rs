@@ -3,6 +3,7 @@
 mod accuracy;
 mod bad_scenes;
 mod bad_values;
+mod chainmail;
 mod determinism;
 mod gpu;
 mod identity;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cutis::{Error, LoadedScene};
 
-use crate::scenes::{SMALL, run_in, scene};
+use crate::scenes::{SMALL, frames, run_in, scene};
 
 /// A wound that opens while a handle, still moving at frame 5, drags the belly.
 fn dragged(frames: &str) -> LoadedScene {
@@ -17,17 +17,6 @@ fn dragged(frames: &str) -> LoadedScene {
             ("output", "{ surface = true, report = true }"),
         ],
     )
-}
-
-/// `frames.csv` without the wall times.
-fn frames(folder: &Path) -> Vec<String> {
-    let text = std::fs::read_to_string(folder.join("frames.csv")).unwrap();
-    let line = |line: &str| {
-        let mut fields: Vec<&str> = line.split(',').collect();
-        fields.remove(2);
-        fields.join(",")
-    };
-    text.lines().map(line).collect()
 }
 
 #[test]

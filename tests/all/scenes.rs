@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use cutis::report::Report;
+use cutis::volume::{Volume, nifti};
 use cutis::{Error, LoadedScene, Override, RunOptions, Scene, Silent};
+use nalgebra::Point3;
 use tempfile::TempDir;
 
 /// The small phantom with an incision.
@@ -56,6 +58,33 @@ impl Run {
         std::fs::read(self.folder.path().join(name)).unwrap()
     }
 
+    /// The CT that it wrote.
+    pub fn deformed(&self) -> Volume {
+        let read = nifti::read(self.path("deformed.nii.gz")).unwrap();
+        assert!(read.warnings.is_empty(), "{:?}", read.warnings);
+        read.volume
+    }
+
+    /// The state without the checkpoint's header, which names the scene, and its seal.
+    pub fn state(&self) -> Vec<u8> {
+        let bytes = self.bytes("checkpoint.bin");
+        bytes[40..bytes.len() - 32].to_vec()
+    }
+
+    /// Positions in the checkpoint, local metres.
+    pub fn positions(&self) -> Vec<Point3<f32>> {
+        let bytes = self.bytes("checkpoint.bin");
+        let count = u64::from_le_bytes(bytes[44..52].try_into().unwrap()) as usize;
+        let values = bytes[52..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
+        let values: Vec<f32> = values.take(3 * count).collect();
+        values.chunks_exact(3).map(Point3::from_slice).collect()
+    }
+
+    /// Path of its folder.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// Path of one of its files.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
@@ -70,6 +99,24 @@ impl Run {
 /// Runs a scene in a folder, from its checkpoint if `resume`.
 pub fn run_in(folder: &Path, loaded: &LoadedScene, resume: bool) -> Result<Report, Error> {
     cutis::run(loaded, &RunOptions { out: folder.into(), resume }, &Silent)
+}
+
+/// `frames.csv` without the wall times.
+pub fn frames(folder: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.join("frames.csv")).unwrap();
+    let line = |line: &str| {
+        let mut fields: Vec<&str> = line.split(',').collect();
+        fields.remove(2);
+        fields.join(",")
+    };
+    text.lines().map(line).collect()
+}
+
+/// A column of `frames.csv`, such as `gape_0_mean_mm`.
+pub fn column(run: &Run, name: &str) -> Vec<f64> {
+    let rows = frames(run.folder());
+    let place = rows[0].split(',').position(|column| column == name).unwrap();
+    rows[1..].iter().map(|row| row.split(',').nth(place).unwrap().parse().unwrap()).collect()
 }
 
 /// Names of the files in a folder, sorted.

@@ -2,12 +2,11 @@
 
 use cutis::report::Wound;
 
-use crate::scenes::{Run, SMALL, real, scene};
+use crate::scenes::{Run, SMALL, column, real, scene};
 
-/// The mean gape of the first wound, frame by frame, mm.
+/// The mean opening of the wound, frame by frame, mm.
 fn gapes(run: &Run) -> Vec<f64> {
-    let text = String::from_utf8(run.bytes("frames.csv")).unwrap();
-    text.lines().skip(1).map(|line| line.split(',').nth(3).unwrap().parse().unwrap()).collect()
+    column(run, "gape_0_mean_mm")
 }
 
 /// Largest change over the last ten frames, relative to the last.

@@ -41,6 +41,25 @@ volume = true
 report = true
 """
 
+# A handle upwards on the belly, all of it a chain that nothing fixes.
+CHAIN = """
+model = "chainmail"
+[volume]
+path = "{volume}"
+[lattice]
+spacing_mm = 16.0
+[[handle]]
+at_mm = [{at}]
+radius_mm = {radius}
+move_mm = [0.0, {by}, 0.0]
+over_s = 0.02
+[run]
+frames = 4
+[output]
+volume = true
+report = true
+"""
+
 # Inputs of other orientations, types and slopes, from the folder of test data.
 OTHERS = ["awkward/orient_PIR.nii.gz", "awkward/oblique.nii.gz", "awkward/bigendian_i16.nii", "ct/leg_sts013_64x55x58.nii.gz"]
 
@@ -169,6 +188,69 @@ def check_demo(work, tally):
     tally.check("demo folder", [f"{name} is empty or unfinished" for name in unfinished])
 
 
+def near(image, place, radius):
+    """Which voxels lie within a distance of a place, mm."""
+    indices = np.indices(image.values.shape).reshape(3, -1)
+    places = image.affine[:3, :3] @ indices + image.affine[:3, 3:]
+    apart = np.linalg.norm(places - np.array(place).reshape(3, 1), axis=0)
+    return (apart <= radius).reshape(image.values.shape)
+
+
+def changed_problems(before, after, handle, reach):
+    """What a handle pulled has changed beside it, and nothing has beyond its reach."""
+    changed = before.values != after.values
+    beside, beyond = int(changed[near(before, handle, 30.0)].sum()), int(changed[~near(before, handle, reach)].sum())
+    problems = [] if same_place(after, before) else ["shape or affine changed"]
+    problems += [] if beside > 200 else [f"only {beside} voxels changed beside the handle"]
+    return problems + ([f"{beyond} voxels changed beyond its reach"] if beyond else [])
+
+
+def unlike_schema(value, schema, whole, name="report"):
+    """Keys that a schema asks for and a document lacks, and those that it does not know."""
+    if "$ref" in schema:
+        schema = whole["$defs"][schema["$ref"].rsplit("/", 1)[1]]
+    for choice in schema.get("anyOf", []):
+        if "$ref" in choice and value is not None:
+            return unlike_schema(value, choice, whole, name)
+    if isinstance(value, list):
+        return [line for entry in value for line in unlike_schema(entry, schema.get("items", {}), whole, f"{name}[]")]
+    known = schema.get("properties")
+    if not isinstance(value, dict) or known is None:
+        return []
+    problems = [f"{name}.{key} is missing" for key in schema.get("required", []) if key not in value]
+    problems += [f"{name}.{key} is not in the schema" for key in value if key not in known]
+    return problems + [line for key in value if key in known for line in unlike_schema(value[key], known[key], whole, f"{name}.{key}")]
+
+
+def report_problems(path):
+    """A report as the schema has it, with what ChainMail did."""
+    report = json.loads(path.read_text())
+    schema = json.loads(run_or_fail("scene", "report-schema").stdout)
+    problems = unlike_schema(report, schema, schema)
+    damaged = {**report, "chainmail": {"unheard_of": 0}}
+    problems += [] if len(unlike_schema(damaged, schema, schema)) > 2 else ["a damaged report passes"]
+    told = report.get("chainmail") or {}
+    problems += [] if told.get("moved", 0) > 20 and told.get("violated_links") == 0 else [f"chainmail: {told}"]
+    return problems
+
+
+def check_chain(phantom, before, work, tally):
+    handle, reach = [-40.0, 100.0, 0.0], 130.0
+    after = {}
+    for name, by in (("chain", 20.0), ("chain at rest", 0.0)):
+        folder = work / name
+        folder.mkdir()
+        scene = folder / "scene.toml"
+        scene.write_text(CHAIN.format(volume=phantom, at=", ".join(map(str, handle)), radius=25.0, by=by))
+        run_or_fail("run", scene, "--out", folder / "run")
+        after[name] = readers_agree(folder / "run" / "deformed.nii.gz", name, tally)
+    tally.check("chain pulls", changed_problems(before, after["chain"], handle, reach))
+    tally.check("chain report", report_problems(work / "chain" / "run" / "report.json"))
+    tally.check("chain at rest stays", untouched_problems(before, after["chain at rest"]))
+    caught = changed_problems(before, after["chain at rest"], handle, reach) and untouched_problems(before, after["chain"])
+    tally.check("chain negative control", [] if caught else ["a drag passed for rest, or rest for a drag"])
+
+
 def check_others(work, tally):
     data = data_folder()
     if data is None:
@@ -186,6 +268,7 @@ def main():
         phantom, before = check_phantom(work, tally)
         check_runs(phantom, before, work, tally)
         check_demo(work, tally)
+        check_chain(phantom, before, work, tally)
         check_others(work, tally)
     tally.finish()
 

@@ -67,7 +67,7 @@ pub use error::ChainError;
 pub use gpu::RelaxGpu;
 pub use material::{Material, MaterialTable};
 pub use relax::Relaxation;
-pub use units::UNITS_PER_STEP;
+pub use units::{FARTHEST_STEPS, UNITS_PER_STEP};
 pub use wave::{Contradiction, Drag, Moved, Order};
 
 #[cfg(doctest)]

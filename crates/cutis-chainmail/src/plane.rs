@@ -70,12 +70,12 @@ impl Plane<'_> {
                 continue;
             }
             if within {
-                let there =
+                // A bit for each material: there are 64 at the most.
+                let mut there =
                     part.iter().filter(|&&state| state < MIXED).fold(0_u64, |all, state| all | 1 << state);
-                for material in (0..MIXED).take_while(|&material| there >> material.min(63) != 0) {
-                    if there >> material & 1 == 1 {
-                        moves += self.relax_alike(place, part, material, odd);
-                    }
+                while there != 0 {
+                    moves += self.relax_alike(place, part, there.trailing_zeros() as u8, odd);
+                    there &= there - 1;
                 }
             }
             for lane in (odd..part.len()).step_by(2).filter(|&lane| part[lane] == MIXED) {

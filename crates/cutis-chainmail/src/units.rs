@@ -8,6 +8,9 @@ pub(crate) const MOST_ELEMENTS: usize = 4096;
 /// Farthest that an element can be told to go, in units.
 pub(crate) const FARTHEST: i32 = 1 << 28;
 
+/// Farthest that an element can be told to go, in steps from the first element along each axis.
+pub const FARTHEST_STEPS: f64 = (FARTHEST / UNITS_PER_STEP) as f64;
+
 /// Farthest that an element can come by following others, in units.
 pub(crate) const FARTHEST_MOVED: u32 = 1 << 29;
 
@@ -34,6 +37,10 @@ mod tests {
         for (beyond, units) in [(0.4, 0), (0.6, 1), (-0.4, 0), (-0.6, -1)] {
             assert_eq!(from_steps(1.0 + beyond / f64::from(UNITS_PER_STEP)), Some(UNITS_PER_STEP + units));
         }
+        assert_eq!(
+            [-1.0, 1.0].map(|side| from_steps(side * FARTHEST_STEPS)),
+            [Some(-FARTHEST), Some(FARTHEST)]
+        );
         for wrong in [f64::NAN, f64::INFINITY, 4096.1, -1e9] {
             assert_eq!(from_steps(wrong), None);
         }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use cutis_chainmail::{Chain, Material, MaterialTable, NO_MATERIAL};
+use cutis_chainmail::{Chain, ChainError, FARTHEST_STEPS, Material, MaterialTable, NO_MATERIAL};
 use cutis_mesh::TetMesh;
 use nalgebra::{Point3, Vector3, distance};
 
@@ -82,19 +82,29 @@ impl ChainmailSection {
                 (MaterialTable::new(&entries), String::new())
             }
         };
-        let wrong = |why: String| Error::SceneKey {
-            file: file.into(),
-            key: "chainmail.materials".into(),
-            value: value.clone(),
-            why,
-        };
-        let table = table.map_err(|error| wrong(error.to_string()))?;
+        let key = "chainmail.materials";
+        let wrong = |key: String, value: String, why| Error::SceneKey { file: file.into(), key, value, why };
+        let table = table.map_err(|error| match error {
+            ChainError::Material { material, key: field, value, range } => {
+                let field = if field == "k" { "k_steps" } else { field };
+                wrong(format!("{key}[{material}].{field}"), format!("{value:?}"), format!("must be {range}"))
+            }
+            ChainError::TableOrder { entry, from_hu } => {
+                let why = "must be a finite number above that of the material before";
+                wrong(format!("{key}[{entry}].from_hu"), format!("{from_hu:?}"), why.into())
+            }
+            other => wrong(key.into(), value.clone(), other.to_string()),
+        })?;
         let (lowest, air) = (table.lowest_hu(), tissue.air_below_hu);
         if lowest > air {
-            return Err(wrong(format!(
-                "the first material begins at {lowest} HU; it must begin where tissue does or below \
+            return Err(wrong(
+                key.into(),
+                value,
+                format!(
+                    "the first material begins at {lowest} HU; it must begin where tissue does or below \
                  (tissue.air_below_hu = {air})"
-            )));
+                ),
+            ));
         }
         Ok(table)
     }
@@ -162,6 +172,18 @@ fn handles(loaded: &LoadedScene, body: &Body) -> Result<Vec<ChainHandle>, Error>
             return Err(wrong(format!("it grabs what handle[{other}] grabs already")));
         }
         let steps = affine.to_index(Vector3::from(handle.move_mm).into()) - affine.to_index(Point3::origin());
+        let reaches = |&element: &u32| {
+            let rest = mesh.lattice.grid().point(element as usize);
+            (0..3).all(|axis| (rest[axis] as f64 + steps[axis]).abs() <= FARTHEST_STEPS)
+        };
+        if !elements.iter().all(reaches) {
+            return Err(Error::SceneKey {
+                file: loaded.file.clone(),
+                key: format!("handle[{n}].move_mm"),
+                value: format!("{:?}", handle.move_mm),
+                why: format!("must end within {FARTHEST_STEPS} steps of where the lattice begins"),
+            });
+        }
         handles.push(ChainHandle { elements, steps, over_s: handle.over_s });
     }
     Ok(handles)

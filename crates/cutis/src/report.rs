@@ -245,7 +245,7 @@ pub struct ChainmailReport {
     pub moved: usize,
     /// Links beyond their limits; 0 unless what must not move was pulled apart.
     pub violated_links: usize,
-    /// Links that the incisions cut in this run.
+    /// Links that the incisions have cut, those before the checkpoint that the run goes on from included.
     pub cut_links: usize,
     /// System energy after the last drag, before the relaxation that followed, mm²: half the sum of the squared differences of links
     /// from rest.

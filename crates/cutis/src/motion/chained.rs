@@ -1,6 +1,6 @@
 //! A body that follows as a chain.
 
-use cutis_chainmail::{Contradiction, Drag, Order};
+use cutis_chainmail::{Drag, LinkViolation, Order};
 use cutis_solver::{Ledger, SolverError};
 use cutis_solver_cpu::CpuError;
 use nalgebra::{Point3, Vector3};
@@ -41,8 +41,6 @@ pub(crate) struct Chained<'a> {
     /// Nothing relaxes any more.
     settled: bool,
     told: ChainmailReport,
-    /// What the last drag could not keep within its limits.
-    torn: Option<Contradiction>,
 }
 
 impl<'a> Chained<'a> {
@@ -80,7 +78,6 @@ impl<'a> Chained<'a> {
             cuts_made: 0,
             settled: false,
             told: ChainmailReport::default(),
-            torn: None,
         })
     }
 
@@ -113,8 +110,7 @@ impl<'a> Chained<'a> {
     fn propagate(&mut self) -> Result<(), Error> {
         let drags = self.drags(self.frame);
         let Self { chain: ChainBody { chain, .. }, pool, order, .. } = self;
-        let moved = pool.install(|| chain.drag(&drags, *order))?;
-        self.torn = moved.contradictions.into_iter().max_by(|a, b| a.excess.total_cmp(&b.excess));
+        pool.install(|| chain.drag(&drags, *order))?;
         Ok(())
     }
 
@@ -160,18 +156,16 @@ impl<'a> Chained<'a> {
         elements.filter(|&(v, &element)| !self.body.removed(v as u32) && !stays(element)).count()
     }
 
-    /// Why links are beyond their limits.
-    fn reason(&self, links: usize) -> String {
-        let lattice = &self.body.mesh.lattice;
-        let Some(torn) = &self.torn else {
-            return format!("{links} links are beyond their limits");
-        };
+    /// Why links are beyond their limits: `worst` and what holds one of its ends.
+    fn reason(&self, links: usize, worst: &LinkViolation) -> String {
+        let (lattice, chain) = (&self.body.mesh.lattice, &self.chain.chain);
+        let ends = [worst.element, worst.next];
+        let fixed = ends.into_iter().find(|&end| chain.is_fixed(end));
+        let what = if fixed.is_some() { "fixed" } else { "held by a handle" };
+        let end = fixed.or_else(|| ends.into_iter().find(|end| self.held.contains(end)));
         let grid = lattice.grid();
-        let mm: [f64; 3] = lattice.mm(grid.point(torn.held as usize)).into();
-        let (what, excess) = (
-            if torn.fixed { "fixed" } else { "held by a handle" },
-            torn.excess * grid.affine.spacing_mm()[torn.axis],
-        );
+        let mm: [f64; 3] = lattice.mm(grid.point(end.unwrap_or(worst.element) as usize)).into();
+        let excess = worst.excess * grid.affine.spacing_mm()[worst.axis];
         format!(
             "{links} links are beyond their limits: what rests at {mm:.1?} mm is {what} and cannot follow, by up to {excess:.2} mm; \
              shorten handle.move_mm, fix less, or let links give way further (chainmail.materials)"
@@ -191,9 +185,13 @@ impl Motion for Chained<'_> {
             .map(|(&element, at)| (element, [0, 1, 2].map(|axis| at[axis].cast_signed())))
             .collect();
         self.chain.chain.restore(&units, strained)?;
+        // What the frames before cut is cut again: a state of its own, which no drag has to follow.
+        if let Some(last) = saved.frame.checked_sub(1) {
+            self.frame = last;
+            self.cut();
+        }
         self.frame = saved.frame;
         self.told.energy_before = self.energy();
-        // Cuts of the frames before are there again with the next one.
         Ok(())
     }
 
@@ -249,12 +247,12 @@ impl Motion for Chained<'_> {
             settled: self.settled,
             ..self.told.clone()
         };
-        let warnings = (violations.links > 0).then(|| self.reason(violations.links));
+        let warnings = violations.worst.iter().map(|worst| self.reason(violations.links, worst));
         Ok(End {
             positions: self.positions(),
             residuals: Vec::new(),
             chainmail: Some(told),
-            warnings: warnings.into_iter().collect(),
+            warnings: warnings.collect(),
         })
     }
 }

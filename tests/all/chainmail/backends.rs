@@ -1,0 +1,65 @@
+//! Whatever runs a chain, the bits are the same.
+
+use super::*;
+use crate::gpu::{gpu, run_on, share_differing};
+
+const FILES: [&str; 3] = ["checkpoint.bin", "deformed.nii.gz", "skin.vtu"];
+
+/// Cuts at two times, a handle that is followed, and one that is not.
+fn busy(set: &[(&str, &str)]) -> LoadedScene {
+    let incisions =
+        "[{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 25, width_mm = 9, at_s = 0.25 },
+        { from_mm = [50, 105, -25], to_mm = [50, 105, 25], depth_mm = 25, width_mm = 9 }]";
+    let handles = "[{ at_mm = [-15, 105, 0], radius_mm = 11, move_mm = [-18, 0, 3], over_s = 0.5 },
+        { at_mm = [65, 98, 0], radius_mm = 11, move_mm = [150, 20, 0], over_s = 0.375 }]";
+    let common = [
+        ("incision", incisions),
+        ("handle", handles),
+        ("chainmail.relax_per_frame", "4"),
+        ("output", "{ volume = true, surface = true }"),
+    ];
+    chain(&[&common, set].concat())
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let run = |set: &[(&str, &str)]| Run::of(&busy(set));
+    let one = run(&[("solver.threads", "1")]);
+    let told = one.report.chainmail.clone();
+    assert!(told.as_ref().is_some_and(|told| told.violated_links > 0 && told.relax_moves > 1000));
+    for (backend, threads) in [("cpu", "2"), ("cpu", "3"), ("cpu", "8"), ("reference", "0")] {
+        let other = run(&[("solver.backend", backend), ("solver.threads", threads)]);
+        assert_eq!(other.report.backend.name, backend);
+        assert!(FILES.iter().all(|file| one.bytes(file) == other.bytes(file)), "{backend} {threads}");
+        assert_eq!(other.report.chainmail, told, "{backend} {threads}");
+    }
+    // The comparison sees one sweep less in each frame.
+    let control = run(&[("chainmail.relax_per_frame", "3")]);
+    assert!(one.state() != control.state() && one.bytes("skin.vtu") != control.bytes("skin.vtu"));
+}
+
+/// On any device: all numbers are whole.
+#[test]
+fn a_gpu_gives_the_same_bits() {
+    let Some(gpu) = gpu() else { return };
+    let (loaded, folder) = (busy(&[]), tempfile::tempdir().unwrap());
+    let cpu = Run::of(&loaded);
+    let report = run_on(&gpu, folder.path(), &loaded, false).unwrap();
+    assert_eq!((report.backend.name.as_str(), &report.chainmail), ("gpu", &cpu.report.chainmail));
+    assert_eq!(report.device_memory.len(), 1);
+    let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
+    for file in ["checkpoint.bin", "skin.vtu"] {
+        assert!(cpu.bytes(file) == read(file), "{file}");
+    }
+    // Which voxel belongs to which tetrahedron is looked up in single precision there.
+    let found = nifti::read(folder.path().join("deformed.nii.gz")).unwrap().volume;
+    assert!(share_differing(cpu.deformed().voxels(), found.voxels()) < 1e-4);
+    // Half of the run there, half of it here; with nothing to be resampled the device relaxes and does nothing else.
+    let other = tempfile::tempdir().unwrap();
+    let mut half = first(3, &loaded);
+    half.scene.output.volume = false;
+    let report = run_on(&gpu, other.path(), &half, false).unwrap();
+    assert!(report.device.is_some_and(|device| device.submits > 0));
+    scenes::run_in(other.path(), &loaded, true).unwrap();
+    assert!(std::fs::read(other.path().join("checkpoint.bin")).unwrap() == cpu.bytes("checkpoint.bin"));
+}

@@ -1,0 +1,109 @@
+//! Incisions, at the start and later.
+
+use std::collections::HashSet;
+
+use super::*;
+use crate::scenes::column;
+
+const REPORT: (&str, &str) = ("output", "{ report = true }");
+
+/// Links that a scene has before its incisions and not after them.
+fn lost(loaded: &LoadedScene) -> Vec<([usize; 2], usize)> {
+    let mut whole = loaded.clone();
+    whole.scene.incision.clear();
+    let left: HashSet<_> = Twin::of(loaded).links.into_iter().collect();
+    Twin::of(&whole).links.into_iter().filter(|link| !left.contains(link)).collect()
+}
+
+/// The widest that links across the cut are drawn, mm.
+fn widest(ended: &Ended, lost: &[([usize; 2], usize)]) -> f64 {
+    let across = lost.iter().filter(|(_, axis)| *axis == 0);
+    across.map(|&([a, b], _)| ended.by[b].x - ended.by[a].x).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_wound_opens_where_the_links_are_cut_and_the_other_side_stays() {
+    let cut = chain(&[REPORT, INCISION, BESIDE, UNRELAXED, UNIFORM]);
+    let (lost, ended) = (lost(&cut), Ended::of(&cut));
+    assert_eq!(ended.told().cut_links, lost.len());
+    let wound = ended.run.report.wound.as_ref().unwrap();
+    assert!(wound.mid_mm - wound.initial_mid_mm > 8.0, "{wound:?}");
+    assert!(widest(&ended, &lost) > 11.9 && ended.told().violated_links == 0);
+    let right = |ended: &Ended| {
+        let beyond = ended.twin.rest.iter().zip(&ended.by).filter(|(rest, _)| rest.x > 0.0);
+        beyond.map(|(_, by)| by.norm()).fold(0.0, f64::max)
+    };
+    assert_eq!(right(&ended), 0.0);
+    // Without the incision the links hold both sides together.
+    let whole = Ended::of(&chain(&[BESIDE, UNRELAXED, UNIFORM]));
+    assert_eq!(whole.told().cut_links, 0);
+    assert!(right(&whole) > 3.0 && widest(&whole, &lost) < 0.3 * STEPS_MM[0] + EXACT_MM);
+}
+
+#[test]
+fn an_incision_is_there_from_its_time_on() {
+    let common = [REPORT, INCISION, BESIDE, UNRELAXED, UNIFORM];
+    let at = |at_s| chain(&[&common[..], &[("incision.0.at_s", at_s)]].concat());
+    let (early, late) = (Ended::of(&at("0")), Ended::of(&at("0.375")));
+    assert_eq!(early.told().cut_links, late.told().cut_links);
+    assert!(early.told().cut_links > 0 && early.by != late.by);
+    // In each of four frames the handle moves by 3 mm. The cut comes before the last of them: until then the links across hold.
+    let growth = |ended: &Ended| -> Vec<f64> {
+        column(&ended.run, "gape_0_mid_mm").windows(2).map(|pair| pair[1] - pair[0]).collect()
+    };
+    let (early, late) = (growth(&early), growth(&late));
+    assert!(early[..4].iter().all(|mm| *mm > 2.9), "{early:?}");
+    assert!(late[2] < 0.01 && late[3] > 2.9, "{late:?}");
+    // Until then it is the body without the incision.
+    let before = Ended::of(&first(3, &at("0.375")));
+    let whole = Ended::of(&first(3, &chain(&[BESIDE, UNRELAXED, UNIFORM])));
+    assert!(before.told().cut_links == 0 && before.by == whole.by);
+    let cut = Ended::of(&first(4, &at("0.375")));
+    assert!(cut.told().cut_links > 0);
+}
+
+/// Two incisions of different lengths, a handle beside each, and the times of their cuts in either order.
+#[test]
+fn each_incision_cuts_its_own_links_at_its_own_time() {
+    const LEFT: &str = "{ from_mm = [-50, 105, -50], to_mm = [-50, 105, 50], depth_mm = 40, width_mm = 9";
+    const RIGHT: &str = "{ from_mm = [50, 105, -25], to_mm = [50, 105, 25], depth_mm = 40, width_mm = 9";
+    let handles = "[{ at_mm = [-68, 90, 0], radius_mm = 22, move_mm = [-12, 0, 0], over_s = 0.5 },
+        { at_mm = [68, 90, 0], radius_mm = 22, move_mm = [12, 0, 0], over_s = 0.5 }]";
+    let scene = |incisions: &[(&str, f64)]| {
+        let all: Vec<String> =
+            incisions.iter().map(|(cut, at_s)| format!("{cut}, at_s = {at_s} }}")).collect();
+        chain(&[
+            REPORT,
+            UNRELAXED,
+            UNIFORM,
+            ("handle", handles),
+            ("incision", &format!("[{}]", all.join(","))),
+        ])
+    };
+    let alone = |cut: &str| lost(&scene(&[(cut, 0.0)])).len();
+    let [left, right] = [LEFT, RIGHT].map(alone);
+    assert!(left > 10 && right > 10 && left != right, "{left} {right}");
+    for (times, counts) in [
+        ([0.0, 0.0], [left + right, left + right, left + right]),
+        ([0.0, 0.375], [left, left, left + right]),
+        ([0.375, 0.0], [right, right, left + right]),
+        ([0.375, 0.125], [0, right, left + right]),
+    ] {
+        for swapped in [false, true] {
+            let mut incisions = [(LEFT, times[0]), (RIGHT, times[1])];
+            if swapped {
+                incisions.reverse();
+            }
+            let scene = scene(&incisions);
+            let cut = |frames| Run::of(&first(frames, &scene)).report.chainmail.unwrap().cut_links;
+            assert_eq!([1, 3, 4].map(cut), counts, "{times:?} {swapped}");
+            // Until its cut the links across hold a wound together, and no longer.
+            let run = Run::of(&scene);
+            for (wound, (_, at_s)) in incisions.iter().enumerate() {
+                let (gapes, frame) = (column(&run, &format!("gape_{wound}_mid_mm")), (at_s / 0.125) as usize);
+                assert!(gapes[frame] - gapes[0] < 0.3 * STEPS_MM[0] + 0.01, "{times:?} {swapped} {gapes:?}");
+                assert!(gapes[frame + 1] - gapes[frame] > 2.9, "{times:?} {swapped} {gapes:?}");
+            }
+        }
+    }
+}

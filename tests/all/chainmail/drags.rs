@@ -1,0 +1,152 @@
+//! What handles drag, and what stays.
+
+use std::f64::consts::FRAC_PI_2;
+
+use cutis::report::ChainmailReport;
+use cutis::volume::{Affine, Grid, Volume};
+use nalgebra::{Matrix4, Rotation3};
+
+use super::*;
+
+const CT: (&str, &str) = ("output", "{ volume = true }");
+
+#[test]
+fn what_nobody_drags_stays_where_it_is() {
+    for backend in ["cpu", "reference"] {
+        let ended = Ended::of(&chain(&[CT, ("solver.backend", backend)]));
+        // One sweep finds out that nothing is to be done, and no other follows.
+        let still = ChainmailReport { relax_sweeps: 1, settled: true, ..ChainmailReport::default() };
+        assert_eq!(*ended.told(), still);
+        assert!(ended.run.positions() == ended.twin.rest && ended.run.report.max_displacement_mm == 0.0);
+        let found = ended.run.deformed();
+        assert_eq!(found.grid(), original().grid());
+        assert!(found.voxels() == original().voxels());
+        assert_eq!(ended.run.report.warnings, [""; 0]);
+    }
+    let dragged = Run::of(&chain(&[CT, HANDLE])).deformed();
+    assert!(dragged.voxels() != original().voxels(), "the control");
+}
+
+/// What incisions take is air, with this model as with the other, early or late.
+#[test]
+fn a_cut_that_nobody_drags_only_takes_tissue_away() {
+    let other = Run::of(&chain(&[CT, INCISION, ("model", "pbd"), ("run.frames", "0")])).deformed();
+    assert!(other.voxels() != original().voxels());
+    for at_s in ["0", "0.25"] {
+        let ended = Ended::of(&chain(&[CT, INCISION, ("incision.0.at_s", at_s)]));
+        assert!(ended.told().cut_links > 0 && ended.told().moved == 0 && ended.moved() == 0);
+        assert!(ended.run.deformed().voxels() == other.voxels(), "{at_s}");
+    }
+}
+
+#[test]
+fn a_handle_is_where_it_is_told_to_be_at_any_time() {
+    let scene = chain(&[HANDLE]);
+    let whole = Vector3::new(0.0, 20.0, 5.0);
+    // It takes four of the frames.
+    for (frames, share) in [(1, 0.25), (2, 0.5), (4, 1.0), (6, 1.0)] {
+        let (ended, told) = (Ended::of(&first(frames, &scene)), whole * share);
+        let held = &ended.twin.held[0];
+        assert!(held.len() > 1 && held.iter().all(|&v| (ended.by[v] - told).norm() < EXACT_MM), "{frames}");
+        assert!((ended.run.report.max_displacement_mm - told.norm()).abs() < EXACT_MM);
+        assert!(ended.told().moved == ended.moved() && ended.moved() > held.len(), "{:?}", ended.told());
+        assert_eq!(ended.told().violated_links, 0);
+        let mut fixed = (0..ended.by.len()).filter(|&v| ended.twin.still[v]);
+        assert!(fixed.all(|v| ended.by[v] == Vector3::zeros()), "{frames}");
+        assert!(ended.run.report.sizes.fixed_vertices > 100);
+    }
+}
+
+/// Two handles at their own pace, one of them on what is fixed otherwise.
+#[test]
+fn each_handle_goes_its_own_way() {
+    let handles = "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5], over_s = 0.5 },
+        { at_mm = [0, -55, 0], radius_mm = 9, move_mm = [1, 2, -1], over_s = 0.25 }]";
+    let scene = chain(&[("handle", handles), UNIFORM]);
+    for (frames, moved) in
+        [(1, [[0.0, 5.0, 1.25], [0.5, 1.0, -0.5]]), (6, [[0.0, 20.0, 5.0], [1.0, 2.0, -1.0]])]
+    {
+        let ended = Ended::of(&first(frames, &scene));
+        for (held, moved) in ended.twin.held.iter().zip(moved) {
+            assert!(!held.is_empty());
+            assert!(held.iter().all(|&v| (ended.by[v] - Vector3::from(moved)).norm() < EXACT_MM), "{frames}");
+        }
+        assert_eq!(ended.told().violated_links, 0);
+    }
+    // It is one that the plane of the scene fixes.
+    let fixed = |set: &[(&str, &str)]| Run::of(&chain(set)).report.sizes.fixed_vertices;
+    let grabbed = Twin::of(&scene).held[1].len();
+    assert_eq!(fixed(&[]) - fixed(&[("handle", handles)]), grabbed);
+}
+
+/// The links are the edges of the lattice along its axes; each is within its limits, and some are at theirs.
+#[test]
+fn links_are_edges_within_their_limits() {
+    for relax in ["0", "10"] {
+        let ended = Ended::of(&chain(&[HANDLE, UNIFORM, ("chainmail.relax_per_frame", relax)]));
+        assert_eq!(ended.run.report.sizes.edges, ended.twin.links.len());
+        let excesses: Vec<f64> = ended.excesses(0.7, 1.3, 0.4).collect();
+        assert!(excesses.iter().all(|&excess| excess < EXACT_MM), "beyond a limit");
+        assert!(excesses.iter().any(|&excess| excess > -2.0 * EXACT_MM), "none is at its limit");
+        let energy = ended.strains().map(|(_, strain)| 0.5 * strain.norm_squared()).sum::<f64>();
+        let told = ended.told().energy_after;
+        assert!((told / energy - 1.0).abs() < 1e-4, "{told} mm², and by the positions {energy}");
+    }
+}
+
+/// What lies beyond a region stays, and what borders on it is fixed.
+#[test]
+fn a_region_is_fixed_where_it_ends() {
+    let region = ("lattice.region", "{ around_mm = 60 }");
+    let ended = Ended::of(&chain(&[HANDLE, region, ("fixed", "{}")]));
+    let sizes = &ended.run.report.sizes;
+    let still = ended.twin.still.iter().filter(|still| **still).count();
+    assert!(sizes.frozen_vertices > 1000 && still > 50 && sizes.fixed_vertices == still, "{sizes:?}");
+    assert!(ended.by.iter().zip(&ended.twin.still).all(|(by, still)| !still || *by == Vector3::zeros()));
+    assert_eq!(sizes.edges, ended.twin.links.len());
+    assert!(ended.told().moved > ended.twin.held[0].len());
+}
+
+/// A CT that is turned and stored along other axes: the same drag, as seen from there.
+#[test]
+fn the_axes_of_the_ct_may_lie_anyhow() {
+    let turn =
+        Rotation3::from_euler_angles(0.0, 0.0, 0.5) * Rotation3::from_euler_angles(0.0, FRAC_PI_2, 0.0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("turned.nii");
+    let upright = original();
+    let rows = upright.grid().affine.rows();
+    let rows = turn.to_homogeneous() * Matrix4::from_fn(|row, column| rows[row][column]);
+    let affine = Affine::from_rows(rows.transpose().into()).unwrap();
+    let grid = Grid { affine, ..*upright.grid() };
+    nifti::write(&path, &Volume::new(grid, upright.voxels().to_vec(), 1.0, 0.0).unwrap()).unwrap();
+    let run = |volume: &str, turn: Rotation3<f64>| {
+        let [at, by] =
+            [[-40.0, 100.0, 0.0], [-7.0, 20.0, 5.0]].map(|v| <[f64; 3]>::from(turn * Vector3::from(v)));
+        let handle = format!("[{{ at_mm = {at:?}, radius_mm = 15, move_mm = {by:?}, over_s = 0.5 }}]");
+        let fixed = "{ bone_above_hu = 250, end_layers = [\"k\"] }";
+        Ended::of(&chain(&[("volume", volume), ("handle", &handle), ("fixed", fixed), UNIFORM, UNRELAXED]))
+    };
+    let turned = run(&format!("{{ path = {path:?} }}"), turn);
+    let upright = run(&CT_FILE, Rotation3::identity());
+    assert!(turned.told().moved == upright.told().moved && turned.moved() > 100);
+    assert!(turned.by.iter().zip(&upright.by).all(|(a, b)| (a - turn * b).norm() < 2.0 * EXACT_MM));
+}
+
+#[test]
+fn relaxation_lowers_the_energy_until_it_settles() {
+    let told = |relax: &str, frames: u32| {
+        let scene = chain(&[HANDLE, ("chainmail.relax_per_frame", relax)]);
+        Run::of(&first(frames, &scene)).report.chainmail.unwrap()
+    };
+    let without = told("0", 6);
+    assert_eq!((without.relax_sweeps, without.relax_moves, without.settled), (0, 0, false));
+    assert!(without.energy_before == without.energy_after && without.energy_after > 0.0, "{without:?}");
+    // The last frame that moves the handle is the fourth, and those after it relax on.
+    let (few, more, all) = (told("1", 4), told("1", 6), told("1", 60));
+    assert_eq!([few.relax_sweeps, more.relax_sweeps], [4, 6]);
+    assert!(few.energy_before == more.energy_before && few.energy_before == all.energy_before);
+    let energies = [few.energy_before, few.energy_after, more.energy_after, all.energy_after];
+    assert!(energies.is_sorted_by(|a, b| a > b) && all.energy_after < without.energy_after, "{energies:?}");
+    assert!(!few.settled && !more.settled && all.settled && all.relax_sweeps < 60, "{all:?}");
+}

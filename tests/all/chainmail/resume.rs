@@ -1,0 +1,67 @@
+//! A chain that goes on from a checkpoint is the one that was not stopped.
+
+use cutis::{ResampleRequest, Silent};
+
+use super::*;
+use crate::scenes::{frames, run_in};
+
+const ALL: (&str, &str) = ("output", "{ volume = true, surface = true, report = true }");
+/// Followed by nothing that is fixed.
+const FAR: (&str, &str) =
+    ("handle", "[{ at_mm = [-15, 105, 0], radius_mm = 11, move_mm = [-150, 0, 9], over_s = 0.375 }]");
+
+/// Before, at and after a cut, while handles move and when they have arrived, with links beyond their limits and without.
+#[test]
+fn any_two_parts_of_a_run_are_the_run() {
+    for (handle, at_s) in [(BESIDE, "0"), (BESIDE, "0.25"), (FAR, "0"), (FAR, "0.25"), (FAR, "0.5")] {
+        let set = [ALL, INCISION, handle, ("incision.0.at_s", at_s), ("chainmail.relax_per_frame", "3")];
+        let scene = chain(&set);
+        let whole = Run::of(&scene);
+        let told = whole.report.chainmail.as_ref().unwrap();
+        assert!(told.cut_links > 0 && (told.violated_links > 0) == (handle == FAR), "{told:?}");
+        for middle in 1..=6 {
+            let folder = tempfile::tempdir().unwrap();
+            run_in(folder.path(), &first(middle, &scene), false).unwrap();
+            let report = run_in(folder.path(), &scene, true).unwrap();
+            let what = format!("{handle:?} {at_s}, from frame {middle} on");
+            assert_eq!(report.frames.count, 6 - middle);
+            for file in ["checkpoint.bin", "skin.vtu", "deformed.nii.gz"] {
+                assert!(
+                    std::fs::read(folder.path().join(file)).unwrap() == whole.bytes(file),
+                    "{what}: {file}"
+                );
+            }
+            assert_eq!(frames(folder.path()), frames(whole.folder()), "{what}");
+            assert_eq!(report.warnings, whole.report.warnings, "{what}");
+            let found = report.chainmail.unwrap();
+            assert_eq!(
+                (found.moved, found.violated_links, found.cut_links, found.energy_after),
+                (told.moved, told.violated_links, told.cut_links, told.energy_after),
+                "{what}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_checkpoint_of_another_chain_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    run_in(folder.path(), &first(3, &chain(&[HANDLE])), false).unwrap();
+    for set in [&[HANDLE, UNIFORM], &[HANDLE, UNRELAXED], &[HANDLE, ("model", "pbd")]] {
+        let error = run_in(folder.path(), &chain(set), true).unwrap_err();
+        assert!(error.is_bad_input() && error.to_string().contains("differ"), "{error}");
+    }
+    run_in(folder.path(), &chain(&[HANDLE]), true).unwrap();
+}
+
+#[test]
+fn the_checkpoint_carries_another_volume_along() {
+    let scene = chain(&[("output", "{ volume = true }"), INCISION, BESIDE]);
+    let run = Run::of(&scene);
+    let out = run.path("again.nii.gz");
+    let request = ResampleRequest { run: run.folder().into(), volume: None, out };
+    let found = cutis::resample_run(&scene, &request, &Silent).unwrap();
+    assert!(run.bytes("again.nii.gz") == run.bytes("deformed.nii.gz"));
+    let told = run.report.resample.as_ref().unwrap();
+    assert_eq!((found.covered_voxels, found.vacated_voxels), (told.covered_voxels, told.vacated_voxels));
+}
