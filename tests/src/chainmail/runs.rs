@@ -22,12 +22,12 @@ pub(super) fn run(scene: &str, set: &[Override], out: &Path) -> Result<Report, F
     Ok(cutis::run(&loaded, &RunOptions { out: out.into(), resume: false }, &Silent)?)
 }
 
-/// As [`run`], with no output but where the vertices end up, in local metres.
+/// As [`run`], with no output but the longest frame, in ms, and where the vertices end up, in local metres.
 pub(super) fn positions(
     scene: &str,
     changes: &[Override],
     out: &Path,
-) -> Result<(Report, Vec<Point3<f32>>), Failure> {
+) -> Result<(Report, f64, Vec<Point3<f32>>), Failure> {
     let bare = [
         set("output", "{ report = true }"),
         set("run.checkpoint_every", "1000000"),
@@ -40,7 +40,15 @@ pub(super) fn positions(
         .take(3 * report.sizes.vertices)
         .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         .collect();
-    Ok((report, numbers.chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect()))
+    let slowest_ms = column(out, 2)?.into_iter().fold(0.0, f64::max);
+    Ok((report, slowest_ms, numbers.chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect()))
+}
+
+/// A column of a run's `frames.csv`.
+fn column(out: &Path, n: usize) -> Result<Vec<f64>, Failure> {
+    let table = std::fs::read_to_string(cutis::RunFolder(out.into()).frames())?;
+    let value = |line: &str| line.split(',').nth(n).and_then(|value| value.parse().ok());
+    Ok(table.lines().skip(1).filter_map(value).collect())
 }
 
 /// A scene as it stands, with all outputs.
@@ -56,12 +64,7 @@ pub(super) struct Whole {
 impl Whole {
     pub(super) fn of(scene: &str, set: &[Override], out: &Path) -> Result<Self, Failure> {
         let report = run(scene, set, out)?;
-        let table = std::fs::read_to_string(cutis::RunFolder(out.into()).frames())?;
-        let column = |n: usize| -> Vec<f64> {
-            let value = |line: &str| line.split(',').nth(n).and_then(|value| value.parse().ok());
-            table.lines().skip(1).filter_map(value).collect()
-        };
-        let (times, frames, gapes) = (column(1), column(2), column(3));
+        let (times, frames, gapes) = (column(out, 1)?, column(out, 2)?, column(out, 3)?);
         let at_s = report.scene.incision.first().map_or(0.0, |incision| incision.at_s);
         let before = times.iter().rposition(|&time| time <= at_s).unwrap_or(0);
         let opening = |row: usize| gapes.get(row).copied().unwrap_or(f64::NAN);
