@@ -40,6 +40,19 @@ fn a_wound_opens_where_the_links_are_cut_and_the_other_side_stays() {
     assert!(right(&whole) > 3.0 && widest(&whole, &lost) < 0.3 * STEPS_MM[0] + EXACT_MM);
 }
 
+/// What an incision takes is no tissue to be dragged.
+#[test]
+fn a_handle_in_a_cut_grabs_what_is_left() {
+    let at = Vector3::new(0.0, 100.0, 0.0);
+    let handle = format!("[{{ at_mm = {:?}, radius_mm = 20, move_mm = [0, 9, 0] }}]", <[f64; 3]>::from(at));
+    let ended = Ended::of(&chain(&[INCISION, ("incision.0.width_mm", "13"), ("handle", &handle)]));
+    let near = |v: &usize| (ended.twin.rest[*v].coords.cast::<f64>() * 1000.0 - at).norm() < 20.0;
+    let taken: Vec<usize> = (0..ended.by.len()).filter(|&v| ended.twin.still[v]).filter(near).collect();
+    assert!(taken.len() > 2 && !ended.twin.held[0].is_empty(), "{}", taken.len());
+    assert!(taken.iter().all(|&v| ended.by[v] == Vector3::zeros()));
+    assert!(ended.twin.held[0].iter().all(|&v| ended.by[v].y > 6.0));
+}
+
 #[test]
 fn an_incision_is_there_from_its_time_on() {
     let common = [REPORT, INCISION, BESIDE, UNRELAXED, UNIFORM];

@@ -148,5 +148,8 @@ fn relaxation_lowers_the_energy_until_it_settles() {
     assert!(few.energy_before == more.energy_before && few.energy_before == all.energy_before);
     let energies = [few.energy_before, few.energy_after, more.energy_after, all.energy_after];
     assert!(energies.is_sorted_by(|a, b| a > b) && all.energy_after < without.energy_after, "{energies:?}");
+    // What settled in one frame and is dragged in the next relaxes again.
+    let at_once = told("1000", 4);
+    assert!(at_once.settled && at_once.energy_after < at_once.energy_before, "{at_once:?}");
     assert!(!few.settled && !more.settled && all.settled && all.relax_sweeps < 60, "{all:?}");
 }

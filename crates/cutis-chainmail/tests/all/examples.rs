@@ -140,14 +140,16 @@ fn relaxation_stops_at_k() {
     assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
 }
 
-/// Where all is of one material, eight elements are relaxed at once. Two materials with the same numbers, element by element, prevent it.
+/// Where all is of one material, eight elements are relaxed at once, the last of 64 materials like the first. Two materials with the same
+/// numbers, element by element, prevent it.
 #[test]
 fn elements_side_by_side_move_as_they_do_one_by_one() {
     for k in [0.0, 0.01] {
         let material = Material { shear: [0.3, 0.2, 0.25], k, ..Material::isotropic(0.7, 1.6, 0.0, 0.0) };
-        let body = |of: fn([usize; 3]) -> u8| chain([40, 9, 7], &[material, material], of);
-        let (mut eight, mut one) = (body(|_| 0), body(|[i, j, k]| ((i + j + k) % 2) as u8));
-        for chain in [&mut eight, &mut one] {
+        let body = |of: fn([usize; 3]) -> u8| chain([40, 9, 7], &[material; 64], of);
+        let (mut eight, mut last) = (body(|_| 0), body(|_| 63));
+        let mut one = body(|[i, j, k]| ((i + j + k) % 2) as u8);
+        for chain in [&mut eight, &mut last, &mut one] {
             let grabbed = chain.element([20, 4, 3]);
             drag(chain, [20, 4, 3], [9.0, -4.0, 6.5]);
             let relaxed = chain.relax(25, &[grabbed, chain.element([0, 0, 0]), grabbed]);
@@ -164,6 +166,7 @@ fn elements_side_by_side_move_as_they_do_one_by_one() {
         }
         for element in 0..eight.places() as u32 {
             assert_eq!(eight.units(element), one.units(element), "{:?}", eight.position(element));
+            assert_eq!(eight.units(element), last.units(element), "{:?}", eight.position(element));
         }
     }
 }
