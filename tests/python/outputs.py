@@ -201,7 +201,7 @@ def changed_problems(before, after, handle, reach):
     changed = before.values != after.values
     beside, beyond = int(changed[near(before, handle, 30.0)].sum()), int(changed[~near(before, handle, reach)].sum())
     problems = [] if same_place(after, before) else ["shape or affine changed"]
-    problems += [] if beside > 200 else [f"only {beside} voxels changed beside the handle"]
+    problems += [] if beside > 100 else [f"only {beside} voxels changed beside the handle"]
     return problems + ([f"{beyond} voxels changed beyond its reach"] if beyond else [])
 
 

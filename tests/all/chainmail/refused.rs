@@ -81,8 +81,9 @@ fn times_zones_and_handles_that_cannot_be() {
     );
     let [far, farther, huge] =
         ["[0, 1e9, 0]", "[0, 0, -70000]", "[1e300, 0, 0]"].map(|by| one(&format!("move_mm = {by}")));
-    type Set<'a> = &'a [(&'a str, &'a str)];
-    let cases: [(Set<'_>, &str, &str); 12] = [
+    /// Overrides, the key that is blamed, and a part of the message.
+    type Refused<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
+    let cases: [Refused<'_>; 12] = [
         (&[("lattice.grading", "{ around_mm = 25 }")], "lattice.grading", "chainmail"),
         (&[("model", "pbd"), ("incision.0.at_s", "0.1")], "incision[0].at_s", "pbd"),
         (&[("incision.0.at_s", "-0.1")], "incision[0].at_s", "-0.1"),
