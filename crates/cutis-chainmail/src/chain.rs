@@ -2,6 +2,7 @@
 
 use crate::ChainError;
 use crate::blade::Blade;
+use crate::census::{MIXED, STILL};
 use crate::limits::{Bounds, Limits};
 use crate::links::{Links, Neighbour};
 use crate::material::{self, Material};
@@ -24,7 +25,7 @@ pub struct Chain {
     pub(crate) flags: [Vec<u8>; 3],
     /// Fixed elements that a drag would have had to move: the next one begins with them too.
     pub(crate) strained: Vec<u32>,
-    /// What [`census`](crate::census::census) says; empty where links or fixed elements have changed since.
+    /// What [`census`](crate::census::census) says; empty before it was first asked.
     pub(crate) census: Vec<u8>,
     /// By row along the first axis: something in it may have changed since it was last relaxed.
     pub(crate) changed: Vec<bool>,
@@ -138,8 +139,12 @@ impl Chain {
     /// [`ChainError::NoSuchElement`]; then none is fixed.
     pub fn fix(&mut self, elements: &[u32]) -> Result<(), ChainError> {
         elements.iter().try_for_each(|&element| self.check_element(element))?;
-        elements.iter().for_each(|&element| self.body.links.set_fixed(element));
-        self.census.clear();
+        for &element in elements {
+            self.body.links.set_fixed(element);
+            if let Some(state) = self.census.get_mut(element as usize) {
+                *state = STILL;
+            }
+        }
         Ok(())
     }
 
@@ -170,12 +175,10 @@ impl Chain {
             for axis in 0..3 {
                 let next = self.body.links.next(element, axis);
                 if next.is_some_and(|next| apart(self, element, next)) {
-                    cut += usize::from(self.body.links.cut(element, axis));
-                    self.mark_changed(element);
+                    cut += usize::from(self.cut_link(element, axis));
                 }
             }
         }
-        self.census.clear();
         cut
     }
 
@@ -200,16 +203,26 @@ impl Chain {
     pub fn cut_links(&mut self, pairs: &[[u32; 2]]) -> usize {
         let mut cut = 0;
         for [a, b] in pairs.iter().map(|[a, b]| [*a.min(b), *a.max(b)]) {
-            let links = &mut self.body.links;
+            let links = &self.body.links;
             if (b as usize) < links.len()
                 && let Some(axis) = (0..3).find(|&axis| links.next(a, axis) == Some(b))
             {
-                cut += usize::from(links.cut(a, axis));
-                self.mark_changed(a);
+                cut += usize::from(self.cut_link(a, axis));
             }
         }
-        self.census.clear();
         cut
+    }
+
+    /// Removes the link of an element to the one after it; whether there was one.
+    fn cut_link(&mut self, element: u32, axis: usize) -> bool {
+        let Some(next) = self.body.links.next(element, axis) else { return false };
+        for end in [element, next] {
+            if let Some(state) = self.census.get_mut(end as usize).filter(|state| **state != STILL) {
+                *state = MIXED;
+            }
+        }
+        self.mark_changed(element);
+        self.body.links.cut(element, axis)
     }
 
     /// Number of links.
