@@ -56,12 +56,16 @@ static CT_FILE: LazyLock<String> = LazyLock::new(|| {
 
 /// The small phantom as a chain on a coarse lattice, six frames of an eighth of a second; uncut, and nothing drags it.
 fn chain(set: &[(&str, &str)]) -> LoadedScene {
+    bare(&[&[("chainmail.materials", TISSUE)], set].concat())
+}
+
+/// The same without a section of its own.
+fn bare(set: &[(&str, &str)]) -> LoadedScene {
     let common = [
         ("model", "chainmail"),
         ("volume", CT_FILE.as_str()),
         ("constraints", "{}"),
         ("incision", "[]"),
-        ("chainmail.materials", TISSUE),
         ("lattice.spacing_mm", "12"),
         ("solver", "{ dt_s = 0.125, backend = \"cpu\" }"),
         ("run", "{ frames = 6, checkpoint_every = 6 }"),
