@@ -2,7 +2,7 @@
 
 use crate::ChainError;
 use crate::blade::Blade;
-use crate::census::{MIXED, STILL};
+use crate::census::{Census, MIXED, STILL};
 use crate::limits::{Bounds, Limits};
 use crate::links::{Links, Neighbour};
 use crate::material::{self, Material};
@@ -25,8 +25,8 @@ pub struct Chain {
     pub(crate) flags: [Vec<u8>; 3],
     /// Fixed elements that a drag would have had to move: the next one begins with them too.
     pub(crate) strained: Vec<u32>,
-    /// What [`census`](crate::census::census) says; empty before it was first asked.
-    pub(crate) census: Vec<u8>,
+    /// How elements can be relaxed; empty before it was first asked.
+    pub(crate) census: Census,
     /// By row along the first axis: something in it may have changed since it was last relaxed.
     pub(crate) changed: Vec<bool>,
     /// What relaxation computes with; the outcome is the same.
@@ -88,7 +88,7 @@ impl Chain {
             flags: [0, 1, 2].map(|_| vec![0; links.len()]),
             body: Body { links, limits: Limits::new(materials, spacing_mm), materials: element_materials },
             strained: Vec::new(),
-            census: Vec::new(),
+            census: Census::default(),
             changed: vec![false; shape[1] * shape[2]],
             width: Width::widest(),
             spacing_mm,
@@ -141,7 +141,7 @@ impl Chain {
         elements.iter().try_for_each(|&element| self.check_element(element))?;
         for &element in elements {
             self.body.links.set_fixed(element);
-            if let Some(state) = self.census.get_mut(element as usize) {
+            if let Some(state) = self.census.of.get_mut(element as usize) {
                 *state = STILL;
             }
         }
@@ -217,7 +217,7 @@ impl Chain {
     fn cut_link(&mut self, element: u32, axis: usize) -> bool {
         let Some(next) = self.body.links.next(element, axis) else { return false };
         for end in [element, next] {
-            if let Some(state) = self.census.get_mut(end as usize).filter(|state| **state != STILL) {
+            if let Some(state) = self.census.of.get_mut(end as usize).filter(|state| **state != STILL) {
                 *state = MIXED;
             }
         }

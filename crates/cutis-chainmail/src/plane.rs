@@ -1,6 +1,6 @@
-//! Relaxation of the elements of a plane: one by one, and many at a time where they and all around them are of one material.
+//! Relaxation of the elements of a plane: one by one, and side by side where many of a row are of one kind.
 
-use crate::census::{MIXED, STILL};
+use crate::census::{Census, Kind, MIXED, STILL};
 use crate::chain::Body;
 use crate::limits::Bounds;
 use crate::links::{BEFORE, NEXT};
@@ -8,12 +8,16 @@ use crate::units::UNITS_PER_STEP;
 
 /// Elements of a row that are looked at side by side; half of them, of one colour of the checkerboard, may move.
 const BLOCK: usize = 64;
+/// Coordinates in the widest vector that there is.
+const VECTOR: usize = 16;
+/// Of a kind that has no more in a block, elements are relaxed one by one: that takes no longer.
+const FEW: usize = 4;
 
 /// A coordinate of the elements of a plane, and of the planes beside it.
 pub(crate) struct Plane<'a> {
     pub(crate) body: &'a Body,
     /// Of all elements.
-    pub(crate) census: &'a [u8],
+    pub(crate) census: &'a Census,
     pub(crate) coordinate: usize,
     pub(crate) k: usize,
     pub(crate) x: &'a mut [i32],
@@ -53,49 +57,61 @@ impl Plane<'_> {
     /// Moves the elements of a row whose `i` is even, or odd.
     #[inline(always)]
     fn relax_row(&mut self, j: usize, odd: usize) -> u64 {
-        let [nx, ny, _] = self.body.links.shape();
+        let nx = self.body.links.shape()[0];
         let (row, first) = (j * nx, self.k * self.x.len() + j * nx);
-        let census = &self.census[first..first + nx];
-        // Elsewhere no element has six neighbours.
-        let within = j > 0 && j + 1 < ny && !self.below.is_empty() && !self.above.is_empty();
+        let census = &self.census.of[first..first + nx];
         let mut moves = 0;
         for (part, i) in census.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
             let (place, odd) = (row + i, (odd + i) % 2);
-            let differ = part.iter().fold(0, |differ, state| differ | (state ^ part[0]));
-            if differ == 0 && part[0] == STILL {
+            if part.iter().fold(STILL, |all, state| all & state) == STILL {
                 continue;
             }
-            if within && differ == 0 && part[0] != MIXED {
-                moves += self.relax_alike(place, part, part[0], odd);
-                continue;
-            }
-            if within {
-                // A bit for each material: there are 64 at the most.
-                let mut there =
-                    part.iter().filter(|&&state| state < MIXED).fold(0_u64, |all, state| all | 1 << state);
-                while there != 0 {
-                    moves += self.relax_alike(place, part, there.trailing_zeros() as u8, odd);
-                    there &= there - 1;
+            let mut states = [STILL; BLOCK];
+            states[..part.len()].copy_from_slice(part);
+            // A bit for each kind.
+            let mut there =
+                states.iter().filter(|&&state| state < MIXED).fold(0_u64, |all, state| all | 1 << state);
+            while there != 0 {
+                let kind = there.trailing_zeros() as u8;
+                there &= there - 1;
+                if states.iter().filter(|&&state| state == kind).count() > FEW {
+                    moves += self.relax_alike(place, part.len(), &states, kind, odd);
+                } else {
+                    states.iter_mut().filter(|state| **state == kind).for_each(|state| *state = MIXED);
                 }
             }
-            for lane in (odd..part.len()).step_by(2).filter(|&lane| part[lane] == MIXED) {
-                moves += u64::from(self.relax_one(place + lane));
+            for (eight, lanes) in states.as_chunks::<8>().0.iter().zip((0..).step_by(8)) {
+                if eight.iter().fold(false, |any, &state| any | (state == MIXED)) {
+                    for lane in (odd..8).step_by(2).filter(|&lane| eight[lane] == MIXED) {
+                        moves += u64::from(self.relax_one(place + lanes + lane));
+                    }
+                }
             }
         }
         moves
     }
 
-    /// Moves those of the elements from a place on that `census` says are of `material`.
+    /// Moves those of `count` elements from a place on that are of a kind, by their `states`. They have six links, so that there are
+    /// elements on all sides.
     #[inline(always)]
-    fn relax_alike(&mut self, place: usize, census: &[u8], material: u8, odd: usize) -> u64 {
-        let (limits, nx, count) = (&self.body.limits, self.body.links.shape()[0], census.len());
+    fn relax_alike(
+        &mut self,
+        place: usize,
+        count: usize,
+        states: &[u8; BLOCK],
+        number: u8,
+        odd: usize,
+    ) -> u64 {
+        let nx = self.body.links.shape()[0];
+        // Whole vectors are faster; where they reach beyond the block, nothing moves.
+        let count = count.next_multiple_of(VECTOR).min(self.x.len() - place - nx);
+        let Kind { bounds, k } = &self.census.kinds[usize::from(number)];
+        let (bounds, k) = (bounds[self.coordinate], *k);
         let mut around = [0; BLOCK + 2];
         around[..count + 2].copy_from_slice(&self.x[place - 1..place + count + 1]);
         let (before, at, after) = (&around[..count], &around[1..=count], &around[2..count + 2]);
         let (left, right) = (&self.x[place - nx..][..count], &self.x[place + nx..][..count]);
         let (below, above) = (&self.below[place..][..count], &self.above[place..][..count]);
-        let (pair, k) = (limits.pair(material, material), limits.k(material));
-        let bounds = [0, 1, 2].map(|axis| limits.of(self.coordinate, pair, axis));
         let mut to = [0; BLOCK];
         let to = &mut to[..count];
         let mut moves = 0_u32;
@@ -104,17 +120,17 @@ impl Plane<'_> {
             let pairs = [[before[lane], after[lane]], [left[lane], right[lane]], [below[lane], above[lane]]];
             // The rest lengths before and after cancel in the sum.
             let (mut sum, mut lowest, mut highest) = (0_i32, i32::MIN, i32::MAX);
-            for ([before, after], Bounds { lo, hi }) in pairs.into_iter().zip(bounds) {
+            for ([before, after], [back, ahead]) in pairs.into_iter().zip(bounds) {
                 sum = sum.wrapping_add(before).wrapping_add(after);
-                lowest = lowest.max(before + lo).max(after - hi);
-                highest = highest.min(before + hi).min(after - lo);
+                lowest = lowest.max(before + back.lo).max(after - ahead.hi);
+                highest = highest.min(before + back.hi).min(after - ahead.lo);
             }
             let sum = sum.wrapping_sub(x.wrapping_mul(6));
             let (lowest, highest) = (lowest - x, highest - x);
             let size = ((2 * sum.unsigned_abs().min(MOST_ASKED) + 5) / 12) as i32;
             let asked = if sum < 0 { -size } else { size };
             let moves_here =
-                (census[lane] == material) & (lane % 2 == odd) & (size >= k) & (lowest <= 0) & (highest >= 0);
+                (states[lane] == number) & (lane % 2 == odd) & (size >= k) & (lowest <= 0) & (highest >= 0);
             let by = if moves_here { asked.min(highest).max(lowest) } else { 0 };
             moves += u32::from(by != 0);
             to[lane] = x.wrapping_add(by);

@@ -13,7 +13,7 @@
 
 use rayon::prelude::*;
 
-use crate::census::{self, STILL};
+use crate::census::{Census, STILL};
 use crate::chain::Chain;
 use crate::plane::Plane;
 
@@ -33,11 +33,11 @@ impl Chain {
     pub fn relax(&mut self, most: u32, held: &[u32]) -> Relaxation {
         let held: Vec<u32> = held.iter().copied().filter(|&element| self.is_there(element)).collect();
         let mut census = std::mem::take(&mut self.census);
-        if census.is_empty() {
-            census = census::census(&self.body);
+        if census.of.is_empty() {
+            census = Census::new(&self.body);
         }
-        let free: Vec<u8> = held.iter().map(|&element| census[element as usize]).collect();
-        held.iter().for_each(|&element| census[element as usize] = STILL);
+        let free: Vec<u8> = held.iter().map(|&element| census.of[element as usize]).collect();
+        held.iter().for_each(|&element| census.of[element as usize] = STILL);
         let mut done = Relaxation::default();
         let [_, ny, nz] = self.shape();
         let rows = || [0, 1, 2].map(|_| vec![false; ny * nz]);
@@ -57,7 +57,7 @@ impl Chain {
             let moved = |row: usize| odd.iter().any(|rows| rows[row]);
             self.changed = (0..ny * nz).map(moved).collect();
         }
-        held.iter().zip(&free).rev().for_each(|(&element, &state)| census[element as usize] = state);
+        held.iter().zip(&free).rev().for_each(|(&element, &state)| census.of[element as usize] = state);
         self.mark_held(&held);
         self.census = census;
         done
@@ -73,7 +73,7 @@ impl Chain {
     fn sweep_half(
         &mut self,
         odd: usize,
-        census: &[u8],
+        census: &Census,
         changed: &[Vec<bool>; 3],
         moved: &mut [Vec<bool>; 3],
     ) -> u64 {

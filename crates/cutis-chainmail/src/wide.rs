@@ -77,6 +77,7 @@ fn with_avx512(plane: &mut Plane<'_>, odd: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::Width;
+    use crate::census::MIXED;
     use crate::{Chain, Drag, Material, Order};
 
     /// Rows longer and shorter than a block, of two materials in clumps, pulled at many elements.
@@ -98,6 +99,24 @@ mod tests {
             }
         }
         chain
+    }
+
+    #[test]
+    fn side_by_side_and_one_by_one_give_the_same_bits() {
+        for shape in [[150, 9, 8], [64, 4, 5], [13, 12, 11]] {
+            let mut chain = kneaded(shape);
+            chain.relax(0, &[]);
+            let links: Vec<_> = (0..40).map(|n| chain.element([shape[0] / 2, 2, 2]) - n).collect();
+            links.windows(2).step_by(2).for_each(|pair| {
+                chain.cut_links(&[[pair[1], pair[0]]]);
+            });
+            let mut alone = chain.clone();
+            let some = alone.census.of.iter_mut().filter(|state| **state < MIXED);
+            assert!(some.map(|state| *state = MIXED).count() > 50 && chain.census.kinds.len() > 10);
+            let done = chain.relax(20, &[3]);
+            assert!(done.moves > 1000 && done == alone.relax(20, &[3]), "{done:?}");
+            assert!(chain.positions == alone.positions);
+        }
     }
 
     #[test]

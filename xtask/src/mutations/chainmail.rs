@@ -86,8 +86,8 @@ pub const CHAINMAIL: &[Mutation] = &[
         ChainMail,
         "ChainMail: relaxation moves what is held",
         "crates/cutis-chainmail/src/relax.rs",
-        "census[element as usize] = STILL",
-        "census[element as usize] |= 0",
+        "census.of[element as usize] = STILL",
+        "census.of[element as usize] |= 0",
     ),
     mutation(
         ChainMail,
@@ -112,10 +112,10 @@ pub const CHAINMAIL: &[Mutation] = &[
     ),
     mutation(
         ChainMail,
-        "ChainMail: a row with a second material relaxes as if it were all of the first",
+        "ChainMail: side by side, other kinds of elements relax as if they were of the first",
         "crates/cutis-chainmail/src/plane.rs",
-        "(census[lane] == material)",
-        "(census[lane] < MIXED)",
+        "(states[lane] == number)",
+        "(states[lane] < MIXED)",
     ),
     mutation(
         ChainMail,
