@@ -30,6 +30,9 @@ pub struct Relaxation {
 
 impl Chain {
     /// Sweeps until nothing moves, or `most` times. Fixed elements and those in `held` stay.
+    ///
+    /// The first time it looks up which elements are alike, also for no sweep at all: whoever waits for frames can have that
+    /// done before the first of them.
     pub fn relax(&mut self, most: u32, held: &[u32]) -> Relaxation {
         let held: Vec<u32> = held.iter().copied().filter(|&element| self.is_there(element)).collect();
         let mut census = std::mem::take(&mut self.census);

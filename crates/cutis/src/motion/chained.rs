@@ -47,7 +47,7 @@ impl<'a> Chained<'a> {
     /// `threads`: none for one queue on one thread.
     pub(crate) fn new(
         loaded: &LoadedScene,
-        chain: ChainBody,
+        mut chain: ChainBody,
         body: &'a Body,
         threads: Option<usize>,
         relaxer: Option<Relaxer>,
@@ -58,6 +58,10 @@ impl<'a> Chained<'a> {
             .thread_name(|k| format!("cutis-chain-{k}"))
             .build()
             .map_err(|error| CpuError::ThreadPool { threads: count, reason: error.to_string() })?;
+        if relaxer.is_none() && chain.relax_per_frame > 0 {
+            // What is looked up once is no part of the first frame.
+            pool.install(|| chain.chain.relax(0, &[]));
+        }
         let affine = &body.mesh.lattice.grid().affine;
         let origin = affine.to_mm(Point3::origin());
         let step_m =
