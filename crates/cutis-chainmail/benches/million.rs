@@ -5,11 +5,25 @@ use cutis_chainmail::{Chain, Drag, Material, Order};
 
 const SIDE: usize = 100;
 
-/// A cube of two materials in layers, bone between soft tissue if `mixed`.
-fn cube(mixed: bool) -> Chain {
+/// What a cube is made of.
+#[derive(Clone, Copy)]
+enum Made {
+    /// One material.
+    Uniform,
+    /// Layers, ten elements thick, of something stiff between soft tissue.
+    Layers,
+    /// Soft or stiff at random, element by element.
+    Noise,
+}
+
+fn cube(made: Made) -> Chain {
     let soft = Material::isotropic(0.9, 1.1, 0.1, 0.0);
     let stiff = Material::isotropic(0.99, 1.01, 0.01, 0.0);
-    let material = |element: usize| u8::from(mixed && (element / SIDE % SIDE / 10) % 2 == 1);
+    let material = |element: usize| match made {
+        Made::Uniform => 0,
+        Made::Layers => (element / SIDE % SIDE / 10 % 2) as u8,
+        Made::Noise => (element as u32).wrapping_mul(2_654_435_761).count_ones() as u8 % 2,
+    };
     Chain::new([SIDE; 3], [1.0; 3], &[soft, stiff], (0..SIDE.pow(3)).map(material).collect()).unwrap()
 }
 
@@ -40,8 +54,8 @@ fn knead(chain: &Chain) -> Chain {
 fn benches(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("million");
     group.sample_size(10).throughput(Throughput::Elements(SIDE.pow(3) as u64));
-    for (name, mixed) in [("uniform", false), ("mixed", true)] {
-        let chain = cube(mixed);
+    for (name, made) in [("uniform", Made::Uniform), ("layers", Made::Layers), ("noise", Made::Noise)] {
+        let chain = cube(made);
         for (kind, order) in [("fifo", Order::Fifo), ("slabs", Order::Slabs)] {
             group.bench_function(format!("{kind}/{name}"), |bencher| {
                 bencher.iter_batched_ref(

@@ -69,7 +69,9 @@ fn between(a: &Material, b: &Material, axis: usize, coordinate: usize, spacing_m
         let hi = 0.5 * (a.longest[axis] + b.longest[axis]);
         Bounds { lo: (lo * one).ceil() as i32, hi: (hi * one).floor() as i32 }
     } else {
-        let shear = 0.5 * (a.shear[axis] + b.shear[axis]) * spacing_mm[axis] / spacing_mm[coordinate];
+        // A quotient that overflows would be undefined times 0.
+        let steps = (spacing_mm[axis] / spacing_mm[coordinate]).min(f64::from(MOST_SHEAR));
+        let shear = 0.5 * (a.shear[axis] + b.shear[axis]) * steps;
         let most = (shear * one).floor().min(f64::from(MOST_SHEAR)) as i32;
         Bounds { lo: -most, hi: most }
     }
@@ -96,6 +98,19 @@ mod tests {
         // A link along y is 2 mm long; across it, a quarter of that is half a step along x.
         assert_eq!((of(0, 0, 1, 0), of(0, 1, 1, 0)), ([-0.5, 0.5], [-0.25, 0.25]));
         assert_eq!([0, 1].map(|material| limits.k(material)), [1, 1]);
+    }
+
+    #[test]
+    fn what_is_rigid_does_not_shear_whatever_the_spacing() {
+        for spacing_mm in [[1e300, 1e-300, 1.0], [f64::MIN_POSITIVE, 1.0, f64::MAX]] {
+            let limits =
+                Limits::new(&[Material::RIGID, Material { shear: [1.0; 3], ..Material::RIGID }], spacing_mm);
+            for (axis, coordinate) in [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)] {
+                assert_eq!(limits.of(coordinate, 0, axis), Bounds { lo: 0, hi: 0 });
+                let soft = limits.of(coordinate, limits.pair(1, 1), axis);
+                assert!(soft.lo == -soft.hi && (0..=MOST_SHEAR).contains(&soft.hi), "{soft:?}");
+            }
+        }
     }
 
     /// A unit more would be beyond what the material allows.

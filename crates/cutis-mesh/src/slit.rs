@@ -193,6 +193,14 @@ impl Slit {
         point.lateral.abs() <= self.half_width && self.in_middle_surface(point)
     }
 
+    /// True if the slit cuts a simplex with these corners at rest: one of them lies in it, or an edge passes through its middle.
+    pub fn takes(&self, corners: &[Point3<f32>]) -> bool {
+        corners
+            .iter()
+            .enumerate()
+            .any(|(n, &a)| self.holds(a) || corners[n + 1..].iter().any(|&b| self.crosses(a, b)))
+    }
+
     /// True if the straight line between two positions meets the surface in the middle of the slit (lateral = 0).
     pub(crate) fn crosses(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
         let (a, b) = (a.cast::<f64>(), b.cast::<f64>());

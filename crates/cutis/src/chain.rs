@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use cutis_chainmail::{Chain, ChainError, FARTHEST_STEPS, Material, MaterialTable, NO_MATERIAL};
-use cutis_mesh::TetMesh;
+use cutis_mesh::{Slit, TetMesh};
 use nalgebra::{Point3, Vector3, distance};
 
 use crate::Error;
@@ -189,19 +189,29 @@ fn handles(loaded: &LoadedScene, body: &Body) -> Result<Vec<ChainHandle>, Error>
     Ok(handles)
 }
 
-/// What each incision cuts: the links that the cut took, by the nearest incision.
+/// What each incision cuts: the links that no tet has any more. A tet goes with the first incision that takes it.
 fn cuts(loaded: &LoadedScene, body: &Body) -> Vec<ChainCut> {
     let mesh = &body.mesh;
+    let slits = loaded.scene.incision.iter().zip(&body.cut.slits);
+    let mut slits: Vec<(f64, &Slit)> = slits.map(|(cut, slit)| (cut.at_s, slit)).collect();
+    slits.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let mut cuts: Vec<ChainCut> =
-        loaded.scene.incision.iter().map(|cut| ChainCut { at_s: cut.at_s, links: Vec::new() }).collect();
-    for edge in &body.taken.edges {
-        let Some(link) = along_axis(mesh, edge) else { continue };
-        let [p, q] = edge.map(|vertex| mesh.positions[vertex as usize]);
-        let far = |n: &usize| body.cut.slits[*n].distance(nalgebra::center(&p, &q));
-        if let Some(nearest) = (0..cuts.len()).min_by(|a, b| far(a).total_cmp(&far(b))) {
-            cuts[nearest].links.push(link);
+        slits.iter().map(|&(at_s, _)| ChainCut { at_s, links: Vec::new() }).collect();
+    let mut gone_with = HashMap::new();
+    for tet in &body.taken.tets {
+        let corners = tet.map(|vertex| mesh.positions[vertex as usize]);
+        let Some(cut) = slits.iter().position(|(_, slit)| slit.takes(&corners)) else { continue };
+        for (a, &p) in tet.iter().enumerate() {
+            for &q in &tet[a + 1..] {
+                let last = gone_with.entry([p.min(q), p.max(q)]).or_insert(cut);
+                *last = cut.max(*last);
+            }
         }
     }
-    cuts.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    for edge in &body.taken.edges {
+        if let (Some(link), Some(&cut)) = (along_axis(mesh, edge), gone_with.get(edge)) {
+            cuts[cut].links.push(link);
+        }
+    }
     cuts
 }

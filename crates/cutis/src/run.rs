@@ -122,6 +122,9 @@ fn run_with(
             initial_mid_mm: before.mid_mm,
         })
         .collect();
+    let crossed = crossed_lips(&wounds);
+    crossed.iter().for_each(|warning| progress.note(warning));
+    plan.warnings.extend(crossed);
     let moved = rest.iter().zip(&deformed).map(|(a, b)| f64::from((b - a).norm()) * 1e3);
     let max_displacement_mm = moved.fold(0.0, f64::max);
     let border_displacement_mm = body.border_displacement_mm(&deformed);
@@ -193,6 +196,19 @@ fn start<'a>(
             Ok((Box::new(Stepped { solver, on_device: device.is_some() }), device))
         }
     }
+}
+
+/// Wounds that are open the wrong way round: nothing keeps parts of a body out of each other.
+fn crossed_lips(wounds: &[Wound]) -> Vec<String> {
+    let least = wounds.iter().map(|wound| wound.final_mm.min(wound.mid_mm)).enumerate();
+    let crossed = least.filter(|(_, least)| *least < 0.0);
+    let told = crossed.map(|(n, least)| {
+        format!(
+            "the lips of incision[{n}] have passed through each other, by {:.2} mm: there is no contact",
+            -least
+        )
+    });
+    told.collect()
 }
 
 #[cfg(test)]

@@ -120,3 +120,56 @@ fn each_incision_cuts_its_own_links_at_its_own_time() {
         }
     }
 }
+
+/// Until the later one it is the body with the earlier one alone, whatever they share and in whichever order they are named.
+#[test]
+fn incisions_over_one_another_cut_each_at_its_time() {
+    const SHALLOW: &str = "{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 20, width_mm = 9";
+    const DEEP: &str = "{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 40, width_mm = 9";
+    const ACROSS: &str = "{ from_mm = [-45, 110, 0], to_mm = [45, 110, 0], depth_mm = 30, width_mm = 9";
+    const WIDE: &str = "{ from_mm = [-35, 107, -50], to_mm = [-35, 107, 50], depth_mm = 30, width_mm = 50";
+    let scene = |incisions: &[(&str, f64)]| {
+        let all: Vec<String> =
+            incisions.iter().map(|(cut, at_s)| format!("{cut}, at_s = {at_s} }}")).collect();
+        chain(&[REPORT, UNRELAXED, UNIFORM, ("incision", &format!("[{}]", all.join(",")))])
+    };
+    let without = |cuts: &[&str]| lost(&scene(&cuts.iter().map(|cut| (*cut, 0.0)).collect::<Vec<_>>())).len();
+    for [a, b] in [[SHALLOW, DEEP], [DEEP, DEEP], [DEEP, ACROSS], [DEEP, WIDE]] {
+        let both = without(&[a, b]);
+        for [early, late] in [[a, b], [b, a]] {
+            let first_alone = without(&[early]);
+            assert!(first_alone > 10 && both >= first_alone);
+            let cut = |scene: &LoadedScene, frames| {
+                Run::of(&first(frames, scene)).report.chainmail.unwrap().cut_links
+            };
+            for incisions in [[(early, 0.125), (late, 0.25)], [(late, 0.25), (early, 0.125)]] {
+                let counts = [1, 2, 3].map(|frames| cut(&scene(&incisions), frames));
+                assert_eq!(counts, [0, first_alone, both], "{incisions:?}");
+            }
+        }
+    }
+}
+
+/// Nothing keeps one lip out of the other.
+#[test]
+fn lips_that_pass_through_each_other_are_told_of() {
+    let over = "[{ at_mm = [-18, 97, 0], radius_mm = 22, move_mm = [40, 0, 0], over_s = 0.5 }]";
+    let told = |handle| Ended::of(&chain(&[REPORT, INCISION, ("handle", handle), UNIFORM])).run.report;
+    let crossed = |report: &cutis::report::Report| {
+        report.warnings.iter().any(|line| line.contains("incision[0] have passed through each other"))
+    };
+    let (through, apart) = (told(over), told(BESIDE.1));
+    assert!(crossed(&through) && through.wound.as_ref().unwrap().mid_mm < 0.0, "{:?}", through.wound);
+    assert!(!crossed(&apart), "{:?}", apart.warnings);
+}
+
+#[test]
+fn a_cut_after_the_last_drag_is_no_part_of_the_energy_before() {
+    let told = |cut: &[(&str, &str)]| {
+        let common = [BESIDE, ("chainmail.relax_per_frame", "3")];
+        Ended::of(&chain(&[&common[..], cut].concat())).told().clone()
+    };
+    let (whole, cut) = (told(&[]), told(&[INCISION, ("incision.0.at_s", "0.625")]));
+    assert!(cut.cut_links > 0 && whole.energy_before > 0.0, "{cut:?}");
+    assert_eq!((cut.energy_before, cut.energy_after == whole.energy_after), (whole.energy_before, false));
+}

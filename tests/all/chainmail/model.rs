@@ -46,6 +46,22 @@ fn relaxation_that_is_left_out_is_said() {
     assert!(plan.left_out.iter().any(|line| line.starts_with("relaxation:")) && plan.projections == 0);
 }
 
+/// A handle that all frames together do not carry to its end, with either model, and a body that nothing moves.
+#[test]
+fn what_does_not_come_about_is_warned_about() {
+    let over = |over_s| [HANDLE, ("handle.0.over_s", over_s)];
+    for model in ["chainmail", "pbd"] {
+        let of = |over_s| {
+            let spring = ("constraints", "{ distance = { youngs_modulus_pa = 5e3 } }");
+            cutis::check(&chain(&[&over(over_s)[..], &[spring, ("model", model)]].concat()), &Silent).unwrap()
+        };
+        // Six frames of an eighth of a second.
+        assert!(warns(&of("3"), "handle[0] comes 25.000 % of its way"), "{:?}", of("3").warnings);
+        assert!(!warns(&of("0.75"), "of its way"));
+    }
+    assert!(warns(&plan(&[]), "there is no handle") && !warns(&plan(&[HANDLE]), "there is no handle"));
+}
+
 #[test]
 fn a_section_of_the_other_model_is_warned_about() {
     let spring = ("constraints", "{ distance = { youngs_modulus_pa = 5e3 } }");

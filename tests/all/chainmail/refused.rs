@@ -34,7 +34,7 @@ fn materials_that_make_no_sense() {
     let second = |from: &str| list(&[&first, &format!("from_hu = {from}, {soft}")]);
     let many: Vec<String> = (0..65).map(|n| format!("from_hu = {}, {soft}", n - 1024)).collect();
     let many: Vec<&str> = many.iter().map(String::as_str).collect();
-    let cases: [(String, &str, &[&str]); 13] = [
+    let cases: [(String, &str, &[&str]); 18] = [
         ("\"muscle\"".into(), "", &["muscle", "tissue", "uniform"]),
         ("[]".into(), "", &["0 materials", "64"]),
         (list(&many), "", &["65 materials", "64"]),
@@ -59,7 +59,20 @@ fn materials_that_make_no_sense() {
         ),
         (list(&["from_hu = -1024, shortest = 1, longest = 1, shear = -1"]), "[0].shear", &["-1", "0 to 16"]),
         (list(&[&format!("{first}, k_steps = nan")]), "[0].k_steps", &["NaN", "0 to 4096"]),
-        (list(&["from_hu = -1024, shortest = 1, longest = 1"]), "", &["materials"]),
+        (list(&["from_hu = -1024, shortest = 1, longest = 1"]), "[0]", &["shear"]),
+        (list(&[&first, &format!("from_hu = 0, {soft}, k = 0.1")]), "[1].k", &["`k`", "k_steps"]),
+        (
+            list(&["from_hu = -1024, shortest = [1, 1], longest = 1, shear = 0"]),
+            "[0].shortest",
+            &["length 2", "length 3"],
+        ),
+        (
+            list(&["from_hu = -1024, shortest = 1, longest = \"far\", shear = 0"]),
+            "[0].longest",
+            &["far", "a number, or three"],
+        ),
+        ("[\"tissue\"]".into(), "[0]", &["tissue"]),
+        ("5".into(), "", &["5", "the name of a preset, or a list"]),
     ];
     for (value, place, words) in cases {
         let (key, text) = refused(&[("chainmail.materials", &value)]);

@@ -139,8 +139,9 @@ ChainMail where a hand moves tissue and the picture must follow at once: it cost
 same frame, it takes any mix of rigid and soft at no cost in stability, and cuts at any time. What it gives is the least that the limits \
 allow, then smoothed: it reaches less far than elasticity (see the charts), it keeps no volume, and its limits are no moduli, so that neither \
 forces nor the opening of a wound under the skin's own tension can be had from it. With `k` = 0 and as many sweeps as it takes, relaxation \
-ends where the energy is least, much nearer to elasticity, in about a fifth of the time that XPBD needs to come to rest: a way to a body \
+ends where no element alone can lower the energy, much nearer to elasticity, in about a fifth of the time that XPBD needs to come to rest: a way to a body \
 at rest rather than to a frame. Position-based dynamics where the deformation itself is the \
 question: how far a wound opens, what the skin's tension does, how a body sags; its materials are physical, its errors are measured \
-(`accuracy.md`), and it costs some hundred times more per frame on these scenes. A scene can be run by either: `--set model=…`.
+(`accuracy.md`), and it costs some hundred times more per frame on these scenes. A scene can be run by either, if it names `[constraints]`, which ChainMail \
+leaves aside, and cuts at the start: `--set model=…`.
 ";

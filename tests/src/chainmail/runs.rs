@@ -113,7 +113,10 @@ impl Whole {
         [
             ("no link is beyond its limits", told.violated_links == 0),
             ("what is dragged farthest is where it was told, within 0.1 µm", off < 1e-4),
-            ("relaxation lowered the energy", told.energy_after < told.energy_before),
+            (
+                "the energy is lower at the end than after the last drag",
+                told.energy_after < told.energy_before,
+            ),
             ("relaxation came to its end", told.settled),
             ("the cut lets the wound open by at least 1 mm", self.opening_mm[1] > self.opening_mm[0] + 1.0),
         ]

@@ -20,6 +20,9 @@ const CUTS: &str = "cuts";
 const PROPAGATION: &str = "propagation";
 const RELAXATION: &str = "relaxation";
 
+/// Of a checkpoint, which the energy after the last drag takes.
+const ENERGY_WORDS: usize = 2;
+
 /// A chain, the body that it moves, and how far the frames have come.
 pub(crate) struct Chained<'a> {
     chain: ChainBody,
@@ -180,7 +183,8 @@ impl<'a> Chained<'a> {
 impl Motion for Chained<'_> {
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
         let count = 3 * self.chain.elements.len();
-        let (units, strained) = saved.words.split_at(count.min(saved.words.len()));
+        let (units, rest) = saved.words.split_at(count.min(saved.words.len()));
+        let (energy, strained) = rest.split_at(ENERGY_WORDS.min(rest.len()));
         let units: Vec<(u32, [i32; 3])> = self
             .chain
             .elements
@@ -195,7 +199,8 @@ impl Motion for Chained<'_> {
             self.cut();
         }
         self.frame = saved.frame;
-        self.told.energy_before = self.energy();
+        self.told.energy_before =
+            f64::from_bits(energy.iter().rev().fold(0, |bits, &word| bits << 32 | u64::from(word)));
         Ok(())
     }
 
@@ -212,7 +217,7 @@ impl Motion for Chained<'_> {
         if !self.held.is_empty() && (changed || self.frame <= self.last_drag) {
             ledger.time(PROPAGATION, || self.propagate())?;
             changed = true;
-            if self.frame >= self.last_drag {
+            if self.frame == self.last_drag {
                 self.told.energy_before = self.energy();
             }
         }
@@ -238,7 +243,10 @@ impl Motion for Chained<'_> {
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {
         let chain = &self.chain.chain;
         let units = self.chain.elements.iter().flat_map(|&element| chain.units(element));
-        let words = units.map(i32::cast_unsigned).chain(chain.strained().iter().copied()).collect();
+        let energy = self.told.energy_before.to_bits();
+        let energy: [u32; ENERGY_WORDS] = [energy as u32, (energy >> 32) as u32];
+        let words =
+            units.map(i32::cast_unsigned).chain(energy).chain(chain.strained().iter().copied()).collect();
         Ok(Checkpoint { frame, positions: self.positions(), words })
     }
 

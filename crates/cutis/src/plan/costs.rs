@@ -51,6 +51,7 @@ pub(super) fn of_dynamics(
         (loaded.scene.solver.iterations == 1, "multipliers: one iteration per substep needs none stored"),
     ];
     let mut warnings = of_scene(loaded, body);
+    warnings.extend(unfinished_handles(loaded));
     warnings.extend(dynamics.skin_rate.and_then(|rate| unresolved_skin(loaded, rate)));
     Ok(Costs {
         device_memory: backend.device_memory(system, settings),
@@ -85,6 +86,11 @@ pub(super) fn of_chain(loaded: &LoadedScene, body: &Body, chain: &ChainBody, req
     if scene.solver.gravity_m_s2 != [0.0; 3] {
         warnings.push("solver.gravity_m_s2 has no effect with model = \"chainmail\"".to_owned());
     }
+    if scene.handle.is_empty() {
+        warnings
+            .push("there is no handle: with model = \"chainmail\" nothing else moves the body".to_owned());
+    }
+    warnings.extend(unfinished_handles(loaded));
     let backend = request.settle_chain(loaded);
     Costs {
         device_memory: backend.chain_memory(&chain.chain),
@@ -111,6 +117,20 @@ fn unresolved_skin(loaded: &LoadedScene, rate: f64) -> Option<String> {
             "skin tension is stiffer than {} substeps can follow on this lattice: the wound will open less than the \
              modulus asks for; about {needed} substeps would do (or a coarser lattice, or a lower area modulus)",
             solver.substeps
+        )
+    })
+}
+
+/// Handles that the last frame stops on their way.
+fn unfinished_handles(loaded: &LoadedScene) -> impl Iterator<Item = String> {
+    let all_s = f64::from(loaded.scene.run.frames) * loaded.scene.solver.dt_s;
+    let handles = loaded.scene.handle.iter().enumerate();
+    // Frames that add up to it but for rounding are enough.
+    handles.filter(move |(_, handle)| handle.over_s > all_s * (1.0 + 1e-9)).map(move |(n, handle)| {
+        let share = 100.0 * all_s / handle.over_s;
+        format!(
+            "handle[{n}] comes {share:.3} % of its way: its over_s is {} s, and the frames take {all_s} s",
+            handle.over_s
         )
     })
 }

@@ -3,6 +3,7 @@
 //! Positions are world millimetres in the volume's RAS+ frame. Unknown keys are refused. [`Scene::load`] reads a
 //! file, applies overrides and checks every value; each section is a struct of this module.
 
+mod choice;
 mod load;
 mod reference;
 mod sections;

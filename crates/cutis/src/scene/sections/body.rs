@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::PlaneSection;
+use crate::scene::choice::NameOr;
 
 /// Deformation model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -192,13 +193,22 @@ pub enum Keep {
 }
 
 /// A piecewise-linear table over HU: the name of a preset, or points `[hu, value]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum TableChoice {
     /// A preset by name.
     Preset(String),
     /// Points `[hu, value]`, HU strictly increasing.
     Points(Vec<[f32; 2]>),
+}
+
+impl<'de> Deserialize<'de> for TableChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(match NameOr::deserialize(deserializer)? {
+            NameOr::Name(name) => Self::Preset(name),
+            NameOr::Value(points) => Self::Points(points),
+        })
+    }
 }
 
 /// Which triangles are skin.

@@ -1,7 +1,9 @@
 //! ChainMail: what gives way how far, and how much is relaxed.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::scene::choice::{NameOr, NumberOr};
 
 /// ChainMail, where it is the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -22,13 +24,22 @@ impl Default for ChainmailSection {
 }
 
 /// Materials by HU: the name of a preset, or a list.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum MaterialsChoice {
     /// A preset by name.
     Preset(String),
     /// `{ from_hu, shortest, longest, shear, k_steps }`, `from_hu` strictly increasing.
     List(Vec<ChainMaterialSection>),
+}
+
+impl<'de> Deserialize<'de> for MaterialsChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(match NameOr::deserialize(deserializer)? {
+            NameOr::Name(name) => Self::Preset(name),
+            NameOr::Value(list) => Self::List(list),
+        })
+    }
 }
 
 /// Limits of the links of what has an HU from `from_hu` up to that of the next one, in rest lengths.
@@ -49,13 +60,22 @@ pub struct ChainMaterialSection {
 }
 
 /// One number, or one for links along each axis of the lattice.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum PerAxis {
     /// The same along every axis.
     All(f64),
     /// Along `i`, `j` and `k`.
     Each([f64; 3]),
+}
+
+impl<'de> Deserialize<'de> for PerAxis {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(match NumberOr::deserialize(deserializer)? {
+            NumberOr::Number(value) => Self::All(value),
+            NumberOr::Value(values) => Self::Each(values),
+        })
+    }
 }
 
 impl PerAxis {
