@@ -113,6 +113,16 @@ mod tests {
         }
     }
 
+    /// On a grid with one step the step cancels, to the last bit.
+    #[test]
+    fn shear_does_not_depend_on_the_step_of_an_even_grid() {
+        let lean = Material { shear: [1.5; 3], ..Material::isotropic(0.5, 2.0, 0.0, 0.0) };
+        for n in 1..2000 {
+            let limits = Limits::new(&[lean], [f64::from(n) / 337.0; 3]);
+            assert_eq!(limits.of(0, 0, 1).hi, UNITS_PER_STEP + UNITS_PER_STEP / 2, "{n}");
+        }
+    }
+
     /// A unit more would be beyond what the material allows.
     #[test]
     fn limits_are_rounded_inwards() {
