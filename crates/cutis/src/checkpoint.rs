@@ -2,8 +2,8 @@
 //!
 //! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32), vertex count (u64),
 //! positions (3 × f32 per vertex, m, local frame), three words of 32 bits per vertex, more words, SHA-256 of all that (32). The words
-//! are velocities (f32, m/s) and no more with the model `pbd`; with `chainmail` coordinates (i32, units of the chain), then the
-//! elements that [`Chain::strained`](cutis_chainmail::Chain::strained) names.
+//! are velocities (f32, m/s) and no more with the model `pbd`; with `chainmail` coordinates (i32, units of the chain), then the energy after
+//! the last drag (f64, mm², two words), then the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) names.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{Error, Scene, files};
 
-const MAGIC: &[u8; 8] = b"CUTISCP1";
+const MAGIC: &[u8; 8] = b"CUTISCP2";
 const HEADER: usize = 8 + 32 + 4 + 8;
 const SEAL: usize = 32;
 

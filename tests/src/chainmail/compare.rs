@@ -49,7 +49,7 @@ const PBD: [(&str, &str); 3] = [
     ("run.frames", "120"),
 ];
 
-/// Relaxes to the least energy.
+/// Relaxes as far as elements can one by one.
 const ELASTIC: &str = "[{ from_hu = -1024, shortest = 0.4, longest = 1.8, shear = 0.8 }, \
                        { from_hu = 250, shortest = 1, longest = 1, shear = 0 }]";
 

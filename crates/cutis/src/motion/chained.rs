@@ -20,7 +20,7 @@ const CUTS: &str = "cuts";
 const PROPAGATION: &str = "propagation";
 const RELAXATION: &str = "relaxation";
 
-/// Of a checkpoint, which the energy after the last drag takes.
+/// Words of a checkpoint that the energy after the last drag takes.
 const ENERGY_WORDS: usize = 2;
 
 /// A chain, the body that it moves, and how far the frames have come.

@@ -1,71 +1,73 @@
-//! Values that may be written in two ways. The message of the way that was tried comes through, with its place.
+//! A value that may be written in two ways. The message of the way that was tried comes through, with its place.
 
 use std::fmt;
 use std::marker::PhantomData;
 
 use serde::de::value::SeqAccessDeserializer;
-use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, Error, IntoDeserializer, SeqAccess, Unexpected, Visitor};
 
-/// The name of a preset, or what it would stand for.
-pub(super) enum NameOr<T> {
-    Name(String),
-    Value(T),
+/// One of something, or a list.
+pub(super) enum OneOr<One, List> {
+    One(One),
+    List(List),
 }
 
-/// One number, or something written as a list.
-pub(super) enum NumberOr<T> {
-    Number(f64),
-    Value(T),
+/// What may stand by itself in place of a list.
+pub(super) trait One<'de>: Deserialize<'de> {
+    /// Both ways, for people.
+    const EITHER: &'static str;
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for NameOr<T> {
+impl One<'_> for String {
+    const EITHER: &'static str = "the name of a preset, or a list";
+}
+
+impl One<'_> for f64 {
+    const EITHER: &'static str = "a number, or three";
+}
+
+impl<'de, A: One<'de>, L: Deserialize<'de>> Deserialize<'de> for OneOr<A, L> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for Either<T> {
-            type Value = NameOr<T>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a preset, or a list")
-            }
-
-            fn visit_str<E: Error>(self, name: &str) -> Result<Self::Value, E> {
-                Ok(NameOr::Name(name.to_owned()))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
-                T::deserialize(SeqAccessDeserializer::new(list)).map(NameOr::Value)
-            }
-        }
         deserializer.deserialize_any(Either(PhantomData))
     }
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for NumberOr<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for Either<T> {
-            type Value = NumberOr<T>;
+struct Either<A, L>(PhantomData<(A, L)>);
 
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, or three")
-            }
+impl<'de, A: One<'de>, L: Deserialize<'de>> Either<A, L> {
+    fn one<E: Error>(
+        self,
+        value: impl IntoDeserializer<'de, E>,
+        found: Unexpected<'_>,
+    ) -> Result<OneOr<A, L>, E> {
+        A::deserialize(value.into_deserializer()).map(OneOr::One).map_err(|_| E::invalid_type(found, &self))
+    }
+}
 
-            fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
-                Ok(NumberOr::Number(number))
-            }
+impl<'de, A: One<'de>, L: Deserialize<'de>> Visitor<'de> for Either<A, L> {
+    type Value = OneOr<A, L>;
 
-            fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
-                Ok(NumberOr::Number(number as f64))
-            }
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(A::EITHER)
+    }
 
-            fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
-                Ok(NumberOr::Number(number as f64))
-            }
+    fn visit_str<E: Error>(self, name: &str) -> Result<Self::Value, E> {
+        self.one(name.to_owned(), Unexpected::Str(name))
+    }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
-                T::deserialize(SeqAccessDeserializer::new(list)).map(NumberOr::Value)
-            }
-        }
-        deserializer.deserialize_any(Either(PhantomData))
+    fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
+        self.one(number, Unexpected::Float(number))
+    }
+
+    fn visit_i64<E: Error>(self, number: i64) -> Result<Self::Value, E> {
+        self.one(number, Unexpected::Signed(number))
+    }
+
+    fn visit_u64<E: Error>(self, number: u64) -> Result<Self::Value, E> {
+        self.one(number, Unexpected::Unsigned(number))
+    }
+
+    fn visit_seq<S: SeqAccess<'de>>(self, list: S) -> Result<Self::Value, S::Error> {
+        L::deserialize(SeqAccessDeserializer::new(list)).map(OneOr::List)
     }
 }

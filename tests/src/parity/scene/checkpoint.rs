@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::parity::bench::Failure;
 
-const MAGIC: &[u8] = b"CUTISCP1";
+const MAGIC: &[u8] = b"CUTISCP2";
 /// Magic, fingerprint, frame, number of vertices.
 const HEADER: usize = 8 + 32 + 4 + 8;
 /// The checksum behind the state.

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::PlaneSection;
-use crate::scene::choice::NameOr;
+use crate::scene::choice::OneOr;
 
 /// Deformation model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -204,9 +204,9 @@ pub enum TableChoice {
 
 impl<'de> Deserialize<'de> for TableChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Ok(match NameOr::deserialize(deserializer)? {
-            NameOr::Name(name) => Self::Preset(name),
-            NameOr::Value(points) => Self::Points(points),
+        Ok(match OneOr::deserialize(deserializer)? {
+            OneOr::One(name) => Self::Preset(name),
+            OneOr::List(points) => Self::Points(points),
         })
     }
 }

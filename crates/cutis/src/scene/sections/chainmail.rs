@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::scene::choice::{NameOr, NumberOr};
+use crate::scene::choice::OneOr;
 
 /// ChainMail, where it is the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,9 +35,9 @@ pub enum MaterialsChoice {
 
 impl<'de> Deserialize<'de> for MaterialsChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Ok(match NameOr::deserialize(deserializer)? {
-            NameOr::Name(name) => Self::Preset(name),
-            NameOr::Value(list) => Self::List(list),
+        Ok(match OneOr::deserialize(deserializer)? {
+            OneOr::One(name) => Self::Preset(name),
+            OneOr::List(list) => Self::List(list),
         })
     }
 }
@@ -71,9 +71,9 @@ pub enum PerAxis {
 
 impl<'de> Deserialize<'de> for PerAxis {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Ok(match NumberOr::deserialize(deserializer)? {
-            NumberOr::Number(value) => Self::All(value),
-            NumberOr::Value(values) => Self::Each(values),
+        Ok(match OneOr::deserialize(deserializer)? {
+            OneOr::One(value) => Self::All(value),
+            OneOr::List(values) => Self::Each(values),
         })
     }
 }
