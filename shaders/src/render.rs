@@ -12,7 +12,7 @@ pub const RAYMARCH: &str = "raymarch";
 /// Bytes of the uniform `View` that [`raymarch`] reads.
 pub const VIEW_BYTES: usize = 848;
 
-/// How a surface point gets its colour.
+/// How a surface point gets its color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Albedo {
     /// All surface is skin.

@@ -63,7 +63,7 @@ fn head(arity: usize) -> String {
     format!("const N: u32 = {arity}u;\n{EVAL}")
 }
 
-/// Projection of one chunk of a colour.
+/// Projection of one chunk of a color.
 pub fn project(
     arity: usize,
     constraint: &str,
@@ -93,7 +93,7 @@ pub fn pull(arity: usize, constraint: &str) -> String {
     link(&[&head(arity), constraint, include_str!("../wgsl/solver/pull.wgsl")])
 }
 
-/// The steps of the vertices of a chunk of one colour.
+/// The steps of the vertices of a chunk of one color.
 pub fn descend() -> String {
     link(&[FINITE, include_str!("../wgsl/solver/descend.wgsl")])
 }

@@ -249,7 +249,7 @@ fn the_ct_and_the_pictures_come_from_the_gpu_too() {
     );
     assert_eq!(names(on_gpu.path()), names(cpu.path()));
     let [cpu, on_gpu, control] = [&cpu, &on_gpu, &control].map(|folder| deformed(folder.path()));
-    // The GPU looks a voxel's place up in single precision: the owner of a voxel on a face may be its neighbour.
+    // The GPU looks a voxel's place up in single precision: the owner of a voxel on a face may be its neighbor.
     let (found, noticed) = (share_differing(&cpu, &on_gpu), share_differing(&cpu, &control));
     assert!(
         found < 1e-4 && noticed > 20.0 * 1e-4,
@@ -291,7 +291,7 @@ fn a_device_that_is_lost_after_the_simulation_costs_nothing() {
     }
 }
 
-/// Splitting every colour, and the limits that any device has, do not change a bit.
+/// Splitting every color, and the limits that any device has, do not change a bit.
 #[test]
 fn a_run_in_small_chunks_is_the_same() {
     let Some(whole) = gpu() else { return };

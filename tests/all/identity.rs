@@ -1,4 +1,4 @@
-//! Where nothing moves, the CT that comes out is the CT that went in, voxel for voxel and at the same millimetres.
+//! Where nothing moves, the CT that comes out is the CT that went in, voxel for voxel and at the same millimeters.
 
 use cutis::volume::{AIR_HU, Volume, phantom::Phantom};
 

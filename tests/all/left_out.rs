@@ -18,7 +18,7 @@ fn says(lines: &[String], topic: &str) -> bool {
     lines.iter().any(|line| line.starts_with(&format!("{topic}:")))
 }
 
-/// What a kind needs: indices, parameters and compliance of each constraint, and where each colour ends.
+/// What a kind needs: indices, parameters and compliance of each constraint, and where each color ends.
 fn needed<const N: usize, C: Constraint<N>>(count: usize, colors: usize) -> usize {
     count * (N * size_of::<u32>() + size_of::<C::Params<f32>>() + size_of::<f32>())
         + (colors + 1) * size_of::<u32>()

@@ -71,7 +71,7 @@ impl Run {
         bytes[40..bytes.len() - 32].to_vec()
     }
 
-    /// Positions in the checkpoint, local metres.
+    /// Positions in the checkpoint, local meters.
     pub fn positions(&self) -> Vec<Point3<f32>> {
         let bytes = self.bytes("checkpoint.bin");
         let count = u64::from_le_bytes(bytes[44..52].try_into().unwrap()) as usize;

@@ -36,7 +36,7 @@ fn tuned(loaded: &LoadedScene, folder: &Path, demand: Demand) -> (Tuning, Loaded
     (tuning, tuned)
 }
 
-/// Positions in the checkpoint of a folder, local metres.
+/// Positions in the checkpoint of a folder, local meters.
 fn state(folder: &Path) -> Vec<Point3<f64>> {
     let bytes = std::fs::read(folder.join("checkpoint.bin")).unwrap();
     let values: Vec<f64> = bytes[52..bytes.len() - 32]

@@ -1,6 +1,6 @@
 """The small-strain moduli of a `kuhn6` lattice with springs and volumes.
 
-Every vertex of the infinite lattice is a centre of symmetry, so that a uniform strain is an equilibrium and the stiffness is
+Every vertex of the infinite lattice is a center of symmetry, so that a uniform strain is an equilibrium and the stiffness is
 the mean over the edges: `C = E·⟨e e e e⟩ + K·1⊗1`, where each tetrahedron counts its six edges e alike. It is not isotropic:
 the springs along the cube's diagonal make that axis stiffer than the others."""
 

@@ -60,7 +60,7 @@ def page(found):
         "A beam of 200 × 50 × 50 mm on a `kuhn6` lattice of 20 × 5 × 5 or 40 × 10 × 10 cells, 1000 kg/m³, held at one end, bends under "
         "9.81 m/s². The same tetrahedra and the same energy are given to four programs: springs with `α = L²/(E·Vₑ)` and volumes with "
         "`α = V₀/K`, which on linear tetrahedra is the density `E/12·Σ(|F e| − 1)² + K/2·(det F − 1)²`. scikit-fem assembles that density "
-        "with derivatives written out by hand and checked by differences; `cutis-newton` minimises the energy of the constraints; the "
+        "with derivatives written out by hand and checked by differences; `cutis-newton` minimizes the energy of the constraints; the "
         "solver (CPU, GPU) steps until the beam hangs still. Measured is the mean displacement of the free end.\n",
         agreement(found), convergence(found), real_time(found), orientation(found), controls(found),
     ]

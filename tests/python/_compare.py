@@ -1,4 +1,4 @@
-"""Volumes as nibabel, SimpleITK and `cutis inspect` see them, brought to one form (RAS+ millimetres) and compared.
+"""Volumes as nibabel, SimpleITK and `cutis inspect` see them, brought to one form (RAS+ millimeters) and compared.
 
 A comparison returns what differs as text, an empty list when nothing does, so that a check can be shown a difference it
 must report."""
@@ -27,7 +27,7 @@ POSITION_SHARE = 1e-3
 # Extremes and the mean may differ by the rounding of a slope in double precision.
 VALUE_SHARE = 1e-12
 
-MILLIMETRES = {"meter": 1000.0, "mm": 1.0, "micron": 0.001, "unknown": 1.0}
+MILLIMETERS = {"meter": 1000.0, "mm": 1.0, "micron": 0.001, "unknown": 1.0}
 
 
 @dataclass
@@ -60,7 +60,7 @@ def by_nibabel(path):
     if values.ndim == 4 and values.shape[3] == 1:
         values = values[..., 0]
     affine = image.affine.astype(np.float64).copy()
-    affine[:3] *= MILLIMETRES[image.header.get_xyzt_units()[0]]
+    affine[:3] *= MILLIMETERS[image.header.get_xyzt_units()[0]]
     return Seen.of_values(values, affine, image.get_data_dtype().newbyteorder("=").name)
 
 
@@ -119,7 +119,7 @@ def differences(ours, theirs, ignore=()):
 
 
 def same_place(ours, theirs):
-    """Whether all eight corners lie at the same millimetre."""
+    """Whether all eight corners lie at the same millimeter."""
     if tuple(ours.shape) != tuple(theirs.shape):
         return False
     corners = np.array([[i, j, k, 1.0] for i in (0, 1) for j in (0, 1) for k in (0, 1)])

@@ -19,7 +19,7 @@ REFUSED = {
 
 # Fields in which a reader differs from the NIfTI standard, and so from us.
 NIBABEL_DIFFERS = {
-    "no_form.nii.gz": ({"affine"}, "without sform and qform nibabel centres the volume and mirrors x; the standard scales only"),
+    "no_form.nii.gz": ({"affine"}, "without sform and qform nibabel centers the volume and mirrors x; the standard scales only"),
 }
 ITK_DIFFERS = {
     "no_form.nii.gz": ({"affine"}, "without sform and qform ITK takes the axes for LPS"),

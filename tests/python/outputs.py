@@ -1,4 +1,4 @@
-"""What `cutis` writes, read by nibabel and SimpleITK: same voxels, same millimetres, a header that both understand."""
+"""What `cutis` writes, read by nibabel and SimpleITK: same voxels, same millimeters, a header that both understand."""
 
 import json
 import tempfile

@@ -1,6 +1,6 @@
 //! A sheet of springs and skin triangles on the equilateral lattice, whose moduli are known in closed form.
 //!
-//! Springs of stiffness `k` between neighbours give the sheet `E = 2k/√3`, `ν = 1/3`, `K₂ = (√3/2)k`, `μ = (√3/4)k`
+//! Springs of stiffness `k` between neighbors give the sheet `E = 2k/√3`, `ν = 1/3`, `K₂ = (√3/2)k`, `μ = (√3/4)k`
 //! (all in N/m); an area stiffness `k_A` on each triangle adds `k_A·A0` to `K₂`.
 
 use std::collections::HashMap;

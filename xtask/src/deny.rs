@@ -1,4 +1,4 @@
-//! `cargo xtask licences`: holds `deny.toml` (licences, bans, sources) against every resolved dependency. It needs no
+//! `cargo xtask licenses`: holds `deny.toml` (licenses, bans, sources) against every resolved dependency. It needs no
 //! tool beyond cargo; `cargo deny check` reads the same file and adds the advisories.
 
 use std::collections::BTreeSet;
@@ -10,7 +10,7 @@ use crate::spdx;
 use crate::workspace::{Scope, Workspace};
 
 struct Rules {
-    allowed_licences: Vec<String>,
+    allowed_licenses: Vec<String>,
     banned: Vec<(String, String)>,
     registries: Vec<String>,
 }
@@ -37,7 +37,7 @@ impl Rules {
             banned.push((name, reason));
         }
         Ok(Self {
-            allowed_licences: strings(list("licenses", "allow")?),
+            allowed_licenses: strings(list("licenses", "allow")?),
             banned,
             registries: strings(list("sources", "allow-registry")?),
         })
@@ -49,15 +49,15 @@ impl Rules {
         let label = format!("{name} {}", package["version"].as_str().unwrap_or("?"));
         let mut complaints = Vec::new();
         match (package["license"].as_str(), package["source"].as_str()) {
-            (Some(licence), _) => match spdx::satisfied(licence, &self.allowed_licences) {
+            (Some(license), _) => match spdx::satisfied(license, &self.allowed_licenses) {
                 Ok(true) => {}
                 Ok(false) => {
-                    complaints.push(format!("{label}: licence `{licence}` is not allowed by deny.toml"))
+                    complaints.push(format!("{label}: license `{license}` is not allowed by deny.toml"))
                 }
-                Err(error) => complaints.push(format!("{label}: licence `{licence}`: {error}")),
+                Err(error) => complaints.push(format!("{label}: license `{license}`: {error}")),
             },
             (None, None) if package["publish"] == Value::Array(Vec::new()) => {} // our own and never published
-            (None, _) => complaints.push(format!("{label}: no licence is stated")),
+            (None, _) => complaints.push(format!("{label}: no license is stated")),
         }
         if let Some((_, reason)) = self.banned.iter().find(|(banned, _)| banned == name) {
             complaints.push(format!("{label}: banned by deny.toml: {reason}"));
@@ -88,7 +88,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         let complaints: Vec<String> = complaints.into_iter().collect();
         bail!("{}", complaints.join("\n       "));
     }
-    println!("licences, bans and sources of {count} packages are as deny.toml wants them");
+    println!("licenses, bans and sources of {count} packages are as deny.toml wants them");
     Ok(())
 }
 
@@ -128,7 +128,7 @@ mod tests {
         let source = format!("registry+{REGISTRY}");
         for (package, word) in [
             (package("fine", json!("GPL-3.0-only"), &source), "GPL-3.0-only"),
-            (package("fine", Value::Null, &source), "no licence"),
+            (package("fine", Value::Null, &source), "no license"),
             (package("left-pad", json!("MIT"), &source), "three lines"),
             (package("fine", json!("MIT"), "git+https://example.org/fine"), "git+"),
         ] {

@@ -26,7 +26,7 @@ usage: cargo xtask COMMAND
   test [--quick]      everything a change must pass; --quick leaves out the slow steps and lists them
   ci                  the same with CI=true: nothing may be skipped, the lock files must be up to date
   tidy                layers, file headers, unsafe, shaders, paths named in the docs, links, manifests
-  licences            licences, bans and sources of every dependency, by deny.toml
+  licenses            licenses, bans and sources of every dependency, by deny.toml
   python              outputs and awkward inputs compared with nibabel and SimpleITK, a bent beam with scikit-fem
   cantilever          a bent beam at rest and in real time compared with scikit-fem: docs/results/cantilever.md
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
@@ -65,7 +65,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["test", "--quick"] => steps::run_all(&workspace, true),
         ["ci"] => steps::run_all(&workspace.in_ci(), false),
         ["tidy"] => tidy::run(&workspace),
-        ["licences"] => deny::run(&workspace),
+        ["licenses"] => deny::run(&workspace),
         ["python"] => steps::build_for_python(&workspace).and_then(|()| python::run(&workspace)),
         ["cantilever"] => steps::cantilever(&workspace),
         ["parity", arguments @ ..] => {

@@ -1,8 +1,8 @@
-//! SPDX licence expressions: is one satisfied by a list of allowed licences?
+//! SPDX license expressions: is one satisfied by a list of allowed licenses?
 
 use anyhow::{Result, bail};
 
-/// Whether `expression` can be satisfied with licences of `allowed` only. `A WITH B` counts as one licence of that
+/// Whether `expression` can be satisfied with licenses of `allowed` only. `A WITH B` counts as one license of that
 /// name; the old spelling `A/B` means `A OR B`.
 ///
 /// # Errors
@@ -13,7 +13,7 @@ pub fn satisfied(expression: &str, allowed: &[String]) -> Result<bool> {
     let mut parser = Parser { words: &words, allowed };
     let result = parser.alternatives()?;
     if let Some(word) = parser.words.first() {
-        bail!("unexpected `{word}` in licence expression `{expression}`");
+        bail!("unexpected `{word}` in license expression `{expression}`");
     }
     Ok(result)
 }
@@ -47,14 +47,14 @@ impl<'a> Parser<'a> {
     }
 
     fn conjunction(&mut self) -> Result<bool> {
-        let mut result = self.licence()?;
+        let mut result = self.license()?;
         while self.accept("AND") {
-            result &= self.licence()?;
+            result &= self.license()?;
         }
         Ok(result)
     }
 
-    fn licence(&mut self) -> Result<bool> {
+    fn license(&mut self) -> Result<bool> {
         match self.next() {
             Some("(") => {
                 let result = self.alternatives()?;
@@ -71,7 +71,7 @@ impl<'a> Parser<'a> {
                 }
                 Ok(self.allowed.contains(&name))
             }
-            other => bail!("a licence is missing before {other:?}"),
+            other => bail!("a license is missing before {other:?}"),
         }
     }
 }

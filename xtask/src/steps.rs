@@ -19,7 +19,7 @@ const STEPS: &[Step] = &[
     Step { name: "tools", quick: true, run: tools },
     Step { name: "format", quick: true, run: format },
     Step { name: "tidy", quick: true, run: tidy::run },
-    Step { name: "licences", quick: true, run: deny::run },
+    Step { name: "licenses", quick: true, run: deny::run },
     Step { name: "xtask", quick: true, run: xtask },
     Step { name: "clippy", quick: true, run: clippy },
     Step { name: "tests", quick: true, run: tests },

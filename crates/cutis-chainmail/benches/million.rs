@@ -33,7 +33,7 @@ fn pull(chain: &Chain) -> Drag {
     Drag { element, to: [-60.0, -50.0, -40.0] }
 }
 
-/// Drags every seventh element along each axis a little, so that many coordinates are not where the neighbours ask them to be.
+/// Drags every seventh element along each axis a little, so that many coordinates are not where the neighbors ask them to be.
 fn knead(chain: &Chain) -> Chain {
     let mut kneaded = chain.clone();
     for element in 0..chain.places() as u32 {

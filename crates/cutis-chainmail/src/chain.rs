@@ -4,7 +4,7 @@ use crate::ChainError;
 use crate::blade::Blade;
 use crate::census::{Census, MIXED, STILL};
 use crate::limits::{Bounds, Limits};
-use crate::links::{Links, Neighbour};
+use crate::links::{Links, Neighbor};
 use crate::material::{self, Material};
 use crate::units::{FARTHEST_MOVED, UNITS_PER_STEP, to_steps};
 use crate::wide::Width;
@@ -12,7 +12,7 @@ use crate::wide::Width;
 /// The material of a place of the grid where there is nothing.
 pub const NO_MATERIAL: u8 = u8::MAX;
 
-/// A grid of elements, and links between neighbours: 17 bytes for each place of the grid, 18 once it is relaxed.
+/// A grid of elements, and links between neighbors: 17 bytes for each place of the grid, 18 once it is relaxed.
 ///
 /// Element `(i, j, k)` is number `i + nx (j + ny k)`. It is at rest at `(i, j, k)` steps.
 #[derive(Clone, Debug)]
@@ -44,9 +44,9 @@ pub(crate) struct Body {
 impl Body {
     /// The bounds of a link.
     #[inline]
-    pub(crate) fn bounds(&self, element: u32, neighbour: Neighbour, coordinate: usize) -> Bounds {
-        let [a, b] = [element, neighbour.element].map(|element| self.materials[element as usize]);
-        self.limits.of(coordinate, self.limits.pair(a, b), neighbour.axis)
+    pub(crate) fn bounds(&self, element: u32, neighbor: Neighbor, coordinate: usize) -> Bounds {
+        let [a, b] = [element, neighbor.element].map(|element| self.materials[element as usize]);
+        self.limits.of(coordinate, self.limits.pair(a, b), neighbor.axis)
     }
 }
 
@@ -154,7 +154,7 @@ impl Chain {
     }
 
     /// Elements linked with an element.
-    pub fn neighbours(&self, element: u32) -> impl Iterator<Item = u32> {
+    pub fn neighbors(&self, element: u32) -> impl Iterator<Item = u32> {
         self.is_there(element).then(|| self.body.links.of(element)).into_iter().flatten().map(|n| n.element)
     }
 
@@ -162,8 +162,8 @@ impl Chain {
     /// be ahead, in units.
     pub fn link(&self, element: u32, axis: usize) -> Option<(u32, [[i32; 2]; 3])> {
         let next = self.is_there(element).then(|| self.body.links.next(element, axis)).flatten()?;
-        let neighbour = Neighbour { element: next, axis, next: true };
-        let bounds = [0, 1, 2].map(|coordinate| self.body.bounds(element, neighbour, coordinate));
+        let neighbor = Neighbor { element: next, axis, next: true };
+        let bounds = [0, 1, 2].map(|coordinate| self.body.bounds(element, neighbor, coordinate));
         Some((next, bounds.map(|Bounds { lo, hi }| [lo, hi])))
     }
 

@@ -2,12 +2,12 @@
 //!
 //! It is here as the baseline that it is. In a convex body of one material it keeps all links within their bounds and looks at
 //! each element about once. With several materials in a body, or with links missing, it leaves links beyond their bounds:
-//! a candidate that moved is compared with its other neighbours only if they come after it in the order of directions.
+//! a candidate that moved is compared with its other neighbors only if they come after it in the order of directions.
 
 use std::collections::VecDeque;
 
 use crate::chain::Chain;
-use crate::links::Neighbour;
+use crate::links::Neighbor;
 use crate::units::from_steps;
 use crate::{ChainError, Drag};
 
@@ -55,16 +55,16 @@ impl Chain {
         Ok(moved)
     }
 
-    /// Puts the neighbours of what moved into the queues: all of what was dragged; of a candidate those in its own direction and along
+    /// Puts the neighbors of what moved into the queues: all of what was dragged; of a candidate those in its own direction and along
     /// the axes that come later.
     fn offer(&self, element: u32, came: Option<usize>, queues: &mut [VecDeque<(u32, u32)>; 6]) {
-        for neighbour in self.body.links.of(element) {
+        for neighbor in self.body.links.of(element) {
             let direction = DIRECTIONS
                 .iter()
-                .position(|&(axis, next)| axis == neighbour.axis && next == neighbour.next)
+                .position(|&(axis, next)| axis == neighbor.axis && next == neighbor.next)
                 .unwrap_or_default();
-            if came.is_none_or(|came| direction == came || neighbour.axis > DIRECTIONS[came].0) {
-                queues[direction].push_back((element, neighbour.element));
+            if came.is_none_or(|came| direction == came || neighbor.axis > DIRECTIONS[came].0) {
+                queues[direction].push_back((element, neighbor.element));
             }
         }
     }
@@ -75,7 +75,7 @@ impl Chain {
             return false;
         }
         let (axis, next) = DIRECTIONS[direction];
-        let link = Neighbour { element: candidate, axis, next };
+        let link = Neighbor { element: candidate, axis, next };
         let mut moved = false;
         for coordinate in 0..3 {
             let bounds = self.body.bounds(sponsor, link, coordinate);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::chain::Chain;
-use crate::links::Neighbour;
+use crate::links::Neighbor;
 use crate::units::{UNITS_PER_STEP, to_steps};
 
 /// A link beyond its bounds.
@@ -54,7 +54,7 @@ impl Chain {
         let found = self.over_rows(|sum: &mut (usize, Option<(i32, u32, u32, usize)>), element| {
             for axis in 0..3 {
                 let Some(next) = self.body.links.next(element, axis) else { continue };
-                let link = Neighbour { element: next, axis, next: true };
+                let link = Neighbor { element: next, axis, next: true };
                 let excess = [0, 1, 2].map(|coordinate| self.excess(element, link, coordinate));
                 let worst =
                     (0..3).max_by_key(|&coordinate| (excess[coordinate], 2 - coordinate)).unwrap_or(0);

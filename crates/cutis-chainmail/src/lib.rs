@@ -2,7 +2,7 @@
 //!
 //! # The model
 //!
-//! Elements sit at the points of a grid, and neighbours along an axis are linked. A link along axis `a` bounds, for every
+//! Elements sit at the points of a grid, and neighbors along an axis are linked. A link along axis `a` bounds, for every
 //! coordinate `c`, the difference of its ends (S. F. Gibson, *3D ChainMail*, I3D 1997):
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Along the link (`c = a`) these are the shortest and longest length, across it ± the shear. They come from the materials at
-//! both ends, half from each. Whoever is grabbed goes where it is told; a neighbour moves only if a bound is violated, and
+//! both ends, half from each. Whoever is grabbed goes where it is told; a neighbor moves only if a bound is violated, and
 //! then by the least that satisfies it; that may violate others in turn.
 //!
 //! # What that is

@@ -54,7 +54,7 @@ impl Limits {
         usize::from(a) * self.materials + usize::from(b)
     }
 
-    /// How near an element may be left to where its neighbours ask it to be, in units.
+    /// How near an element may be left to where its neighbors ask it to be, in units.
     #[inline]
     pub(crate) fn k(&self, material: u8) -> i32 {
         self.k[usize::from(material)]

@@ -13,7 +13,7 @@ const GRABBED: u8 = 128;
 
 /// A link as one of its ends sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Neighbour {
+pub(crate) struct Neighbor {
     /// The other end.
     pub(crate) element: u32,
     /// The axis that it lies along.
@@ -31,7 +31,7 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// Links between all neighbours that are both `there`.
+    /// Links between all neighbors that are both `there`.
     pub(crate) fn new(shape: [usize; 3], there: impl Fn(usize) -> bool) -> Result<Self, ChainError> {
         let count = shape.iter().try_fold(1_usize, |count, &n| count.checked_mul(n));
         let fits = |count: &usize| u32::try_from(*count).is_ok_and(|count| count < u32::MAX);
@@ -77,15 +77,15 @@ impl Links {
 
     /// What an element is linked with.
     #[inline]
-    pub(crate) fn of(&self, element: u32) -> impl Iterator<Item = Neighbour> + use<> {
+    pub(crate) fn of(&self, element: u32) -> impl Iterator<Item = Neighbor> + use<> {
         let (bits, strides) = (self.bits[element as usize], self.strides);
         (0..3).flat_map(move |axis| {
-            let next = (bits & NEXT[axis] != 0).then(|| Neighbour {
+            let next = (bits & NEXT[axis] != 0).then(|| Neighbor {
                 element: element + strides[axis],
                 axis,
                 next: true,
             });
-            let before = (bits & BEFORE[axis] != 0).then(|| Neighbour {
+            let before = (bits & BEFORE[axis] != 0).then(|| Neighbor {
                 element: element - strides[axis],
                 axis,
                 next: false,

@@ -17,7 +17,7 @@ pub struct Material {
     pub longest: [f64; 3],
     /// Farthest that the ends of a link along each axis move apart across it, in either direction; 0 to 16.
     pub shear: [f64; 3],
-    /// Relaxation leaves an element alone that is nearer than this to where its neighbours ask it to be, in each coordinate, in steps
+    /// Relaxation leaves an element alone that is nearer than this to where its neighbors ask it to be, in each coordinate, in steps
     /// of the grid; 0 is fully elastic. From 0 to 4096.
     pub k: f64,
 }

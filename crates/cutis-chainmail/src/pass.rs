@@ -129,7 +129,7 @@ struct Slab<'a> {
 }
 
 impl Slab<'_> {
-    /// Makes the neighbours of whatever waits keep within their bounds.
+    /// Makes the neighbors of whatever waits keep within their bounds.
     fn empty_queue<const UP: bool, const HOLD: bool>(&mut self) {
         let body = self.body;
         while let Some(sponsor) = self.queue.pop_front() {
@@ -137,15 +137,15 @@ impl Slab<'_> {
             self.flags[place] &= !QUEUED;
             self.passed.visits += 1;
             let x = self.x[place];
-            for neighbour in body.links.of(sponsor) {
-                let Bounds { lo, hi } = body.bounds(sponsor, neighbour, self.coordinate);
-                let bound = match (UP, neighbour.next) {
+            for neighbor in body.links.of(sponsor) {
+                let Bounds { lo, hi } = body.bounds(sponsor, neighbor, self.coordinate);
+                let bound = match (UP, neighbor.next) {
                     (true, true) => x + lo,
                     (true, false) => x - hi,
                     (false, true) => x + hi,
                     (false, false) => x - lo,
                 };
-                let element = neighbour.element;
+                let element = neighbor.element;
                 if (element.wrapping_sub(self.first) as usize) < self.x.len() {
                     self.ask::<UP, HOLD>(element, bound);
                 } else {

@@ -6,7 +6,7 @@ use crate::limits::Bounds;
 use crate::links::{BEFORE, NEXT};
 use crate::units::UNITS_PER_STEP;
 
-/// Elements of a row that are looked at side by side; half of them, of one colour of the checkerboard, may move.
+/// Elements of a row that are looked at side by side; half of them, of one color of the checkerboard, may move.
 const BLOCK: usize = 64;
 /// Coordinates in the widest vector that there is.
 const VECTOR: usize = 16;
@@ -23,7 +23,7 @@ pub(crate) struct Plane<'a> {
     pub(crate) x: &'a mut [i32],
     pub(crate) below: &'a [i32],
     pub(crate) above: &'a [i32],
-    /// By row of the grid: something in it has changed since elements of this colour were last relaxed.
+    /// By row of the grid: something in it has changed since elements of this color were last relaxed.
     pub(crate) changed: &'a [bool],
     /// By row of the plane: something in it moves now.
     pub(crate) moved: &'a mut [bool],
@@ -186,7 +186,7 @@ impl Plane<'_> {
     }
 }
 
-/// More than six neighbours within their bounds can ask for together, and few enough to be doubled in 32 bits.
+/// More than six neighbors within their bounds can ask for together, and few enough to be doubled in 32 bits.
 const MOST_ASKED: u32 = 1 << 30;
 
 /// The nearest integer to a mean, of two that are equally near the one nearer to 0.

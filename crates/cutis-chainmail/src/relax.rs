@@ -1,14 +1,14 @@
-//! Elastic relaxation: each element towards where its neighbours ask it to be.
+//! Elastic relaxation: each element towards where its neighbors ask it to be.
 //!
-//! A neighbour asks an element to be where it rests to that neighbour. The mean of what all ask is where the element has the least
+//! A neighbor asks an element to be where it rests to that neighbor. The mean of what all ask is where the element has the least
 //! energy; it goes there, as far as its links' bounds allow, unless it is nearer than its material's `k` in that coordinate.
-//! Elements whose `i + j + k` is even have only odd neighbours, so that all of one kind can move at once: each sweep moves the
+//! Elements whose `i + j + k` is even have only odd neighbors, so that all of one kind can move at once: each sweep moves the
 //! even ones, then the odd ones, with the same bits on any number of threads.
 //!
 //! An element that moves comes nearer to the one minimum of a parabola without passing it, so that every move lowers the energy, and
 //! relaxation ends: coordinates are integers, and there is no endless descent among them.
 //!
-//! An element that was looked at moves again only if a neighbour moved in between. So of each row of elements it is noted whether
+//! An element that was looked at moves again only if a neighbor moved in between. So of each row of elements it is noted whether
 //! something in it changed, and rows that have nothing to answer to are passed by: relaxing after a local drag costs what moves.
 
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Propagation as a wave: whoever moved makes its neighbours keep within their bounds, until all do. The theory is in the
+//! Propagation as a wave: whoever moved makes its neighbors keep within their bounds, until all do. The theory is in the
 //! documentation of the crate.
 
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::ChainError;
 use crate::chain::Chain;
 use crate::limits::Bounds;
-use crate::links::Neighbour;
+use crate::links::Neighbor;
 use crate::pass::{Pass, Passed};
 use crate::units::{from_steps, to_steps};
 
@@ -129,11 +129,11 @@ impl Chain {
     fn contradictions(&self, held: u32) -> Vec<Contradiction> {
         let fixed = self.body.links.is_fixed(held);
         let mut found = Vec::new();
-        for neighbour in self.body.links.of(held) {
+        for neighbor in self.body.links.of(held) {
             for axis in 0..3 {
-                let excess = self.excess(held, neighbour, axis);
+                let excess = self.excess(held, neighbor, axis);
                 if excess > 0 {
-                    let other = neighbour.element;
+                    let other = neighbor.element;
                     found.push(Contradiction { held, fixed, other, axis, excess: to_steps(excess) });
                 }
             }
@@ -142,11 +142,11 @@ impl Chain {
     }
 
     /// How far a link is beyond its bounds in a coordinate, in units; 0 within them.
-    pub(crate) fn excess(&self, element: u32, neighbour: Neighbour, coordinate: usize) -> i32 {
-        let Bounds { lo, hi } = self.body.bounds(element, neighbour, coordinate);
+    pub(crate) fn excess(&self, element: u32, neighbor: Neighbor, coordinate: usize) -> i32 {
+        let Bounds { lo, hi } = self.body.bounds(element, neighbor, coordinate);
         let x = |element: u32| self.positions[coordinate][element as usize];
-        let apart = x(neighbour.element) - x(element);
-        let apart = if neighbour.next { apart } else { -apart };
+        let apart = x(neighbor.element) - x(element);
+        let apart = if neighbor.next { apart } else { -apart };
         (lo - apart).max(apart - hi).max(0)
     }
 }

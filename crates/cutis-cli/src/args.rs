@@ -142,7 +142,7 @@ pub(crate) enum Command {
         /// Window of a slice: level/width in HU
         #[arg(long, default_value = "40/400", requires = "slice")]
         window: String,
-        /// Centre of a close-up: x,y,z in mm
+        /// Center of a close-up: x,y,z in mm
         #[arg(long, requires = "zoom")]
         focus: Option<String>,
         /// Size of a close-up, mm

@@ -1,4 +1,4 @@
-//! Time to colour and sort the edges and tets of a Kuhn lattice, against the project's targets.
+//! Time to color and sort the edges and tets of a Kuhn lattice, against the project's targets.
 //!
 //! `cargo bench -p cutis-coloring` prints the minimum of several runs, per constraint, and the ratio to the target.
 #![allow(clippy::print_stdout)] // printing is what a benchmark is for
@@ -74,7 +74,7 @@ fn report<const N: usize>(name: &str, constraints: &[[u32; N]], color_target_ms:
     let vertex_count = VERTICES.iter().map(|&n| n as usize).product();
     let count = constraints.len();
     let (total, groups) = least(|| greedy(constraints, vertex_count).expect("a lattice is valid"));
-    groups.verify(constraints, vertex_count).expect("greedy colours are valid");
+    groups.verify(constraints, vertex_count).expect("greedy colors are valid");
     let mut colors = vec![0u16; count];
     for (color, group) in groups.iter().enumerate() {
         for &i in group {
@@ -84,7 +84,7 @@ fn report<const N: usize>(name: &str, constraints: &[[u32; N]], color_target_ms:
     let (sort, sorted) = least(|| Groups::from_colors(&colors).expect("few constraints"));
     assert_eq!(sorted, groups);
     let (verify, valid) = least(|| groups.verify(constraints, vertex_count));
-    valid.expect("greedy colours are valid");
+    valid.expect("greedy colors are valid");
 
     let line = |what: &str, ms: f64, target: Option<f64>| {
         let per_constraint = ms * 1e6 / count as f64;
@@ -92,9 +92,9 @@ fn report<const N: usize>(name: &str, constraints: &[[u32; N]], color_target_ms:
         println!("{name:5} {what:15} {ms:7.1} ms, {per_constraint:5.2} ns per constraint{target}");
     };
     println!("{name:5} {:?}", groups.statistics());
-    line("colour and sort", total, Some(color_target_ms + sort_target_ms));
+    line("color and sort", total, Some(color_target_ms + sort_target_ms));
     line("sort alone", sort, Some(sort_target_ms));
-    line("colour (diff.)", total - sort, Some(color_target_ms));
+    line("color (diff.)", total - sort, Some(color_target_ms));
     line("verify", verify, None);
 }
 

@@ -1,6 +1,6 @@
-//! What can be wrong with constraints, colours or groups.
+//! What can be wrong with constraints, colors or groups.
 
-/// Why constraints could not be grouped, or why groups are not a valid colouring of them.
+/// Why constraints could not be grouped, or why groups are not a valid coloring of them.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColoringError {
@@ -81,7 +81,7 @@ pub enum ColoringError {
     /// Two constraints of one group share a vertex.
     #[error("constraints {first} and {second}, both of group {group}, share vertex {vertex}")]
     Clash {
-        /// The group (colour).
+        /// The group (color).
         group: usize,
         /// The constraint that comes first in the group.
         first: u32,
@@ -101,7 +101,7 @@ pub enum ColoringError {
     /// Two vertices of one group are in one constraint.
     #[error("vertices {first} and {second}, both of group {group}, are in constraint {constraint}")]
     VertexClash {
-        /// The group (colour).
+        /// The group (color).
         group: usize,
         /// A vertex of the constraint.
         first: u32,

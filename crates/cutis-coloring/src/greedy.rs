@@ -1,29 +1,29 @@
-//! Greedy first-fit on vertex bitmasks, 64 colours to a round.
+//! Greedy first-fit on vertex bitmasks, 64 colors to a round.
 
 use crate::sort::{self, INDEX_LIMIT, check_constraint_count, filled};
 use crate::{ColoringError, Groups};
 
-/// Colours of one round: the bits of a vertex mask.
+/// Colors of one round: the bits of a vertex mask.
 const ROUND: usize = u64::BITS as usize;
 
-/// Colours constraints over `N` vertices each by greedy first-fit: in the order given, each constraint takes the
-/// lowest colour that no earlier constraint with a common vertex has.
+/// Colors constraints over `N` vertices each by greedy first-fit: in the order given, each constraint takes the
+/// lowest color that no earlier constraint with a common vertex has.
 ///
-/// A constraint never needs more than `1 + N·(d − 1)` colours, where `d` is the largest number of constraints at one
-/// vertex. The number of colours is not limited.
+/// A constraint never needs more than `1 + N·(d − 1)` colors, where `d` is the largest number of constraints at one
+/// vertex. The number of colors is not limited.
 ///
 /// # Method
-/// Each vertex carries a mask of 64 bits with the colours of its constraints so far; a constraint takes the lowest bit
+/// Each vertex carries a mask of 64 bits with the colors of its constraints so far; a constraint takes the lowest bit
 /// that is clear in the union of its vertices' masks. A constraint that finds all 64 taken is deferred to a next round
-/// with fresh masks, which stand for the next 64 colours.
+/// with fresh masks, which stand for the next 64 colors.
 ///
-/// This is first-fit without a limit. A deferred constraint has an earlier neighbour in each of the 64 colours of its
+/// This is first-fit without a limit. A deferred constraint has an earlier neighbor in each of the 64 colors of its
 /// round, so first-fit too gives it a later one; and as it takes none of these 64, it takes none from the
-/// constraints after it. Hence the colours of a round are those of first-fit, and first-fit among the deferred
+/// constraints after it. Hence the colors of a round are those of first-fit, and first-fit among the deferred
 /// constraints, which come in their original order, gives the rest.
 ///
 /// # Cost
-/// One pass over the constraints for each 64 colours; 8 bytes per vertex and 1 byte per constraint besides the result.
+/// One pass over the constraints for each 64 colors; 8 bytes per vertex and 1 byte per constraint besides the result.
 /// A constraint list in which one vertex has `d` constraints costs at least `d²/128` mask look-ups.
 ///
 /// # Errors
@@ -74,7 +74,7 @@ pub fn greedy<const N: usize>(
     Ok(groups)
 }
 
-/// Takes the lowest colour that is free at all `vertices`, or [`ROUND`] if none is; `None` if a vertex is out of range.
+/// Takes the lowest color that is free at all `vertices`, or [`ROUND`] if none is; `None` if a vertex is out of range.
 #[inline(always)]
 fn first_fit<const N: usize>(masks: &mut [u64], vertices: &[u32; N]) -> Option<u8> {
     let mut taken = 0;

@@ -3,7 +3,7 @@
 use crate::ColoringError;
 use crate::sort::{self, check_constraint_count, filled};
 
-/// Constraints cut into groups (colours), such that no two of a group share a vertex.
+/// Constraints cut into groups (colors), such that no two of a group share a vertex.
 ///
 /// The constraints of group `c` are `order[offsets[c]..offsets[c + 1]]`, in ascending order. No group is empty.
 /// What the fields promise holds for groups made by this crate; for others, see [`verify`](Groups::verify).
@@ -16,9 +16,9 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// Groups from known colours, one per constraint, for example those of a lattice in closed form.
+    /// Groups from known colors, one per constraint, for example those of a lattice in closed form.
     ///
-    /// Groups follow ascending colour; colours that nothing has are left out. Whether the colours are valid is for
+    /// Groups follow ascending color; colors that nothing has are left out. Whether the colors are valid is for
     /// [`verify`](Groups::verify) to say.
     ///
     /// # Errors
@@ -49,7 +49,7 @@ impl Groups {
         }
     }
 
-    /// Number of groups (colours).
+    /// Number of groups (colors).
     pub fn len(&self) -> usize {
         self.offsets.len().saturating_sub(1)
     }

@@ -1,8 +1,8 @@
-//! Graph colouring of constraints: index tuples in, groups without shared vertices out.
+//! Graph coloring of constraints: index tuples in, groups without shared vertices out.
 //!
-//! Two constraints that share a vertex cannot be projected at the same time. A colouring gives each constraint a
-//! colour so that constraints of one colour share no vertex; a solver then runs colour after colour, and the
-//! constraints inside a colour in any order or in parallel, with the same result bit for bit. This crate knows
+//! Two constraints that share a vertex cannot be projected at the same time. A coloring gives each constraint a
+//! color so that constraints of one color share no vertex; a solver then runs color after color, and the
+//! constraints inside a color in any order or in parallel, with the same result bit for bit. This crate knows
 //! nothing of what the constraints mean.
 //!
 //! A solver that moves vertex after vertex instead needs groups of vertices, no two of which are in one constraint:
@@ -11,7 +11,7 @@
 //! ```
 //! use cutis_coloring::greedy;
 //!
-//! // A chain of four edges over five vertices needs two colours.
+//! // A chain of four edges over five vertices needs two colors.
 //! let edges = [[0, 1], [1, 2], [2, 3], [3, 4]];
 //! let groups = greedy(&edges, 5)?;
 //! assert_eq!(groups.len(), 2);

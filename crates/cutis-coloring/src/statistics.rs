@@ -34,7 +34,7 @@ impl Groups {
 
     /// Share (0 to 1) of the constraints that lie in groups of fewer than `size`; 0 if there is no constraint.
     ///
-    /// Groups smaller than what a machine runs at once waste it: greedy colours of a lattice end in such groups.
+    /// Groups smaller than what a machine runs at once waste it: greedy colors of a lattice end in such groups.
     pub fn share_in_groups_below(&self, size: usize) -> f64 {
         if self.order.is_empty() {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Whether groups are a valid colouring, and if not, what clashes.
+//! Whether groups are a valid coloring, and if not, what clashes.
 
 use crate::sort::filled;
 use crate::{ColoringError, Groups};

@@ -5,12 +5,12 @@ use crate::{ColoringError, Groups, Incidence, Tuples};
 
 const NONE: u32 = u32::MAX;
 
-/// Colours the vertices that move by greedy first-fit: in ascending order, each takes the lowest colour that no earlier
+/// Colors the vertices that move by greedy first-fit: in ascending order, each takes the lowest color that no earlier
 /// vertex has which is in a constraint with it. The result names the moving vertices only; two that do not move may well be in
 /// one constraint.
 ///
 /// `kinds` and `incidences` belong together, kind by kind. Cost: one look at each vertex of each constraint of each vertex; 4 bytes
-/// per vertex and colour besides the result. No vertex takes a colour above the number of its neighbours.
+/// per vertex and color besides the result. No vertex takes a color above the number of its neighbors.
 ///
 /// # Errors
 /// [`ColoringError::OutOfMemory`].
@@ -24,7 +24,7 @@ pub fn greedy_vertices(
 ) -> Result<Groups, ColoringError> {
     let mut colors = filled(NONE, moves.len())?;
     let mut counts: Vec<u32> = Vec::new();
-    // For each colour, one more than the last vertex that found it taken.
+    // For each color, one more than the last vertex that found it taken.
     let mut taken: Vec<u32> = Vec::new();
     let moving = || (0u32..).zip(moves).filter(|(_, moves)| **moves).map(|(v, _)| v);
     for v in moving() {

@@ -3,19 +3,19 @@
 use cutis_coloring::{ColoringError, Groups, greedy};
 use proptest::prelude::*;
 
-/// First-fit from its definition: for each constraint, the lowest colour of no earlier neighbour. Quadratic.
+/// First-fit from its definition: for each constraint, the lowest color of no earlier neighbor. Quadratic.
 fn first_fit_by_definition<const N: usize>(constraints: &[[u32; N]]) -> Vec<usize> {
     let mut colors: Vec<usize> = Vec::new();
     for (i, a) in constraints.iter().enumerate() {
-        let neighbours: Vec<usize> =
+        let neighbors: Vec<usize> =
             (0..i).filter(|&j| constraints[j].iter().any(|v| a.contains(v))).map(|j| colors[j]).collect();
-        let lowest = (0..=i).find(|color| !neighbours.contains(color));
-        colors.push(lowest.expect("i earlier constraints cannot take i + 1 colours"));
+        let lowest = (0..=i).find(|color| !neighbors.contains(color));
+        colors.push(lowest.expect("i earlier constraints cannot take i + 1 colors"));
     }
     colors
 }
 
-/// The groups as one colour per constraint.
+/// The groups as one color per constraint.
 fn colors_of(groups: &Groups) -> Vec<usize> {
     let mut colors = vec![usize::MAX; groups.order.len()];
     for (color, group) in groups.iter().enumerate() {
@@ -56,7 +56,7 @@ proptest! {
         check(&tets, 60);
     }
 
-    /// Few vertices and many constraints: several rounds of 64 colours.
+    /// Few vertices and many constraints: several rounds of 64 colors.
     #[test]
     fn crowded_triangles_equal_first_fit(triangles in constraints::<3>(6, 400)) {
         check(&triangles, 6);
@@ -75,7 +75,7 @@ proptest! {
         }
     }
 
-    /// Hostile groups: a result or a typed error, never a panic; and what passes is a colouring.
+    /// Hostile groups: a result or a typed error, never a panic; and what passes is a coloring.
     #[test]
     fn any_groups_are_answered(
         order in prop::collection::vec(0u32..4, 0..5),
@@ -93,7 +93,7 @@ proptest! {
     }
 }
 
-/// A star's edges all share the hub: one colour each, whether below, at or beyond one round's 64.
+/// A star's edges all share the hub: one color each, whether below, at or beyond one round's 64.
 #[test]
 fn star_needs_a_color_per_edge() {
     for spokes in [63, 64, 65, 128, 129, 1000] {

@@ -61,13 +61,13 @@ pub(crate) struct Body<const N: usize> {
 }
 
 impl<const N: usize> Body<N> {
-    /// The samples of one scale, each with vertices of its own: one colour, which is more than one workgroup.
+    /// The samples of one scale, each with vertices of its own: one color, which is more than one workgroup.
     pub(crate) fn soup(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
         let name = format!("elements on their own at {scale} m");
         Self::new(name, cases, scale, |_, x| x, |k, i| k * N + i, true)
     }
 
-    /// The samples of one scale, each hung onto the one before by a vertex: two colours.
+    /// The samples of one scale, each hung onto the one before by a vertex: two colors.
     pub(crate) fn chain(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
         let mut end = Point3::origin();
         let place = move |k: usize, x: [Point3<f64>; N]| {

@@ -12,7 +12,7 @@
 //! |---|---|---|
 //! | [`gradient`](checks::gradient) | `∇C` is the gradient of `C` | a gradient off by 1e-3; two swapped |
 //! | [`momentum`](checks::momentum) | gradients sum to zero and make no torque | one off by 1e-3; a couple |
-//! | [`scale`](checks::scale) | no length and no epsilon of its own | a micrometre |
+//! | [`scale`](checks::scale) | no length and no epsilon of its own | a micrometer |
 //! | [`parameters`](checks::parameters) | each parameter matters in the samples | (it is one: an idle parameter fails) |
 //! | [`precision`](checks::precision) | `f32` is near `f64` | value or gradient off by 1e-3 |
 //! | [`lanes`](checks::lanes) | a SIMD lane has the bits of the scalar | the lane beside |

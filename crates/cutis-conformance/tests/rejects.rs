@@ -83,7 +83,7 @@ fn a_parameter_without_effect_is_idle() {
 
 #[test]
 fn cancellation_costs_precision() {
-    assert_rejected::<Cancelling, 2>("precision", &["gradient", "momentum", "lanes", "wgsl"]);
+    assert_rejected::<Canceling, 2>("precision", &["gradient", "momentum", "lanes", "wgsl"]);
 }
 
 #[test]

@@ -82,7 +82,7 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 /// `normalize`, `mix`, `fma`, `pow` and the transcendental functions differ. A denominator that may be zero is replaced by
 /// `select` before the division. Drivers turn `a·b + a·c` into `a·(b + c)`: where a sum of products shares a factor, take it out
 /// in both languages, or put the terms through `exact` (a scalar) or `exact3` (a vector), which return what they are given and
-/// which no optimiser sees through. The battery of the crate `cutis-conformance` holds one against the other.
+/// which no optimizer sees through. The battery of the crate `cutis-conformance` holds one against the other.
 ///
 /// A constraint with an [`inverse_reach_squared`](Constraint::inverse_reach_squared) sets the private variable of that name in `eval`.
 ///
@@ -126,9 +126,9 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     type Params<T: Real>: Params<T>;
     /// What the caller chooses when a constraint is built from its rest shape (for example a rest-area scale).
     type Material;
-    /// Parameters of a constraint whose rest shape is `x` (positions in metres).
+    /// Parameters of a constraint whose rest shape is `x` (positions in meters).
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;
-    /// `C` and `∇C` at `x` (positions in metres).
+    /// `C` and `∇C` at `x` (positions in meters).
     fn eval<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Eval<T, N>;
     /// `1/r²` in 1/m², where `r` is the longest way on which a projection follows the gradient at `x`; none for no limit.
     ///

@@ -32,7 +32,7 @@ pub struct TetMesh {
     pub frame: Frame,
     /// The lattice the mesh was taken from.
     pub lattice: Lattice,
-    /// Local metres.
+    /// Local meters.
     pub positions: Vec<Point3<f32>>,
     /// Positively oriented tets, in the order of their cells, then as [`Lattice::cell_tets`].
     pub tets: Vec<[u32; 4]>,

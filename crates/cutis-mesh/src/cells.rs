@@ -7,7 +7,7 @@ use crate::stencil::Stencil;
 
 /// A bit per tet of each cell.
 ///
-/// One layer of empty cells surrounds the lattice, so that looking at a neighbouring cell needs no bounds check.
+/// One layer of empty cells surrounds the lattice, so that looking at a neighboring cell needs no bounds check.
 #[derive(Clone)]
 pub(crate) struct CellMasks {
     pub stencil: &'static Stencil,

@@ -1,4 +1,4 @@
-//! Edges of a lattice mesh, generated per direction, and the lattice's closed-form colours.
+//! Edges of a lattice mesh, generated per direction, and the lattice's closed-form colors.
 
 use cutis_volume::Grid;
 use rayon::prelude::*;
@@ -90,9 +90,9 @@ pub(crate) fn generate(
 }
 
 impl TetMesh {
-    /// Colours of lattice edges in closed form: edges of one colour share no vertex.
+    /// Colors of lattice edges in closed form: edges of one color share no vertex.
     ///
-    /// Colour = 2 · direction + parity of the first point along the direction's first axis: 14 colours for `kuhn6` (7 directions),
+    /// Color = 2 · direction + parity of the first point along the direction's first axis: 14 colors for `kuhn6` (7 directions),
     /// 18 for `five` (9 directions). `edges` are edges of this mesh, or what a cut has left of them.
     pub fn edge_classes(&self, edges: &[[u32; 2]]) -> Vec<u16> {
         let directions = &self.lattice.stencil().directions;
@@ -107,10 +107,10 @@ impl TetMesh {
         edges.par_iter().map(class).collect()
     }
 
-    /// Colours of the vertices in closed form: vertices of one colour are in no common tet, edge or face.
+    /// Colors of the vertices in closed form: vertices of one color are in no common tet, edge or face.
     ///
-    /// `kuhn6`: (i + j + k) mod 4, since the corners of a tet lie on a monotonous path; 4 colours. `five`: the parities of i, j
-    /// and k; 8 colours.
+    /// `kuhn6`: (i + j + k) mod 4, since the corners of a tet lie on a monotonous path; 4 colors. `five`: the parities of i, j
+    /// and k; 8 colors.
     pub fn vertex_classes(&self) -> Vec<u16> {
         let grid = self.lattice.grid();
         let class = |&point: &u32| {
@@ -124,10 +124,10 @@ impl TetMesh {
         self.lattice_index.par_iter().map(class).collect()
     }
 
-    /// Colours of lattice tets in closed form: tets of one colour share no vertex.
+    /// Colors of lattice tets in closed form: tets of one color share no vertex.
     ///
-    /// `kuhn6`: colour = 4 · type + (i + j + k) mod 4 of the cell, 24 colours. `five`: 8 · type + the parities of i, j and k, 40
-    /// colours. `tets` are tets of this mesh, or what a cut has left of them.
+    /// `kuhn6`: color = 4 · type + (i + j + k) mod 4 of the cell, 24 colors. `five`: 8 · type + the parities of i, j and k, 40
+    /// colors. `tets` are tets of this mesh, or what a cut has left of them.
     pub fn tet_classes(&self, tets: &[[u32; 4]]) -> Vec<u16> {
         let class = |tet: &[u32; 4]| {
             let ([i, j, k], t) = self.cell_of(tet);

@@ -16,8 +16,8 @@ pub enum MeshError {
         /// Largest number of vertices.
         max: usize,
     },
-    /// The lattice's extent cannot be held in 32-bit metres.
-    #[error("lattice steps of {spacing_mm:?} mm over {shape:?} vertices cannot be held in 32-bit metres")]
+    /// The lattice's extent cannot be held in 32-bit meters.
+    #[error("lattice steps of {spacing_mm:?} mm over {shape:?} vertices cannot be held in 32-bit meters")]
     LatticeExtent {
         /// Step along each axis, mm.
         spacing_mm: [f64; 3],
@@ -103,7 +103,7 @@ pub enum MeshError {
         from_mm: [f64; 3],
         /// End, mm.
         to_mm: [f64; 3],
-        /// Distance from the segment to the nearest skin triangle's centre, mm; infinite without skin.
+        /// Distance from the segment to the nearest skin triangle's center, mm; infinite without skin.
         distance_mm: f64,
         /// The distance allowed, mm.
         reach_mm: f64,

@@ -1,4 +1,4 @@
-//! Local metres: the coordinates of meshes and solvers.
+//! Local meters: the coordinates of meshes and solvers.
 
 use cutis_volume::Grid;
 use nalgebra::Point3;
@@ -19,12 +19,12 @@ impl Frame {
         Self { origin_mm: grid.affine.to_mm(Point3::from(middle)) }
     }
 
-    /// Local metres → world mm.
+    /// Local meters → world mm.
     pub fn to_mm(&self, local: Point3<f32>) -> Point3<f64> {
         self.origin_mm + local.coords.cast::<f64>() * 1000.0
     }
 
-    /// World mm → local metres.
+    /// World mm → local meters.
     pub fn to_local(&self, mm: Point3<f64>) -> Point3<f32> {
         ((mm - self.origin_mm) / 1000.0).cast::<f32>().into()
     }

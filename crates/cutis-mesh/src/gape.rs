@@ -107,7 +107,7 @@ impl Gape {
         &self.vertices[self.left..]
     }
 
-    /// Measures positions in local metres, one per mesh vertex.
+    /// Measures positions in local meters, one per mesh vertex.
     ///
     /// # Panics
     /// If there are fewer positions than mesh vertices.
@@ -115,7 +115,7 @@ impl Gape {
         self.measure_by(&|vertex| positions[vertex as usize].cast())
     }
 
-    /// As [`Gape::measure`], asking for each vertex's position, in local metres.
+    /// As [`Gape::measure`], asking for each vertex's position, in local meters.
     pub fn measure_by(&self, position: &dyn Fn(u32) -> Point3<f64>) -> WoundGape {
         let mean = |part: &Range<usize>| {
             let sum =

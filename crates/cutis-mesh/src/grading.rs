@@ -1,7 +1,7 @@
 //! Graded lattices: planes across each axis that lie densely in a fine zone and further apart away from it.
 //!
 //! Where the planes of the three axes meet there is a point, so that the lattice stays one of boxes: no hanging vertices, the same split,
-//! the same colours. The price is that a fine step along one axis runs through the whole lattice.
+//! the same colors. The price is that a fine step along one axis runs through the whole lattice.
 
 use std::ops::RangeInclusive;
 
@@ -13,7 +13,7 @@ use crate::MeshError;
 /// How steps grow away from the fine zone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grading {
-    /// Largest ratio of two neighbouring steps along an axis, above 1 and at most [`Grading::MOST_GROWTH`].
+    /// Largest ratio of two neighboring steps along an axis, above 1 and at most [`Grading::MOST_GROWTH`].
     pub growth: f64,
     /// Longest step, in steps of the fine zone, from 1 to [`Grading::MOST_COARSE`]. Cells are as much longer along one axis than along
     /// another beside the zone.
@@ -21,7 +21,7 @@ pub struct Grading {
 }
 
 impl Grading {
-    /// Largest growth: neighbouring steps differ by a factor of 2 at most, as in a balanced octree.
+    /// Largest growth: neighboring steps differ by a factor of 2 at most, as in a balanced octree.
     pub const MOST_GROWTH: f64 = 2.0;
     /// Largest `coarsest`: the smallest dihedral angle of `kuhn6` is then 7° (14° at 4, 45° in a cube).
     pub const MOST_COARSE: f64 = 8.0;

@@ -10,7 +10,7 @@ use crate::neighbors::Neighbors;
 use crate::slit::{Facet, Slit, check_indices};
 use crate::{MeshError, NO_VERTEX, TetMesh};
 
-/// A straight cut along a segment on or near the skin. World millimetres.
+/// A straight cut along a segment on or near the skin. World millimeters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Incision {
@@ -118,7 +118,7 @@ impl Cut {
         Taken { tets: taken, edges, triangles: faces - triangles.len() }
     }
 
-    /// Distance from a position at rest (local metres) to the nearest slit, mm; infinite without slits.
+    /// Distance from a position at rest (local meters) to the nearest slit, mm; infinite without slits.
     pub fn distance_mm(&self, position: Point3<f32>) -> f64 {
         self.slits.iter().map(|slit| slit.distance(position) * 1000.0).fold(f64::INFINITY, f64::min)
     }

@@ -28,7 +28,7 @@ pub enum Split {
 /// Corners of a cell are numbered `di + 2 dj + 4 dk`; cell `(i, j, k)` has its corner 0 at point `(i, j, k)`.
 ///
 /// The points lie evenly, or ([`Lattice::graded`]) on planes across each axis that are further apart away from a fine zone.
-/// Cells, tets, neighbours and colours are the same for both; only the places of the points differ.
+/// Cells, tets, neighbors and colors are the same for both; only the places of the points differ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
     grid: Grid,
@@ -44,7 +44,7 @@ impl Lattice {
     ///
     /// # Errors
     /// [`MeshError::LatticeSize`] if an axis has fewer than 2 points or there are more than [`Lattice::MAX_POINTS`];
-    /// [`MeshError::LatticeExtent`] if positions or steps vanish or overflow in 32-bit metres.
+    /// [`MeshError::LatticeExtent`] if positions or steps vanish or overflow in 32-bit meters.
     pub fn new(grid: Grid, split: Split) -> Result<Self, MeshError> {
         Self::check(&grid, grid.shape)?;
         Ok(Self { grid, split, planes: None })

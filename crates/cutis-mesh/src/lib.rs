@@ -1,6 +1,6 @@
 //! Tetrahedral lattices of CT volumes: meshes of tissue, skin detection, incisions, wound gape, mesh files.
 //!
-//! Mesh coordinates are local metres in 32 bits, placed by a [`Frame`]; millimetres appear only in names that end in `_mm`.
+//! Mesh coordinates are local meters in 32 bits, placed by a [`Frame`]; millimeters appear only in names that end in `_mm`.
 #![forbid(unsafe_code)]
 
 mod build;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Lattice, MeshError, TetMesh};
 
-/// The side of a plane that its normal points to, in world millimetres.
+/// The side of a plane that its normal points to, in world millimeters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HalfSpace {

@@ -16,7 +16,7 @@ use crate::{Cut, Frozen, Lattice, MeshError, NO_VERTEX, TetMesh};
 pub struct Shell {
     /// Number of mesh vertices, and so the index of the first extra vertex.
     pub first_extra: u32,
-    /// Rest positions of the extra vertices, local metres, in lattice order.
+    /// Rest positions of the extra vertices, local meters, in lattice order.
     pub positions: Vec<Point3<f32>>,
     /// Tets that move along, positively oriented at rest.
     pub tets: Vec<[u32; 4]>,

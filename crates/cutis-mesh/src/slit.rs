@@ -8,7 +8,7 @@ use crate::{Frame, Lattice, MeshError, TetMesh};
 /// Most stations and bins along one slit; bounds the work for absurdly long segments.
 const MOST_BINS: f64 = 1024.0;
 
-/// An incision placed on the skin of a mesh at rest. All lengths in metres, positions in the mesh's local frame.
+/// An incision placed on the skin of a mesh at rest. All lengths in meters, positions in the mesh's local frame.
 ///
 /// Axes: *along* from start to end; *inward* against the mean outward skin normal near the segment, made orthogonal to it; *lateral* =
 /// inward × along, with the left lip at negative and the right lip at positive lateral coordinate. *Depth* is counted along the inward axis from
@@ -79,7 +79,7 @@ impl Slit {
 
     /// Finds the slit's frame and the skin's height along it.
     ///
-    /// The segment must come within `reach` = max(depth, a quarter of the length, two lattice steps) of the centre of a skin triangle: enough for
+    /// The segment must come within `reach` = max(depth, a quarter of the length, two lattice steps) of the center of a skin triangle: enough for
     /// the chord of a strongly curved belly. Along at least half of it there must be skin within reach above or below.
     pub(crate) fn place(ground: &Ground<'_>, number: usize, cut: &Incision) -> Result<Self, MeshError> {
         let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - ground.frame.origin_mm) / 1000.0);
@@ -140,7 +140,7 @@ impl Slit {
     }
 
     /// Mean height of the skin in bins of about two lattice steps, and in how many of them there is skin. The others take theirs
-    /// from their neighbours.
+    /// from their neighbors.
     fn heights(&self, ground: &Ground<'_>) -> (Vec<f64>, usize) {
         let step = ground.step;
         let count = (self.length / (2.0 * step)).floor().clamp(1.0, MOST_BINS) as usize;
@@ -243,7 +243,7 @@ impl Slit {
         self.along
     }
 
-    /// The point of the skin above the middle of the slit, local metres, at rest.
+    /// The point of the skin above the middle of the slit, local meters, at rest.
     pub fn middle(&self) -> Point3<f64> {
         let height = self.skin.get(self.skin.len() / 2).copied().unwrap_or(0.0);
         self.start + self.along * (self.length / 2.0) + self.inward * height
@@ -266,7 +266,7 @@ pub(crate) struct Ground<'a> {
     /// Longest lattice step, m.
     step: f64,
     triangles: &'a [[u32; 3]],
-    /// Place of a corner at rest, local metres.
+    /// Place of a corner at rest, local meters.
     position: &'a dyn Fn(u32) -> Point3<f32>,
     facets: Vec<Facet>,
 }
@@ -283,7 +283,7 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// A skin triangle's centre, and its outward normal times its area.
+/// A skin triangle's center, and its outward normal times its area.
 pub(crate) struct Facet {
     center: Point3<f64>,
     pub area_vector: Vector3<f64>,

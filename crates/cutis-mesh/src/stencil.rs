@@ -1,4 +1,4 @@
-//! What is the same in every cell of a lattice: tets, their neighbours across faces, edge directions.
+//! What is the same in every cell of a lattice: tets, their neighbors across faces, edge directions.
 
 use std::sync::LazyLock;
 
@@ -19,7 +19,7 @@ pub(crate) struct Neighbor {
 #[derive(Clone, Debug)]
 pub(crate) struct Direction {
     pub step: [i8; 3],
-    /// Number of the direction within the split, for colours.
+    /// Number of the direction within the split, for colors.
     pub number: u16,
     /// Cells around the edge, as offsets from its first point, and which of their tets have the edge.
     pub cells: Vec<([i8; 3], u8)>,
@@ -35,7 +35,7 @@ pub(crate) struct Stencil {
     pub corners: [[u8; 64]; 2],
     /// Corners that are air → number of tets with 0, 1, 2, 3, 4 air corners.
     pub air_corners: [[[u8; 5]; 256]; 2],
-    /// `[tet][f]`: the neighbour across the face opposite to the tet's corner `f`.
+    /// `[tet][f]`: the neighbor across the face opposite to the tet's corner `f`.
     pub neighbors: [Vec<[Neighbor; 4]>; 2],
     /// By parity of the edge's first point, ascending in flat index of the second point.
     pub directions: [Vec<Direction>; 2],
@@ -141,7 +141,7 @@ fn neighbors(tets: &[Vec<[u8; 4]>; 2], parity: usize) -> Vec<[Neighbor; 4]> {
     (0..tets[parity].len())
         .map(|tet| {
             std::array::from_fn(|f| {
-                across(tet, f).expect("the splits of neighbouring cells share their faces")
+                across(tet, f).expect("the splits of neighboring cells share their faces")
             })
         })
         .collect()

@@ -73,7 +73,7 @@ pub(crate) fn faces(lattice: &Lattice, masks: &CellMasks) -> Vec<LatticeFace> {
     (0..cells[2]).into_par_iter().flat_map_iter(layer).collect()
 }
 
-/// The neighbouring cell, if it is within the lattice.
+/// The neighboring cell, if it is within the lattice.
 pub(crate) fn step(cell: [usize; 3], neighbor: &Neighbor, cells: [usize; 3]) -> Option<[usize; 3]> {
     let mut to = cell;
     for axis in 0..3 {

@@ -55,7 +55,7 @@ pub enum Cells<'a> {
 pub struct Piece<'a> {
     /// Where the positions lie in the world.
     pub frame: &'a Frame,
-    /// Local metres.
+    /// Local meters.
     pub positions: &'a [Point3<f32>],
     /// The cells.
     pub cells: Cells<'a>,

@@ -139,7 +139,7 @@ impl WholeBody {
 pub struct StillSkin {
     /// Corners below the mesh's number of vertices are mesh vertices; the others are `positions`, counted from there.
     pub triangles: Vec<[u32; 3]>,
-    /// Local metres, in lattice order.
+    /// Local meters, in lattice order.
     pub positions: Vec<Point3<f32>>,
     /// Flat index of the lattice point of each position.
     pub lattice_index: Vec<u32>,

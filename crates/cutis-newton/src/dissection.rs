@@ -11,15 +11,15 @@ const LEAF: usize = 12;
 /// Shares of the vertices below the planes that are tried.
 const SHARES: [f64; 7] = [0.5, 0.46, 0.54, 0.42, 0.58, 0.38, 0.62];
 
-/// Who shares a constraint with whom: the neighbours of vertex `v` are `targets[offsets[v]..offsets[v + 1]]`, ascending.
+/// Who shares a constraint with whom: the neighbors of vertex `v` are `targets[offsets[v]..offsets[v + 1]]`, ascending.
 pub(crate) struct Graph {
     pub offsets: Vec<usize>,
     pub targets: Vec<u32>,
 }
 
 impl Graph {
-    /// The neighbours of `v`.
-    pub fn neighbours(&self, v: u32) -> &[u32] {
+    /// The neighbors of `v`.
+    pub fn neighbors(&self, v: u32) -> &[u32] {
         &self.targets[self.offsets[v as usize]..self.offsets[v as usize + 1]]
     }
 }
@@ -56,7 +56,7 @@ impl Dissection<'_> {
         self.mark(vertices, middle);
         // The separator: what lies below the plane and touches what lies above.
         let touches =
-            |&v: &u32| self.graph.neighbours(v).iter().any(|&n| self.side[n as usize] == Side::Above);
+            |&v: &u32| self.graph.neighbors(v).iter().any(|&n| self.side[n as usize] == Side::Above);
         let (separator, below): (Vec<u32>, Vec<u32>) = vertices[..middle].iter().partition(|v| touches(v));
         for &v in &*vertices {
             self.side[v as usize] = Side::Outside;
@@ -79,7 +79,7 @@ impl Dissection<'_> {
                 let middle = self.between_planes(vertices, axis, (vertices.len() as f64 * share) as usize);
                 self.mark(vertices, middle);
                 let above = |&n: &u32| self.side[n as usize] == Side::Above;
-                let touches = |v: &&u32| self.graph.neighbours(**v).iter().any(above);
+                let touches = |v: &&u32| self.graph.neighbors(**v).iter().any(above);
                 let separator = vertices[..middle].iter().filter(touches).count();
                 let larger = (middle - separator).max(vertices.len() - middle);
                 // The work on the halves grows with about the square of their sizes.

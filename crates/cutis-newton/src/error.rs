@@ -1,4 +1,4 @@
-//! Everything that can be wrong with a problem, its options or a minimisation.
+//! Everything that can be wrong with a problem, its options or a minimization.
 
 /// Why a system has no minimum that could be found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -49,7 +49,7 @@ pub enum NewtonError {
         /// What would be right.
         expected: &'static str,
     },
-    /// A vertex has a coordinate or, where the minimisation starts, a force that is not finite.
+    /// A vertex has a coordinate or, where the minimization starts, a force that is not finite.
     #[error("vertex {vertex}: {what} is not finite")]
     NotFinite {
         /// Which vertex.

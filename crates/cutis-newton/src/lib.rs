@@ -2,7 +2,7 @@
 //! precision with a sparse direct solver.
 //!
 //! A [`Problem`] takes the energies `½C²/α`, masses and positions from a system of `cutis-solver` and nothing of how that
-//! steps. [`Problem::step`] finds the minimiser of an implicit Euler step, which XPBD approaches with its iterations;
+//! steps. [`Problem::step`] finds the minimizer of an implicit Euler step, which XPBD approaches with its iterations;
 //! [`Problem::equilibrium`] finds where the body comes to rest. [`relative_rms`] says how far a solver is from either.
 #![forbid(unsafe_code)]
 

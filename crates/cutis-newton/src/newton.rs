@@ -18,7 +18,7 @@ const FIRST_SHIFT: f64 = 1e-6;
 /// With so large a shift every matrix with a positive diagonal would be definite.
 const LARGEST_SHIFT: f64 = 1e6;
 
-/// The end of a minimisation.
+/// The end of a minimization.
 pub(crate) struct Found {
     pub state: State,
     /// Relative gradient.
@@ -27,8 +27,8 @@ pub(crate) struct Found {
     pub definite: bool,
 }
 
-/// Minimises `objective` from `start`.
-pub(crate) fn minimise(
+/// Minimizes `objective` from `start`.
+pub(crate) fn minimize(
     objective: &Objective<'_>,
     start: Vec<Point3<f64>>,
     options: &Options,
@@ -48,7 +48,7 @@ pub(crate) fn minimise(
         if state.norm <= (options.tolerance * scale).max(state.floor) {
             let definite = match search.definite {
                 Some(definite) => definite,
-                None => search.factorise(&state, 0.0, 0.0),
+                None => search.factorize(&state, 0.0, 0.0),
             };
             return Ok(Found { state, gradient, iterations, definite });
         }
@@ -74,7 +74,7 @@ struct Search<'a> {
 impl Search<'_> {
     /// The next state, lower than `state`; `None` if no step is.
     fn step(&mut self, state: &State) -> Option<State> {
-        let plain = self.factorise(state, 0.0, 0.0);
+        let plain = self.factorize(state, 0.0, 0.0);
         self.definite = Some(plain);
         if plain && let Some((next, _)) = self.along_direction(state) {
             self.shift = 0.0;
@@ -83,7 +83,7 @@ impl Search<'_> {
         // Where the Hessian bends downwards: as little of that turned upwards as makes it definite. Beside a saddle, where elements that
         // bend upwards and downwards all but cancel, the steps would be short with more.
         while self.shift <= LARGEST_SHIFT {
-            if self.factorise(state, self.turned, self.shift)
+            if self.factorize(state, self.turned, self.shift)
                 && let Some((next, length)) = self.along_direction(state)
             {
                 match length {
@@ -114,7 +114,7 @@ impl Search<'_> {
         }
     }
 
-    fn factorise(&mut self, state: &State, turned: f64, shift: f64) -> bool {
+    fn factorize(&mut self, state: &State, turned: f64, shift: f64) -> bool {
         assemble(self.objective, state, &self.pattern.places, turned, &mut self.factors);
         if shift > 0.0 {
             let diagonal: Vec<usize> = (0..state.gradient.len()).map(|n| self.factors.diagonal(n)).collect();
@@ -123,7 +123,7 @@ impl Search<'_> {
                 self.factors.values[n] += shift * (self.factors.values[n] + mean);
             }
         }
-        self.factors.factorise()
+        self.factors.factorize()
     }
 
     /// A step along the direction that the factors give, and its length as a share of the whole.

@@ -1,4 +1,4 @@
-//! What is minimised: the elastic energy, and with it either gravity or the inertia of an implicit step.
+//! What is minimized: the elastic energy, and with it either gravity or the inertia of an implicit step.
 
 use nalgebra::{Point3, Vector3};
 
@@ -18,7 +18,7 @@ pub(crate) enum Outer {
     },
 }
 
-/// An energy to be minimised over the vertices that can move.
+/// An energy to be minimized over the vertices that can move.
 pub(crate) struct Objective<'a> {
     pub problem: &'a Problem,
     pub outer: Outer,

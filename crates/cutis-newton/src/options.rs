@@ -1,4 +1,4 @@
-//! What a minimisation is asked for, and what it finds.
+//! What a minimization is asked for, and what it finds.
 
 use nalgebra::Point3;
 
@@ -17,7 +17,7 @@ pub struct Options {
     /// Below what the rounding of positions leaves of the gradient there is nothing to be gained; what is known to no better than
     /// that is taken as found as well, and [`Minimum::gradient`] says how far it is.
     pub tolerance: f64,
-    /// Iterations, each with one factorisation at least.
+    /// Iterations, each with one factorization at least.
     pub max_iterations: usize,
 }
 
@@ -49,7 +49,7 @@ pub struct Minimum {
     pub iterations: usize,
     /// Elastic and gravitational energy there, in J. Zero for gravity is at the caller's origin.
     pub energy_j: f64,
-    /// Whether the Hessian, when it was last factorised, was positive definite: then this is a minimum and the only one near. If not,
+    /// Whether the Hessian, when it was last factorized, was positive definite: then this is a minimum and the only one near. If not,
     /// it may be a saddle, as a straight column under too heavy a load, or one of many, as of a body on a hinge.
     pub definite: bool,
 }
@@ -57,7 +57,7 @@ pub struct Minimum {
 /// Root of the sum of `|found − reference|²` over that of `|reference − start|²`: how far `found` is from the reference, as a share of
 /// the way from `start` to it. Without unit; 0 where nothing differs, infinite where only the way is zero.
 ///
-/// With the minimiser of an implicit step as reference and what the step started from it is the error E1; with other references the
+/// With the minimizer of an implicit step as reference and what the step started from it is the error E1; with other references the
 /// same serves for errors in time and against closed forms. Vertices that do not move add nothing to either sum.
 ///
 /// # Panics

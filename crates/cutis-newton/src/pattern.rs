@@ -62,7 +62,7 @@ impl Pattern {
         for (column, &number) in (0..).zip(&order) {
             let from = rows.len();
             let above =
-                graph.neighbours(number).iter().map(|&n| ranks[n as usize]).filter(|&row| row < column);
+                graph.neighbors(number).iter().map(|&n| ranks[n as usize]).filter(|&row| row < column);
             rows.extend(above);
             rows[from..].sort_unstable();
             rows.push(column);
@@ -204,8 +204,8 @@ impl Factors<'_> {
         pattern.restored(&y)
     }
 
-    /// Factorises the Hessian. False where it is not positive definite, to rounding.
-    pub fn factorise(&mut self) -> bool {
+    /// Factorizes the Hessian. False where it is not positive definite, to rounding.
+    pub fn factorize(&mut self) -> bool {
         let pattern = self.pattern;
         let n = pattern.column_starts.len() - 1;
         let matrix =
@@ -236,7 +236,7 @@ impl Factors<'_> {
         })
     }
 
-    /// The solution of `H x = b`, with the Hessian that was factorised last. Three numbers for each vertex that can move, in their
+    /// The solution of `H x = b`, with the Hessian that was factorized last. Three numbers for each vertex that can move, in their
     /// order.
     pub fn solve(&mut self, b: &[f64]) -> Vec<f64> {
         let mut x = self.pattern.permuted(b);
@@ -328,7 +328,7 @@ mod tests {
         }
         let x: Vec<f64> = (0..size).map(|n| (n % 11) as f64 - 5.0).collect();
         let b = factors.product(&x);
-        assert!(factors.factorise());
+        assert!(factors.factorize());
         let solved = factors.solve(&b);
         assert!(x.iter().zip(&solved).all(|(x, y)| (x - y).abs() < 1e-12), "{solved:?}");
     }
@@ -348,7 +348,7 @@ mod tests {
             let block = if value < 0.0 { Matrix3::identity() * (1.0 - value) } else { block };
             let last = problem.free.len() as u32 - 1;
             factors.add(pattern.rows[pattern.starts[last as usize]], last, &block);
-            assert_eq!(factors.factorise(), definite, "{value}");
+            assert_eq!(factors.factorize(), definite, "{value}");
         }
     }
 }

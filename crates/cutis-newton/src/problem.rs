@@ -8,14 +8,14 @@ use nalgebra::{Point3, Vector3};
 
 use crate::field::Elastic;
 use crate::floating;
-use crate::newton::minimise;
+use crate::newton::minimize;
 use crate::objective::{Objective, Outer};
 use crate::pattern::Pattern;
 use crate::{Minimum, NewtonError, Options};
 
 /// The energies of a system, in double precision and independent of it: the constraints as `½C²/α`, the masses, gravity.
 ///
-/// Positions that are given and returned are in metres, in the caller's coordinates, one per vertex of the system.
+/// Positions that are given and returned are in meters, in the caller's coordinates, one per vertex of the system.
 /// Vertices with inverse mass 0 do not move.
 pub struct Problem {
     pub(crate) elastic: Elastic,
@@ -69,7 +69,7 @@ impl Problem {
         &self.masses
     }
 
-    /// Bytes that the factors of the Hessian take, the most of what a minimisation needs.
+    /// Bytes that the factors of the Hessian take, the most of what a minimization needs.
     ///
     /// # Errors
     /// [`NewtonError::Memory`] if they cannot be counted.
@@ -115,7 +115,7 @@ impl Problem {
         predicted
     }
 
-    /// An implicit Euler step of `h` seconds: the minimiser of `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`, from `start`. Gravity is in
+    /// An implicit Euler step of `h` seconds: the minimizer of `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`, from `start`. Gravity is in
     /// `x̃`, see [`predicted`](Self::predicted). Vertices that do not move stay where `start` has them.
     ///
     /// # Errors
@@ -157,7 +157,7 @@ impl Problem {
     ) -> Result<Minimum, NewtonError> {
         options.check()?;
         let objective = Objective { problem: self, outer };
-        let found = minimise(&objective, self.local(start), options)?;
+        let found = minimize(&objective, self.local(start), options)?;
         let mut positions = start.to_vec();
         for &v in &self.free {
             positions[v as usize] = found.state.x[v as usize] + self.origin;

@@ -9,7 +9,7 @@ use crate::{Axes, Image, Rgb};
 
 const INK: Rgb = [255, 255, 255];
 
-/// World position of the picture's centre and the size of a pixel in mm, so that all `corners` are seen, or the focus.
+/// World position of the picture's center and the size of a pixel in mm, so that all `corners` are seen, or the focus.
 pub fn frame(
     axes: &Axes,
     corners: &[Point3<f64>; 8],
@@ -17,8 +17,8 @@ pub fn frame(
     size: [usize; 2],
 ) -> (Point3<f64>, f64) {
     let pixels = size.map(|length| length as f64);
-    if let Some(Focus { centre_mm, size_mm }) = focus {
-        return (Point3::from(centre_mm), size_mm / pixels[0].min(pixels[1]));
+    if let Some(Focus { center_mm, size_mm }) = focus {
+        return (Point3::from(center_mm), size_mm / pixels[0].min(pixels[1]));
     }
     let middle = corners.iter().fold(Vector3::zeros(), |sum, corner| sum + corner.coords / 8.0);
     let [width, height] = [axes.right, axes.up].map(|axis| extent(corners, &axis));
@@ -45,12 +45,12 @@ pub fn annotate(image: &mut Image, axes: &Axes, pixel_mm: f64) {
     let height = font::HEIGHT * scale;
     let (width, bottom) = (image.width, image.height.saturating_sub(margin + height));
     let middle = (image.height / 2).saturating_sub(height / 2);
-    let centred = |text: &str| (width / 2).saturating_sub(text_width(text, scale) / 2);
+    let centerd = |text: &str| (width / 2).saturating_sub(text_width(text, scale) / 2);
     let [left, right, top, low] = axes.letters();
     image.text(margin, middle, &left, scale, INK);
     image.text(width.saturating_sub(margin + text_width(&right, scale)), middle, &right, scale, INK);
-    image.text(centred(&top), margin, &top, scale, INK);
-    image.text(centred(&low), bottom, &low, scale, INK);
+    image.text(centerd(&top), margin, &top, scale, INK);
+    image.text(centerd(&low), bottom, &low, scale, INK);
     scale_bar(image, pixel_mm, scale, margin);
 }
 

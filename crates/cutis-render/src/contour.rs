@@ -4,16 +4,16 @@ use nalgebra::{Point3, Vector3};
 
 use crate::{RenderError, Rgb};
 
-/// A triangle surface to draw on a slice. Positions are local metres: `world_mm = origin_mm + 1000 · local`.
+/// A triangle surface to draw on a slice. Positions are local meters: `world_mm = origin_mm + 1000 · local`.
 #[derive(Clone, Copy, Debug)]
 pub struct Contour<'a> {
     /// World position of the surface's local origin, mm, RAS+.
     pub origin_mm: Point3<f64>,
-    /// Vertices, local metres.
+    /// Vertices, local meters.
     pub positions: &'a [Point3<f32>],
     /// Corners of the triangles.
     pub triangles: &'a [[u32; 3]],
-    /// Colour of the line.
+    /// Color of the line.
     pub color: Rgb,
 }
 

@@ -45,7 +45,7 @@ impl Image {
         }
     }
 
-    /// Draws a smooth line between two points in pixels; the centre of the first pixel is at (0, 0).
+    /// Draws a smooth line between two points in pixels; the center of the first pixel is at (0, 0).
     pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], thickness: f64, color: Rgb) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let squared = along[0] * along[0] + along[1] * along[1];

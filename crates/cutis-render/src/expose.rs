@@ -7,7 +7,7 @@ use crate::{Image, RenderError};
 
 /// Places of the picture that are looked at together.
 pub const BATCH: usize = 1 << 16;
-/// Difference between neighbouring pixels that calls for more rays.
+/// Difference between neighboring pixels that calls for more rays.
 const EDGE: u8 = 12;
 
 /// Fills a picture with the light that comes to its places, which are given in pixels from its top left corner and at most
@@ -51,7 +51,7 @@ pub fn expose(
     Ok(())
 }
 
-/// True if a neighbour's colour differs by more than [`EDGE`] in a channel.
+/// True if a neighbor's color differs by more than [`EDGE`] in a channel.
 fn on_edge(image: &Image, pixel: usize) -> bool {
     let (width, x, y) = (image.width, pixel % image.width, pixel / image.width);
     let color = |pixel: usize| &image.rgb[3 * pixel..][..3];

@@ -57,7 +57,7 @@ impl<'a> Field<'a> {
     }
 
     /// ∂HU/∂index, smoothed: central differences over one voxel to either side, averaged over the position and its six
-    /// neighbours. Without the average the steps between voxels show as rings on the skin.
+    /// neighbors. Without the average the steps between voxels show as rings on the skin.
     pub fn index_gradient(&self, position: Point3<f64>) -> Vector3<f64> {
         let unit = |axis: usize| Vector3::from_fn(|row, _| if row == axis { 1.0 } else { 0.0 });
         let at = |offset: Vector3<f64>| f64::from(self.at(position + offset));
@@ -65,7 +65,7 @@ impl<'a> Field<'a> {
         for axis in 0..3 {
             let along = unit(axis);
             sum[axis] += at(along) - at(-along) + at(along * 2.0) - at(along * -2.0);
-            // Each diagonal neighbour serves the differences along both its axes.
+            // Each diagonal neighbor serves the differences along both its axes.
             let other = (axis + 1) % 3;
             let across = unit(other);
             let [pp, pm, mp, mm] =

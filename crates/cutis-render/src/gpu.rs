@@ -38,8 +38,8 @@ pub fn raymarch_gpu(gpu: &Gpu, volume: &Volume, view: &View<'_>) -> Result<Image
 ///
 /// # How its pictures differ
 /// A position is rounded to about 10⁻⁷ of the grid's length. That moves a surface by less than the 1/128 voxel to which it is
-/// refined, and its colour by 1 of 255 here and there; more only at ties: a ray that grazes a silhouette, a probe of the
-/// ambient occlusion at just the threshold, neighbours at just the difference that calls for more rays. Ties are not as rare
+/// refined, and its color by 1 of 255 here and there; more only at ties: a ray that grazes a silhouette, a probe of the
+/// ambient occlusion at just the threshold, neighbors at just the difference that calls for more rays. Ties are not as rare
 /// as chance has it: voxels are integers, and where pixels and voxels are in a round proportion a value between them can be
 /// the threshold itself. On Mesa's software Vulkan the mean absolute difference was at most 0.0023 of 255 over the pictures
 /// of the tests, where at most 2 pixels of 12 000 differed by more than 8. The tests hold 0.005, and one pixel in 2000.

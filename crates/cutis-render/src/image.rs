@@ -7,7 +7,7 @@ use cutis_volume::PartialFile;
 
 use crate::RenderError;
 
-/// A colour: red, green, blue.
+/// A color: red, green, blue.
 pub type Rgb = [u8; 3];
 
 /// An RGB picture, 8 bits per channel, row by row from the top left.
@@ -25,7 +25,7 @@ impl Image {
     /// The largest number of pixels: 2²⁷, three times as many bytes.
     pub const MAX_PIXELS: usize = 1 << 27;
 
-    /// A picture of one colour.
+    /// A picture of one color.
     ///
     /// # Errors
     /// [`RenderError::ImageSize`] for no pixels or more than [`Image::MAX_PIXELS`]; nothing is allocated then.
@@ -39,13 +39,13 @@ impl Image {
         }
     }
 
-    /// The colour of a pixel, column `x` of row `y`; `None` outside the picture.
+    /// The color of a pixel, column `x` of row `y`; `None` outside the picture.
     pub fn pixel(&self, x: usize, y: usize) -> Option<Rgb> {
         let at = self.offset(x, y)?;
         Some([self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]])
     }
 
-    /// Mixes a colour into a pixel: 0 leaves it, 1 replaces it. Outside the picture nothing happens.
+    /// Mixes a color into a pixel: 0 leaves it, 1 replaces it. Outside the picture nothing happens.
     pub fn blend(&mut self, x: usize, y: usize, color: Rgb, opacity: f32) {
         if let Some(at) = self.offset(x, y) {
             for (channel, new) in self.rgb[at..at + 3].iter_mut().zip(color) {

@@ -2,7 +2,7 @@
 //!
 //! Everything runs on the CPU without a display, and gives the same bits for any number of threads; with the feature `gpu`,
 //! `raymarch_gpu` gives the same surface pictures by a GPU, but for rounding. Positions and directions
-//! are RAS+ millimetres: `[1, 0, 0]` points to the patient's right, `[0, 1, 0]` to anterior, `[0, 0, 1]` to superior.
+//! are RAS+ millimeters: `[1, 0, 0]` points to the patient's right, `[0, 1, 0]` to anterior, `[0, 0, 1]` to superior.
 //!
 //! ```
 //! use cutis_render::{Plane, Side, SliceView, View, raymarch, slice};

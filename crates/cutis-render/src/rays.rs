@@ -14,7 +14,7 @@ const STEP: f64 = 0.5;
 pub struct Rays<'a> {
     field: &'a Field<'a>,
     axes: Axes,
-    centre_mm: Point3<f64>,
+    center_mm: Point3<f64>,
     /// Half the picture's width and height, pixels.
     half: [f64; 2],
     /// Size of a pixel, mm.
@@ -29,7 +29,7 @@ pub struct Rays<'a> {
 
 /// A ray's part that is shown: not empty.
 pub struct Ray {
-    /// Continuous index in the plane of the picture's centre.
+    /// Continuous index in the plane of the picture's center.
     origin: Point3<f64>,
     /// Steps from there to the first sample.
     start: f64,
@@ -40,7 +40,7 @@ pub struct Ray {
 impl<'a> Rays<'a> {
     pub fn new(field: &'a Field<'a>, view: &View<'_>, axes: &Axes) -> Self {
         let size = [view.width, view.height];
-        let (centre_mm, pixel_mm) = frame(axes, &field.corners_mm(), view.focus, size);
+        let (center_mm, pixel_mm) = frame(axes, &field.corners_mm(), view.focus, size);
         let per_mm = field.index_per_mm() * -axes.toward;
         let step = per_mm * (STEP / per_mm.amax());
         let mut planes = Vec::new();
@@ -63,14 +63,14 @@ impl<'a> Rays<'a> {
         }
         let longest = field.shape().into_iter().max().unwrap_or(1);
         let half = size.map(|length| length as f64 / 2.0);
-        Self { field, axes: *axes, centre_mm, half, pixel_mm, step, planes, most: longest as f64 / STEP }
+        Self { field, axes: *axes, center_mm, half, pixel_mm, step, planes, most: longest as f64 / STEP }
     }
 
     /// The ray through a place of the picture, in pixels from its top left corner, if it meets anything that is shown.
     pub fn through(&self, [x, y]: [f64; 2]) -> Option<Ray> {
         let u = (x - self.half[0]) * self.pixel_mm;
         let v = (self.half[1] - y) * self.pixel_mm;
-        let origin = self.field.to_index(self.centre_mm + self.axes.right * u + self.axes.up * v);
+        let origin = self.field.to_index(self.center_mm + self.axes.right * u + self.axes.up * v);
         let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
         for (normal, offset) in &self.planes {
             let rate = normal.dot(&self.step);

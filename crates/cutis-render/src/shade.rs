@@ -1,4 +1,4 @@
-//! Colour of a surface point: skin, or tissue by HU where it was deep, with light and ambient occlusion.
+//! Color of a surface point: skin, or tissue by HU where it was deep, with light and ambient occlusion.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -26,7 +26,7 @@ const REACHES: [f64; 3] = [0.2, 0.5, 1.0];
 /// Linear light, 0 to 1.
 pub type Light = Vector3<f32>;
 
-/// Colours the surface of one field under one view.
+/// Colors the surface of one field under one view.
 pub struct Shader<'a> {
     field: &'a Field<'a>,
     depth: Option<(Field<'a>, f64)>,
@@ -71,8 +71,8 @@ impl<'a> Shader<'a> {
 
     pub fn color(&self, hit: &Hit) -> Light {
         if hit.on_cut {
-            let grey = (self.field.at(hit.index) + 160.0) / 400.0;
-            return Light::repeat(grey.clamp(0.0, 1.0).powi(2)) * 0.8;
+            let gray = (self.field.at(hit.index) + 160.0) / 400.0;
+            return Light::repeat(gray.clamp(0.0, 1.0).powi(2)) * 0.8;
         }
         let normal = self.normal(hit.index);
         let base = self.albedo(hit.index, &normal);
@@ -132,7 +132,7 @@ impl<'a> Shader<'a> {
     }
 }
 
-/// Colour of tissue by HU.
+/// Color of tissue by HU.
 fn tissue(hu: f32) -> Light {
     let after = TISSUE.partition_point(|(at, _)| *at < hu);
     match (TISSUE.get(after.wrapping_sub(1)), TISSUE.get(after)) {
@@ -148,12 +148,12 @@ fn smooth_step(x: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// Stored colour → linear light, with a gamma of 2.
+/// Stored color → linear light, with a gamma of 2.
 pub fn decode(color: Rgb) -> Light {
     Light::from(color.map(|c| (f32::from(c) / 255.0).powi(2)))
 }
 
-/// Linear light → stored colour.
+/// Linear light → stored color.
 pub fn encode(light: Light) -> Rgb {
     light.map(|c| (c.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8).into()
 }

@@ -24,7 +24,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Direction from the patient to the viewer, RAS+, not normalised.
+    /// Direction from the patient to the viewer, RAS+, not normalized.
     pub fn direction(self) -> [f64; 3] {
         match self {
             Side::Anterior => [0.0, 1.0, 0.0],

@@ -30,9 +30,9 @@ pub struct SliceView<'a> {
     pub at_mm: f64,
     /// Patient's right on the left of the picture (default); mirrored if false.
     pub radiological: bool,
-    /// Width of the grey scale, HU. Default 400.
+    /// Width of the gray scale, HU. Default 400.
     pub window_hu: f32,
-    /// Its centre, HU. Default 40.
+    /// Its center, HU. Default 40.
     pub level_hu: f32,
     /// Pixels along the longer side; `None`: a pixel is as large as the finest voxel spacing.
     pub long_side: Option<usize>,
@@ -88,9 +88,9 @@ impl SliceView<'_> {
         self.contours.iter().enumerate().try_for_each(|(number, contour)| contour.validate(number))
     }
 
-    /// Grey of a HU value: black at `level − window/2` and below, white at `level + window/2` and above, linear between
+    /// Gray of a HU value: black at `level − window/2` and below, white at `level + window/2` and above, linear between
     /// (DICOM PS3.3 C.11.2.1.3.2, LINEAR_EXACT).
-    pub fn grey(&self, hu: f32) -> u8 {
+    pub fn gray(&self, hu: f32) -> u8 {
         let part = (hu - (self.level_hu - self.window_hu / 2.0)) / self.window_hu;
         (part.clamp(0.0, 1.0) * 255.0).round() as u8
     }
@@ -113,34 +113,34 @@ pub fn slice(volume: &Volume, view: &SliceView<'_>) -> Result<Image, RenderError
     let pixel = view.long_side.map_or(field.finest_mm(), |long| width_mm.max(height_mm) / long as f64);
     let [width, height] = [width_mm, height_mm].map(|length| (length / pixel).round().max(1.0) as usize);
     let mut image = Image::new(width, height, [0; 3])?;
-    let (mut centre, _) = frame(&axes, &corners, view.focus, [width, height]);
+    let (mut center, _) = frame(&axes, &corners, view.focus, [width, height]);
     let axis = match view.plane {
         Plane::Axial => 2,
         Plane::Coronal => 1,
         Plane::Sagittal => 0,
     };
-    centre[axis] = view.at_mm;
+    center[axis] = view.at_mm;
 
     let shape = field.shape();
     image.rgb.par_chunks_mut(3 * width).enumerate().for_each(|(y, row)| {
         let v = (height as f64 - 1.0) / 2.0 - y as f64;
         for (x, out) in row.chunks_exact_mut(3).enumerate() {
             let u = x as f64 - (width as f64 - 1.0) / 2.0;
-            let index = field.to_index(centre + (axes.right * u + axes.up * v) * pixel);
+            let index = field.to_index(center + (axes.right * u + axes.up * v) * pixel);
             let inside = (0..3).all(|axis| index[axis] >= -0.5 && index[axis] <= shape[axis] as f64 - 0.5);
             if inside {
-                out.fill(view.grey(field.at(index)));
+                out.fill(view.gray(field.at(index)));
             }
         }
     });
 
     let thickness = (width.max(height) as f64 / 400.0).max(1.0);
     for contour in view.contours {
-        for segment in contour.cut(centre, &axes.toward) {
+        for segment in contour.cut(center, &axes.toward) {
             let [from, to] = segment.map(|p: Point3<f64>| {
-                let from_centre = (p - centre) / pixel;
-                let u = from_centre.dot(&axes.right) + (width as f64 - 1.0) / 2.0;
-                [u, (height as f64 - 1.0) / 2.0 - from_centre.dot(&axes.up)]
+                let from_center = (p - center) / pixel;
+                let u = from_center.dot(&axes.right) + (width as f64 - 1.0) / 2.0;
+                [u, (height as f64 - 1.0) / 2.0 - from_center.dot(&axes.up)]
             });
             image.line(from, to, thickness, contour.color);
         }

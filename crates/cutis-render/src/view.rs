@@ -7,8 +7,8 @@ use crate::{RenderError, Side};
 /// A part of the world to look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Focus {
-    /// Centre of the picture, world mm.
-    pub centre_mm: [f64; 3],
+    /// Center of the picture, world mm.
+    pub center_mm: [f64; 3],
     /// Length shown along the shorter side of the picture, mm.
     pub size_mm: f64,
 }
@@ -36,10 +36,10 @@ pub struct View<'a> {
     pub threshold_hu: f32,
     /// Part to look at; the whole volume if `None`.
     pub focus: Option<Focus>,
-    /// Planes to cut away what hides the view. The cut face shows HU as grey, window 400, level 40.
+    /// Planes to cut away what hides the view. The cut face shows HU as gray, window 400, level 40.
     pub clip: &'a [ClipPlane],
     /// Depth below the skin that the tissue had at rest, in mm, as [`skin_depth`](crate::skin_depth) gives it and as it was
-    /// resampled with the body. Surface that was deep is coloured as tissue of a wound. Without it all surface is skin.
+    /// resampled with the body. Surface that was deep is colored as tissue of a wound. Without it all surface is skin.
     pub depth: Option<&'a Volume>,
     /// Thickness of what counts as skin where `depth` is given, mm. Default 2.
     pub skin_mm: f64,
@@ -100,8 +100,8 @@ impl View<'_> {
 impl Focus {
     pub(crate) fn validate(&self) -> Result<(), RenderError> {
         let bad = |key, value, expected| Err(RenderError::Setting { key, value, expected });
-        if let Some(&value) = self.centre_mm.iter().find(|c| !c.is_finite()) {
-            return bad("focus.centre_mm", value, "finite");
+        if let Some(&value) = self.center_mm.iter().find(|c| !c.is_finite()) {
+            return bad("focus.center_mm", value, "finite");
         }
         if !(self.size_mm.is_finite() && self.size_mm > 0.0) {
             return bad("focus.size_mm", self.size_mm, "a length above zero");

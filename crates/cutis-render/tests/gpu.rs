@@ -83,7 +83,7 @@ impl Person {
         };
         let wounded =
             Volume::new(*whole.grid(), (0..whole.grid().len()).map(hu).collect(), 1.0, 0.0).unwrap();
-        Self { wounded, depth, site: Focus { centre_mm: middle, size_mm: 180.0 }, whole }
+        Self { wounded, depth, site: Focus { center_mm: middle, size_mm: 180.0 }, whole }
     }
 
     /// A look at the incision; the skin is as thick as a voxel, so that there is some.
@@ -308,7 +308,7 @@ fn what_cannot_be_drawn_is_refused_as_on_the_cpu() {
         View { skin_mm: 0.0, ..good },
         View { occlusion_mm: f64::INFINITY, ..good },
         View { side: Side::From([0.0; 3]), ..good },
-        View { focus: Some(Focus { centre_mm: [0.0; 3], size_mm: -1.0 }), ..good },
+        View { focus: Some(Focus { center_mm: [0.0; 3], size_mm: -1.0 }), ..good },
         View { clip: &[ClipPlane { point_mm: [0.0; 3], keep: [0.0; 3] }], ..good },
     ];
     for view in bad {
@@ -326,8 +326,8 @@ fn extreme_numbers_end_in_a_picture() {
     let grid = Grid { shape: [20; 3], affine: Affine::from_spacing([1.0; 3], [-9.5; 3]).unwrap() };
     let ball = volume(grid, |p| if p.coords.norm() < 6.0 { 40.0 } else { -1000.0 });
     let view = View { width: 20, height: 20, annotate: false, ..View::new(TURNED) };
-    let far = |size_mm| Some(Focus { centre_mm: [4e300, 1e301, 3e300], size_mm });
-    let near = Some(Focus { centre_mm: [0.0; 3], size_mm: 1e-300 });
+    let far = |size_mm| Some(Focus { center_mm: [4e300, 1e301, 3e300], size_mm });
+    let near = Some(Focus { center_mm: [0.0; 3], size_mm: 1e-300 });
     let clip = [ClipPlane { point_mm: [0.0; 3], keep: [0.0, 1e-300, 1e-200] }];
     let same = [
         ("far", View { focus: far(1.0), ..view }),

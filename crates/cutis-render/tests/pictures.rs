@@ -1,4 +1,4 @@
-//! Geometry, grey values, files and limits of the pictures.
+//! Geometry, gray values, files and limits of the pictures.
 
 use cutis_render::{
     Axes, ClipPlane, Contour, Focus, Image, Plane, RenderError, Side, SliceView, View, raymarch,
@@ -30,7 +30,7 @@ fn volume(grid: Grid, hu: impl Fn(Point3<f64>) -> f64) -> Volume {
     Volume::new(grid, voxels, 1.0, 0.0).unwrap()
 }
 
-/// Mean position of the pixels that `is_bright`, from the picture's centre, to the right and upwards.
+/// Mean position of the pixels that `is_bright`, from the picture's center, to the right and upwards.
 fn centroid(image: &Image, is_bright: impl Fn([u8; 3]) -> bool) -> [f64; 2] {
     let (mut sum, mut count) = ([0.0; 2], 0.0);
     for y in 0..image.height {
@@ -81,7 +81,7 @@ fn a_mark_appears_at_its_letter_from_every_side_and_for_every_orientation() {
         for (mark, at) in MARKS {
             let block = volume(grid, |p| if (p - Point3::from(at)).amax() < 4.0 { 300.0 } else { -1000.0 });
             for (side, letters) in sides.into_iter().zip(expected) {
-                let focus = Some(Focus { centre_mm: [0.0; 3], size_mm: 40.0 });
+                let focus = Some(Focus { center_mm: [0.0; 3], size_mm: 40.0 });
                 let view = View { width: 40, height: 40, annotate: false, focus, ..View::new(side) };
                 let image = raymarch(&block, &view).unwrap();
                 let found = centroid(&image, |[r, _, _]| r > 80);
@@ -125,13 +125,13 @@ fn window_and_level_are_exact() {
     let view = SliceView { annotate: false, radiological: false, ..SliceView::new(Plane::Axial, 0.0) };
     let image = slice(&Volume::new(grid, values.clone(), 1.0, 0.0).unwrap(), &view).unwrap();
     assert_eq!((image.width, image.height), (7, 1));
-    let greys: Vec<u8> = (0..7).map(|x| image.pixel(x, 0).unwrap()[0]).collect();
-    assert_eq!(greys, [0, 0, 1, 128, 254, 255, 255]);
+    let grays: Vec<u8> = (0..7).map(|x| image.pixel(x, 0).unwrap()[0]).collect();
+    assert_eq!(grays, [0, 0, 1, 128, 254, 255, 255]);
     let scaled = Volume::new(grid, values.iter().map(|v| v / 2).collect(), 2.0, 0.0).unwrap();
     assert_eq!(slice(&scaled, &view).unwrap().pixel(3, 0), Some([128; 3]));
     let narrow = SliceView { window_hu: 2.0, level_hu: 239.5, ..view };
-    assert_eq!(narrow.grey(239.5), 128);
-    assert_eq!((narrow.grey(238.5), narrow.grey(240.5)), (0, 255));
+    assert_eq!(narrow.gray(239.5), 128);
+    assert_eq!((narrow.gray(238.5), narrow.gray(240.5)), (0, 255));
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn a_ball_is_a_disc_of_its_radius_from_any_side() {
     let ball = ball([1.0, 1.0, 1.0], [60, 60, 60], 20.0);
     for side in [Side::Anterior, Side::Inferior, Side::Right, Side::From([1.0, -2.0, 0.7])] {
         for samples in [1, 2] {
-            let focus = Some(Focus { centre_mm: [0.0; 3], size_mm: 50.0 });
+            let focus = Some(Focus { center_mm: [0.0; 3], size_mm: 50.0 });
             let view = View { width: 200, height: 200, annotate: false, focus, samples, ..View::new(side) };
             let image = raymarch(&ball, &view).unwrap();
             let background = image.pixel(0, 0);
@@ -174,13 +174,13 @@ fn a_clip_plane_shows_what_is_inside() {
     let clip = [ClipPlane { point_mm: [0.0; 3], keep: [0.0, -1.0, 0.0] }];
     let cut = raymarch(&ball, &View { clip: &clip, ..view }).unwrap();
     let [r, g, b] = cut.pixel(50, 50).unwrap();
-    assert!(r == g && g == b && r > 60, "the cut face is grey");
+    assert!(r == g && g == b && r > 60, "the cut face is gray");
     let [r, _, b] = raymarch(&ball, &view).unwrap().pixel(50, 50).unwrap();
     assert!(r > b, "the skin is not");
 }
 
 #[test]
-fn deep_tissue_is_coloured_by_hu() {
+fn deep_tissue_is_colored_by_hu() {
     let ball = ball([1.0; 3], [60; 3], 20.0);
     let view = View { width: 50, height: 50, annotate: false, ..View::new(Side::Anterior) };
     let skin = raymarch(&ball, &view).unwrap().pixel(25, 25).unwrap();
@@ -232,7 +232,7 @@ fn contours_follow_the_surface() {
     let [x, y] = centroid(&image, red);
     assert!(
         (x + 3.0).abs() < 0.3 && y.abs() < 0.3,
-        "centre of the square at {x}, {y}: patient right is on the left"
+        "center of the square at {x}, {y}: patient right is on the left"
     );
     let count = (0..3600).filter(|p| red(image.pixel(p % 60, p / 60).unwrap())).count();
     assert!((40..140).contains(&count), "{count} red pixels for a square of 85 mm");
@@ -278,14 +278,14 @@ fn hostile_sizes_and_settings_are_refused_by_name() {
         let view = SliceView { long_side: Some(long_side), ..SliceView::new(Plane::Axial, 0.0) };
         assert!(matches!(slice(&ball, &view).unwrap_err(), RenderError::ImageSize { .. }));
     }
-    let focus = |centre: f64, size_mm: f64| Some(Focus { centre_mm: [centre, 0.0, 0.0], size_mm });
+    let focus = |center: f64, size_mm: f64| Some(Focus { center_mm: [center, 0.0, 0.0], size_mm });
     let bad = [
         ("threshold_hu", View { threshold_hu: f32::NAN, ..good }),
         ("samples", View { samples: 0, ..good }),
         ("occlusion_mm", View { occlusion_mm: -1.0, ..good }),
         ("skin_mm", View { skin_mm: 0.0, ..good }),
         ("focus.size_mm", View { focus: focus(0.0, 0.0), ..good }),
-        ("focus.centre_mm", View { focus: focus(f64::INFINITY, 1.0), ..good }),
+        ("focus.center_mm", View { focus: focus(f64::INFINITY, 1.0), ..good }),
         ("side", View { side: Side::From([0.0; 3]), ..good }),
         ("clip", View { clip: &[ClipPlane { point_mm: [0.0; 3], keep: [0.0; 3] }], ..good }),
     ];

@@ -18,12 +18,12 @@ fn bench(criterion: &mut Criterion) {
     let mesh = common::lattice(&grid, [63; 3], [0.0; 3], [255.0; 3]);
     let wave =
         |p: &Point3<f32>| p + Vector3::new((40.0 * p.y).sin(), (30.0 * p.z).sin(), (50.0 * p.x).sin()) * 2e-3;
-    let centre = mesh.rest[mesh.rest.len() / 2];
+    let center = mesh.rest[mesh.rest.len() / 2];
     let cases = [
         ("all move", mesh.rest.iter().map(wave).collect::<Vec<_>>()),
         (
             "a ball moves",
-            mesh.rest.iter().map(|p| if (p - centre).norm() < 0.05 { wave(p) } else { *p }).collect(),
+            mesh.rest.iter().map(|p| if (p - center).norm() < 0.05 { wave(p) } else { *p }).collect(),
         ),
         ("none moves", mesh.rest.clone()),
     ];

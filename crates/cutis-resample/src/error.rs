@@ -21,7 +21,7 @@ pub enum ResampleError {
         which: &'static str,
         /// Index of the vertex (0 for the origin and the offset).
         vertex: usize,
-        /// Its coordinates, local metres (mm for the origin).
+        /// Its coordinates, local meters (mm for the origin).
         position: [f64; 3],
     },
     /// A tet names a vertex that does not exist.

@@ -13,7 +13,7 @@
 //! 4. `vacate`: the same walk at rest, for tets that moved or were removed, marks what the body may have left.
 //! 5. `gather`: a thread per two voxels gives them their value through their owner.
 //!
-//! What may differ from the CPU's result, which is computed in `f64`: the owner of a centre within a few roundings of `f32` of a
+//! What may differ from the CPU's result, which is computed in `f64`: the owner of a center within a few roundings of `f32` of a
 //! face, and values by the rounding of the place at rest. A tet so flat, or with a corner so far away, that `f32` cannot tell its
 //! volume from zero takes no part.
 
@@ -48,7 +48,7 @@ pub fn resample_gpu(
     warp: &Warp<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<(Volume, ResampleReport), ResampleError> {
-    let mut resampler = ResamplerGpu::new(gpu, volume, warp, &ResamplerOptions::centred(warp))?;
+    let mut resampler = ResamplerGpu::new(gpu, volume, warp, &ResamplerOptions::centerd(warp))?;
     resampler.resample(warp.deformed)?;
     let volume = resampler.volume(progress)?;
     Ok((volume, resampler.report()?))

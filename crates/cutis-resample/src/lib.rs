@@ -1,11 +1,11 @@
 //! Resampling a CT volume through a deformed tetrahedral mesh.
 //!
-//! The inverse warp is evaluated by rasterising the deformed tetrahedra: an output voxel whose centre lies inside a
+//! The inverse warp is evaluated by rasterizing the deformed tetrahedra: an output voxel whose center lies inside a
 //! deformed tet takes, through barycentric coordinates, the input's trilinear value at the matching rest position, rounded
 //! to the nearest stored `int16`. Contract, held by the tests:
 //!
 //! * a tet that did not move copies the input bit for bit;
-//! * of several tets that hold a voxel centre the one with the lowest index owns it;
+//! * of several tets that hold a voxel center the one with the lowest index owns it;
 //! * a voxel that the body left (it is in the rest shape, but in no deformed tet) becomes air;
 //! * a voxel that neither shape covers keeps its input value;
 //! * no value outside the input's range appears;
@@ -21,7 +21,7 @@
 //!
 //! let grid = Grid { shape: [4, 4, 4], affine: Affine::from_spacing([1.0; 3], [0.0; 3])? };
 //! let volume = Volume::new(grid, (0..64).collect(), 1.0, 0.0)?;
-//! // One tet in local metres, moved by one voxel (1 mm) along +i.
+//! // One tet in local meters, moved by one voxel (1 mm) along +i.
 //! let rest = [[0.0, 0.0, 0.0], [0.002, 0.0, 0.0], [0.0, 0.002, 0.0], [0.0, 0.0, 0.002]].map(Point3::from);
 //! let deformed = rest.map(|p| Point3::new(p.x + 0.001, p.y, p.z));
 //! let warp = Warp {

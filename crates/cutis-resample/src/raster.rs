@@ -1,17 +1,17 @@
-//! One tetrahedron as four linear functions over the voxel grid, and the rows of voxel centres that it covers.
+//! One tetrahedron as four linear functions over the voxel grid, and the rows of voxel centers that it covers.
 
 use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 
-/// Share of the tolerance that covers the rounding of `f64`, so that a centre on a shared face is inside both tets.
+/// Share of the tolerance that covers the rounding of `f64`, so that a center on a shared face is inside both tets.
 const ROUNDING: f64 = 1.0 / 1024.0;
 
 /// A deformed tet over the voxel grid. Its barycentric coordinates are linear functions `λ(x) = constant + gradient · x` of the
 /// continuous voxel index.
 ///
-/// A centre counts as inside when no face has it further out than the tolerance, a length in voxels. With the rounding of
-/// `f32` positions as tolerance no centre falls between two tets that share a face.
+/// A center counts as inside when no face has it further out than the tolerance, a length in voxels. With the rounding of
+/// `f32` positions as tolerance no center falls between two tets that share a face.
 pub struct TetRaster {
     constant: [f64; 4],
     gradient: [Vector3<f64>; 4],
@@ -33,7 +33,7 @@ struct Crossings {
     slack: [f64; 4],
 }
 
-/// Columns, as first and end, of a row by how firmly the tet holds their centres; each range lies in the one before.
+/// Columns, as first and end, of a row by how firmly the tet holds their centers; each range lies in the one before.
 #[derive(Clone, Copy)]
 pub struct Row {
     /// Inside, or outside by no more than the tolerance.
@@ -100,9 +100,9 @@ impl TetRaster {
         }
     }
 
-    /// Barycentric coordinates of a centre.
-    pub fn lambda(&self, centre: [f64; 3]) -> [f64; 4] {
-        std::array::from_fn(|c| self.constant[c] + self.gradient[c].dot(&Vector3::from(centre)))
+    /// Barycentric coordinates of a center.
+    pub fn lambda(&self, center: [f64; 3]) -> [f64; 4] {
+        std::array::from_fn(|c| self.constant[c] + self.gradient[c].dot(&Vector3::from(center)))
     }
 
     /// ∇λ of a corner.
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_list_exactly_the_centres_inside() {
+    fn rows_list_exactly_the_centers_inside() {
         let corners = [[0.3, 0.2, 0.1], [7.7, 1.0, 2.0], [2.0, 8.3, 1.0], [3.0, 2.0, 6.6]].map(Point3::from);
         let mut flipped = corners;
         flipped.swap(1, 2);
@@ -223,7 +223,7 @@ mod tests {
             raster.rows(&[0..10, 0..10, 0..10], |_, _, row| {
                 let row = row.firmness();
                 found += row.strict.1 - row.strict.0;
-                assert_eq!((row.near, row.inside), (row.strict, row.strict), "no centre lies near a face");
+                assert_eq!((row.near, row.inside), (row.strict, row.strict), "no center lies near a face");
             });
             let mut expected = 0;
             let all: f64 = volume(corners).abs();

@@ -7,13 +7,13 @@ use serde::Serialize;
 /// Counts over the voxels and tets of one resampling. Voxels are those of the region that was asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ResampleReport {
-    /// Voxels whose centre lies in a deformed tet.
+    /// Voxels whose center lies in a deformed tet.
     pub covered_voxels: usize,
     /// Covered voxels whose tet moved.
     pub moved_voxels: usize,
     /// Voxels of the rest shape that no deformed tet covers any more: they became air.
     pub vacated_voxels: usize,
-    /// Voxels whose centre lies strictly inside two or more deformed body tets.
+    /// Voxels whose center lies strictly inside two or more deformed body tets.
     pub folds: usize,
     /// Tets, of the whole mesh, whose volume changed its sign or vanished.
     pub inverted_tets: usize,

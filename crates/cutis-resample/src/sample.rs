@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// grid are clamped to it, so the value always lies between the smallest and the largest of the voxels read.
 ///
 /// Of the voxels read, those outside `scanned` are padding: where they meet voxels inside it, they count as its nearest
-/// end (air), so that padding never bleeds into tissue. Among themselves, and at a voxel's centre, they keep their value.
+/// end (air), so that padding never bleeds into tissue. Among themselves, and at a voxel's center, they keep their value.
 #[inline]
 pub fn trilinear(voxels: &[i16], shape: [usize; 3], scanned: [i16; 2], position: [f64; 3]) -> i16 {
     let (mut base, mut stride) = (0, 1);

@@ -81,7 +81,7 @@ impl<'a> Slab<'a> {
                 let inside = (row.inside.0..row.inside.1).contains(&i);
                 let claim = if inside { INSIDE } else { NEAR };
                 let state = &mut self.state[at(i)];
-                // The first tet wins, and a tet that holds the centre wins over one that only comes near it.
+                // The first tet wins, and a tet that holds the center wins over one that only comes near it.
                 if *state & (INSIDE | claim) != 0 {
                     continue;
                 }
@@ -90,8 +90,8 @@ impl<'a> Slab<'a> {
                     None => voxels[i + shape[0] * (j + shape[1] * k)],
                     Some(map) => {
                         *state |= MOVED;
-                        let centre = [i as f64, j as f64, k as f64];
-                        let rest = if inside { map.at(centre) } else { map.nearest(raster.lambda(centre)) };
+                        let center = [i as f64, j as f64, k as f64];
+                        let rest = if inside { map.at(center) } else { map.nearest(raster.lambda(center)) };
                         trilinear(voxels, shape, scanned, rest)
                     }
                 };
@@ -153,7 +153,7 @@ impl RestMap {
         (self.linear * Vector3::from(index) + self.offset).into()
     }
 
-    /// For a centre just outside: the coordinates are held in the tet, however thin it is.
+    /// For a center just outside: the coordinates are held in the tet, however thin it is.
     fn nearest(&self, lambda: [f64; 4]) -> [f64; 3] {
         let held = lambda.map(|l| l.max(0.0));
         let sum: f64 = held.iter().sum();

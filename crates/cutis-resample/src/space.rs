@@ -1,12 +1,12 @@
-//! Local metres of the mesh → continuous voxel index of the volume.
+//! Local meters of the mesh → continuous voxel index of the volume.
 
 use cutis_volume::Affine;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-/// The affine map from local metres to voxel index, with the rounding error that `f32` positions have there.
+/// The affine map from local meters to voxel index, with the rounding error that `f32` positions have there.
 pub struct IndexSpace {
-    /// Voxels per metre.
+    /// Voxels per meter.
     pub linear: Matrix3<f64>,
     /// Index of the local origin.
     pub offset: Vector3<f64>,
@@ -37,7 +37,7 @@ impl IndexSpace {
         }
     }
 
-    /// Continuous index of a position in local metres.
+    /// Continuous index of a position in local meters.
     #[inline]
     pub fn index(&self, local: Point3<f32>) -> Point3<f64> {
         Point3::from(self.linear * local.coords.map(f64::from) + self.offset)

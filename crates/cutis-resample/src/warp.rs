@@ -17,14 +17,14 @@ use crate::space::IndexSpace;
 /// Slices per slab. The result does not depend on it; thinner slabs meet more tets twice.
 const SLAB: usize = 16;
 
-/// A deformed tetrahedral mesh. Positions are local metres: `world_mm = origin_mm + 1000 · local`.
+/// A deformed tetrahedral mesh. Positions are local meters: `world_mm = origin_mm + 1000 · local`.
 #[derive(Clone, Copy, Debug)]
 pub struct Warp<'a> {
     /// World position of the mesh's local origin, mm, RAS+.
     pub origin_mm: Point3<f64>,
-    /// Rest positions, local metres, one per vertex.
+    /// Rest positions, local meters, one per vertex.
     pub rest: &'a [Point3<f32>],
-    /// Deformed positions, local metres, one per vertex.
+    /// Deformed positions, local meters, one per vertex.
     pub deformed: &'a [Point3<f32>],
     /// Corners of the tets: those of the body first, then those of a shell that carries the air around it.
     pub tets: &'a [[u32; 4]],

@@ -279,7 +279,7 @@ proptest! {
     }
 
     #[test]
-    fn no_centre_falls_between_tets(seed in any::<u64>(), cells in 1_usize..6) {
+    fn no_center_falls_between_tets(seed in any::<u64>(), cells in 1_usize..6) {
         let grid = Grid { shape: [15, 14, 13], affine: oblique() };
         let volume = noise(grid, seed);
         // The outer vertices stay on the box, the inner ones move by up to a fifth of a cell: no tet inverts.

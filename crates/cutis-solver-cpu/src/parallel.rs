@@ -1,7 +1,7 @@
 //! How passes are spread over threads.
 
 use cutis_constraints::Scalar;
-use cutis_solver::{Coloured, ColouredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
+use cutis_solver::{Colored, ColoredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
 use rayon::prelude::*;
 
 /// Vertices that a thread takes at a time.
@@ -25,11 +25,11 @@ impl<T: Scalar> Execute<T> for Parallel {
         step: Step<T>,
         multipliers: &mut [T],
     ) {
-        let color = Coloured::new(vertices, set, sweep.color, step, multipliers);
+        let color = Colored::new(vertices, set, sweep.color, step, multipliers);
         fan_out(self.threads.min(color.chunks()), &|| while color.project_next_chunk() {});
     }
 
-    fn turn(&self, color: ColouredVertices<'_, T>) {
+    fn turn(&self, color: ColoredVertices<'_, T>) {
         fan_out(self.threads.min(color.chunks()), &|| while color.move_next_chunk() {});
     }
 

@@ -101,7 +101,7 @@ fn a_scene_pays_only_for_what_it_names() {
     let descending = SolverReference::new(body(true), descent).unwrap();
     assert_eq!(descending.bytes().last().map(|part| part.name), Some("incidences"));
 
-    // Four numbers, three and three of a vertex; indices, length and colour offsets of a spring.
+    // Four numbers, three and three of a vertex; indices, length and color offsets of a spring.
     let lattice = Kuhn::new([30, 20, 20], 0.1);
     let solver = SolverReference::new(body(false), settings(1)).unwrap();
     let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();

@@ -14,7 +14,7 @@ use cutis_solver_cpu::{CpuError, SolverCpu};
 use lattice::Kuhn;
 use nalgebra::Point3;
 
-/// A block large enough for several chunks of every colour and several blocks of vertices: all kinds, one face fixed,
+/// A block large enough for several chunks of every color and several blocks of vertices: all kinds, one face fixed,
 /// an edge carried by a handle.
 fn body<T: Scalar>(formulation: Formulation) -> System<T> {
     let lattice = Kuhn::new([40, 24, 20], 0.1);

@@ -1,7 +1,7 @@
 //! Vertex block descent on the device: slabs of the body, and the chunks of vertices that move at once.
 //!
-//! A constraint is read by each of its vertices, and these are of different colours. So constraints are not stored by
-//! colour but by **slab**: a range of vertices whose constraints fit one binding each. All colours of a slab share its tables. A body
+//! A constraint is read by each of its vertices, and these are of different colors. So constraints are not stored by
+//! color but by **slab**: a range of vertices whose constraints fit one binding each. All colors of a slab share its tables. A body
 //! that fits the device's bindings is one slab, and each of its constraints is stored once.
 
 use std::ops::Range;
@@ -24,11 +24,11 @@ pub(crate) struct DescentOnDevice {
     /// One per kind.
     pulls: Vec<(Kernel, BindGroup)>,
     moved: BindGroup,
-    /// Chunks of each colour.
+    /// Chunks of each color.
     colors: Vec<Vec<Chunk>>,
 }
 
-/// Vertices of one colour and one slab.
+/// Vertices of one color and one slab.
 struct Chunk {
     vertices: BindGroup,
     len: usize,
@@ -98,7 +98,7 @@ impl DescentOnDevice {
         for (color, group) in descent.groups().iter().enumerate() {
             let chosen: Vec<u32> = group.iter().copied().filter(|v| slab.contains(v)).collect();
             for chosen in chosen.chunks(most) {
-                let order = gpu.buffer("vertices of a colour", chosen)?;
+                let order = gpu.buffer("vertices of a color", chosen)?;
                 let vertices = gpu.bind(&self.descend, 1, &[(0, order.whole())])?;
                 let mut chunk = Chunk { vertices, len: chosen.len(), kinds: Vec::new() };
                 for (n, (set, incidence)) in kinds.iter().zip(descent.incidences()).enumerate() {
@@ -113,7 +113,7 @@ impl DescentOnDevice {
         Ok(())
     }
 
-    /// Moves the vertices of a colour.
+    /// Moves the vertices of a color.
     pub(crate) fn turn(&self, pass: &mut Pass<'_>, turn: &Turn) {
         for chunk in &self.colors[turn.color] {
             for (n, group, len) in &chunk.kinds {

@@ -1,4 +1,4 @@
-//! One kind of constraint on the device: chunks of its colours, and the kernels that project them.
+//! One kind of constraint on the device: chunks of its colors, and the kernels that project them.
 
 use std::ops::Range;
 
@@ -8,9 +8,9 @@ use cutis_solver::{ConstraintSet, Formulation, Settings, Sweep, Values};
 
 use crate::body::Body;
 
-/// A part of a colour, small enough for one binding and one dispatch, with buffers of its own.
+/// A part of a color, small enough for one binding and one dispatch, with buffers of its own.
 pub(crate) struct Chunk {
-    /// Constraints, in the order of the colours.
+    /// Constraints, in the order of the colors.
     pub(crate) range: Range<usize>,
     pub(crate) tuples: Buffer<u32>,
     pub(crate) params: Buffer<f32>,
@@ -28,7 +28,7 @@ struct Variant {
 
 /// A kind of constraint on the device.
 pub(crate) struct Kind {
-    /// Chunks of each colour.
+    /// Chunks of each color.
     pub(crate) colors: Vec<Vec<Chunk>>,
     /// For the first iteration, and for later ones where they differ.
     variants: Vec<Variant>,
@@ -81,7 +81,7 @@ impl Kind {
         Ok(Self { colors, variants })
     }
 
-    /// Projects a colour.
+    /// Projects a color.
     pub(crate) fn project(&self, pass: &mut Pass<'_>, sweep: &Sweep, iteration: u32) {
         let variant = if iteration == 0 { 0 } else { self.variants.len() - 1 };
         let Variant { kernel, shared } = &self.variants[variant];

@@ -8,8 +8,8 @@
 //!   is still finite; everything else is read when somebody asks for it, and no more than that:
 //!   [`positions_of`](cutis_solver::Solver::positions_of) reads the vertices it names,
 //!   [`residuals`](cutis_solver::Solver::residuals) two numbers per 64 constraints.
-//! - **Chunks.** The constraints of a colour are stored in parts that fit WebGPU's baseline limits on bindings, buffers and
-//!   workgroups. Parts of a colour share no vertex, so that the result does not depend on how it is split.
+//! - **Chunks.** The constraints of a color are stored in parts that fit WebGPU's baseline limits on bindings, buffers and
+//!   workgroups. Parts of a color share no vertex, so that the result does not depend on how it is split.
 //! - **Pipelines are built for what a body has**: a kind that was not added, handles, multipliers and measures that nobody asks
 //!   for have none.
 //!

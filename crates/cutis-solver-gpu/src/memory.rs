@@ -28,7 +28,7 @@ pub fn device_bytes(system: &System<f32>, settings: &Settings) -> Vec<MemoryPart
         parts.push(MemoryPart { name: "multipliers", bytes: count * size_of::<f32>() });
     }
     if descends {
-        // The vertices of all colours, and the pulls of the largest one.
+        // The vertices of all colors, and the pulls of the largest one.
         let bytes = Descent::new(system, settings).map_or(0, |descent| {
             let largest = descent.groups().iter().map(<[u32]>::len).max().unwrap_or(0);
             size_of_val(descent.groups().order.as_slice()) + largest * size_of::<PullRow>()

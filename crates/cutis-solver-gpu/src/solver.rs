@@ -45,7 +45,7 @@ pub struct SolverGpu {
 
 /// The constraints, stored as the formulation takes them.
 enum Constraints {
-    /// Colour by colour of each kind.
+    /// Color by color of each kind.
     Projected(Vec<Kind>),
     /// By the vertices that they act on.
     Pulling(DescentOnDevice),
@@ -132,7 +132,7 @@ impl SolverGpu {
         let body = Body::new(gpu, &simulation)?;
         let constraints = Constraints::new(gpu, &body, &simulation)?;
         let handles = Handles::new(gpu, &body, simulation.system(), &settings)?;
-        // Prediction, handles and the look at finiteness; then the colours.
+        // Prediction, handles and the look at finiteness; then the colors.
         let passes = 3;
         let iterations = settings.iterations as usize;
         let iteration = constraints.load(&simulation);
@@ -284,7 +284,7 @@ impl SolverGpu {
         Ok([vertices, self.gpu.read(&self.body.velocities, all)?])
     }
 
-    /// Residuals by reduction; none where constraints are not stored by colour.
+    /// Residuals by reduction; none where constraints are not stored by color.
     fn reduce(&mut self) -> Result<Option<Vec<Residual>>, GpuError> {
         self.bring_device_up_to_date()?;
         let Constraints::Projected(kinds) = &self.constraints else { return Ok(None) };

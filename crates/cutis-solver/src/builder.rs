@@ -18,7 +18,7 @@ pub struct SystemBuilder<T: Scalar> {
 }
 
 impl<T: Scalar> SystemBuilder<T> {
-    /// Starts with positions in metres and inverse masses in 1/kg (0 = fixed), one of each per vertex. Their number
+    /// Starts with positions in meters and inverse masses in 1/kg (0 = fixed), one of each per vertex. Their number
     /// type may differ from the solver's.
     ///
     /// A body that lies farther from zero than its own extent (along an axis) is moved there, so that single
@@ -158,7 +158,7 @@ impl<T: Scalar> SystemBuilder<T> {
     }
 
     /// Groups of the vertices for [`Formulation::Vbd`](crate::Formulation::Vbd), where the caller knows better ones than
-    /// greedy colouring finds, for example those of a lattice in closed form. Vertices that do not move may be among them. They are
+    /// greedy coloring finds, for example those of a lattice in closed form. Vertices that do not move may be among them. They are
     /// checked when a solver is made; other formulations do not look at them.
     pub fn vertex_groups(mut self, groups: Groups) -> Self {
         self.system.vertex_groups = Some(Arc::new(groups));
@@ -183,13 +183,13 @@ impl<T: Scalar> SystemBuilder<T> {
     }
 }
 
-/// Centre of the bounding box along the axes where it is farther from zero than the box is long, zero along the
+/// Center of the bounding box along the axes where it is farther from zero than the box is long, zero along the
 /// others. Then subtracting it is exact in the number type of the positions (Sterbenz), and so is adding it again.
 fn origin_of<S: Scalar>(positions: &[Point3<S>]) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| {
         let values = positions.iter().map(|position| position[axis].to_f64());
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        let centre = S::constant(0.5 * low + 0.5 * high).to_f64();
-        if centre.abs() > high - low && centre.is_finite() { centre } else { 0.0 }
+        let center = S::constant(0.5 * low + 0.5 * high).to_f64();
+        if center.abs() > high - low && center.is_finite() { center } else { 0.0 }
     })
 }

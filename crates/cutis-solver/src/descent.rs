@@ -1,7 +1,7 @@
 //! Vertex block descent: what acts on a vertex, and the step that it takes.
 //!
 //! An implicit step of length `h` ends where `Σ m/(2h²)|x − x̃|² + Σ C²/(2α)` is least, with `x̃ = x_n + h·v + h²·g`. The
-//! vertices go there one after the other (a colour of them at a time): each to where the sum, as a function of this vertex
+//! vertices go there one after the other (a color of them at a time): each to where the sum, as a function of this vertex
 //! alone, is least in a quadratic model. Source: Chen, Liu, Yang, Yuksel, *Vertex Block Descent*, ACM Trans. Graph. 43 (2024),
 //! eq. 5–9. Different here:
 //!
@@ -12,7 +12,7 @@
 //!   skin, `U'' ∝ 1 + 2βC/A0` along `∇A`, it has at least three quarters: a step lowers the energy for `ω ≤ 1.5`.
 //! - **The start is `x_n + h·v`, without gravity.** A body in static equilibrium then has no force left on any vertex at the
 //!   start, and stays: what comes to rest is in equilibrium for any number of iterations and substeps.
-//! - **There and back**: an iteration is two passes over the colours. In the first half of a substep's passes they take their turns
+//! - **There and back**: an iteration is two passes over the colors. In the first half of a substep's passes they take their turns
 //!   in order, in the second half in the opposite order. Where forces are linear, with `A = M/h² + K`, what the first half leaves of an
 //!   error is some `W`, and both leave `S = W*W`, with `W*` the adjoint of `W` in the product of `A`; so `(I − S)(I − A⁻¹M/h²)` has its eigenvalues between 0 and 1, and those of
 //!   `x_{n+1} = Q(2x_n − x_{n−1})`, with `Q` what is left to 1, satisfy `|λ|² = q ≤ 1`: no motion grows, for any stiffness, step, `ω` and
@@ -149,7 +149,7 @@ impl<T: Scalar> Descent<T> {
         Ok(Self { groups, incidences, step: DescentStep::new(settings) })
     }
 
-    /// The vertices that move, colour after colour: no two of a colour are in one constraint.
+    /// The vertices that move, color after color: no two of a color are in one constraint.
     pub fn groups(&self) -> &Groups {
         &self.groups
     }

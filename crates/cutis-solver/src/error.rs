@@ -136,7 +136,7 @@ pub enum SolverError {
     Groups {
         /// Which kind.
         kind: &'static str,
-        /// What the colouring found.
+        /// What the coloring found.
         reason: String,
     },
     /// A kind was given the stiffness of another formulation than the settings ask for.

@@ -15,7 +15,7 @@ use crate::{SolverError, Vertex};
 pub struct Handle {
     /// The vertices it moves.
     pub vertices: Vec<u32>,
-    /// The whole path in metres.
+    /// The whole path in meters.
     pub move_m: [f64; 3],
     /// Time that the path takes, in seconds.
     pub over_s: f64,
@@ -73,7 +73,7 @@ impl<T: Scalar> Carried<T> {
         &self.rest
     }
 
-    /// How far they have come at `time_s`, in metres.
+    /// How far they have come at `time_s`, in meters.
     pub fn path(&self, time_s: f64) -> Vector3<T> {
         let share = if time_s < self.over_s { time_s / self.over_s } else { 1.0 };
         Vector3::from(self.move_m.map(|d| T::constant(d * share)))

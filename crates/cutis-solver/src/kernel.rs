@@ -58,7 +58,7 @@ fn least_square<T: Real, const N: usize>(w: &[T; N], c: T, inverse_reach_squared
 /// What one projection does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection<T, const N: usize> {
-    /// Correction of each position in metres.
+    /// Correction of each position in meters.
     pub corrections: [Vector3<T>; N],
     /// Change of the multiplier.
     pub multiplier: T,

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use cutis_constraints::Scalar;
 
-use crate::{ColouredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
+use crate::{ColoredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
 
 /// Time of one part of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,7 +98,7 @@ impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
         self.ledger.borrow_mut().time(set.name(), work);
     }
 
-    fn turn(&self, color: ColouredVertices<'_, T>) {
+    fn turn(&self, color: ColoredVertices<'_, T>) {
         self.ledger.borrow_mut().time(Ledger::DESCENT, || self.inner.turn(color));
     }
 

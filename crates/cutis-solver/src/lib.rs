@@ -1,6 +1,6 @@
 //! Position-based dynamics: the system, the schedule and the scalar reference solver.
 //!
-//! A [`System`] holds vertices and one batch of constraints per kind, grouped by colour. A [`Schedule`] says what a
+//! A [`System`] holds vertices and one batch of constraints per kind, grouped by color. A [`Schedule`] says what a
 //! frame executes, in which order. A [`Solver`] executes it: [`SolverReference`] here, one constraint after the other
 //! in safe scalar code (in `f64` the yardstick of every other backend), the multi-threaded one in `cutis-solver-cpu`.
 //! Both run the same [`Simulation`] and the same [`project`] function, so that their results are equal bit for bit.
@@ -36,13 +36,13 @@
 //! ```
 //!
 //! # Unsafe code
-//! One file, `coloured.rs`: the type [`Coloured`], which lets several threads move the vertices of one colour.
+//! One file, `colored.rs`: the type [`Colored`], which lets several threads move the vertices of one color.
 //! Everything else of this crate and of the backends is safe code.
 
 mod batch;
 mod builder;
 mod clock;
-mod coloured;
+mod colored;
 mod descent;
 mod error;
 mod handle;
@@ -62,7 +62,7 @@ mod vertex;
 
 pub use builder::SystemBuilder;
 pub use clock::Clock;
-pub use coloured::{Coloured, ColouredVertices};
+pub use colored::{Colored, ColoredVertices};
 pub use descent::{Descent, DescentStep, Pull};
 pub use error::SolverError;
 pub use handle::{Carried, Handle};

@@ -50,10 +50,10 @@ impl Energy {
 pub struct Momentum {
     /// `Σ m v` in kg·m/s.
     pub linear: Vector3<f64>,
-    /// `Σ m (x − centre)×v` in kg·m²/s.
+    /// `Σ m (x − center)×v` in kg·m²/s.
     pub angular: Vector3<f64>,
-    /// Centre of mass in metres.
-    pub centre: Point3<f64>,
+    /// Center of mass in meters.
+    pub center: Point3<f64>,
 }
 
 /// One line of the memory ledger.

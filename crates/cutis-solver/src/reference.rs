@@ -4,7 +4,7 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    ColouredVertices, ConstraintSet, Execute, Ledger, Settings, Simulation, Solver, SolverError, Step, Sweep,
+    ColoredVertices, ConstraintSet, Execute, Ledger, Settings, Simulation, Solver, SolverError, Step, Sweep,
     System, Timed, Vertex, VertexBlock,
 };
 
@@ -30,7 +30,7 @@ impl<T: Scalar> Execute<T> for Serial {
         set.project(range, vertices, step, multipliers);
     }
 
-    fn turn(&self, color: ColouredVertices<'_, T>) {
+    fn turn(&self, color: ColoredVertices<'_, T>) {
         color.move_one_by_one();
     }
 

@@ -5,12 +5,12 @@ use cutis_constraints::Scalar;
 
 use crate::{Kind, Settings};
 
-/// One colour of one kind: constraints `start..end` of that kind may be projected in any order, or at once.
+/// One color of one kind: constraints `start..end` of that kind may be projected in any order, or at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sweep {
     /// Kind, counted in the order the kinds were added.
     pub kind: usize,
-    /// Colour of that kind.
+    /// Color of that kind.
     pub color: usize,
     /// First constraint.
     pub start: usize,
@@ -18,10 +18,10 @@ pub struct Sweep {
     pub end: usize,
 }
 
-/// One colour of the vertices that move: they may be moved in any order, or at once.
+/// One color of the vertices that move: they may be moved in any order, or at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Turn {
-    /// Colour.
+    /// Color.
     pub color: usize,
     /// First vertex, in the order of the groups.
     pub start: usize,
@@ -37,9 +37,9 @@ pub struct Schedule {
     pub substeps: u32,
     /// Iterations of a substep.
     pub iterations: u32,
-    /// What one iteration projects, in order. Empty colours are left out. None in vertex block descent.
+    /// What one iteration projects, in order. Empty colors are left out. None in vertex block descent.
     pub sweeps: Vec<Sweep>,
-    /// All colours of the vertices that move, in order, in vertex block descent; none elsewhere. See [`turns_of`](Self::turns_of).
+    /// All colors of the vertices that move, in order, in vertex block descent; none elsewhere. See [`turns_of`](Self::turns_of).
     pub turns: Vec<Turn>,
 }
 
@@ -68,8 +68,8 @@ impl Schedule {
         Self { substeps, iterations, sweeps: Vec::new(), turns: there.collect() }
     }
 
-    /// The turns of an iteration of vertex block descent, counted from 0, in order: all colours twice. Of all passes over the
-    /// colours in a substep the first half goes there and the second half back, so that a substep is symmetric: see the top
+    /// The turns of an iteration of vertex block descent, counted from 0, in order: all colors twice. Of all passes over the
+    /// colors in a substep the first half goes there and the second half back, so that a substep is symmetric: see the top
     /// of `descent.rs`.
     pub fn turns_of(&self, iteration: u32) -> impl Iterator<Item = &Turn> {
         let pass = |number: u64| {

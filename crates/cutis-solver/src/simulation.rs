@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use crate::descent::suits;
 use crate::passes::Integrator;
 use crate::{
-    Clock, ColouredVertices, ConstraintSet, Descent, Formulation, Ledger, Motion, Schedule, Settings,
+    Clock, ColoredVertices, ConstraintSet, Descent, Formulation, Ledger, Motion, Schedule, Settings,
     SolverError, Step, Sweep, System, Vertex, VertexBlock,
 };
 
@@ -25,8 +25,8 @@ pub trait Execute<T: Scalar> {
         multipliers: &mut [T],
     );
 
-    /// Moves the vertices of one colour.
-    fn turn(&self, color: ColouredVertices<'_, T>);
+    /// Moves the vertices of one color.
+    fn turn(&self, color: ColoredVertices<'_, T>);
 
     /// Runs what one thread does between the passes; `part` is its name in a [`Ledger`](crate::Ledger).
     fn alone(&self, _part: &'static str, work: &mut dyn FnMut()) {
@@ -248,7 +248,7 @@ impl<T: Scalar> Simulation<T> {
                 }
                 Method::Descend(descent) => {
                     for &turn in self.schedule.turns_of(iteration) {
-                        execute.turn(ColouredVertices::new(&mut self.system, descent, turn));
+                        execute.turn(ColoredVertices::new(&mut self.system, descent, turn));
                     }
                 }
             }

@@ -19,7 +19,7 @@ pub struct System<T: Scalar> {
     pub(crate) velocities: Vec<Vector3<T>>,
     pub(crate) kinds: Vec<Kind<T>>,
     pub(crate) handles: Vec<Carried<T>>,
-    /// Groups of the vertices, if the caller knows better ones than greedy colouring finds.
+    /// Groups of the vertices, if the caller knows better ones than greedy coloring finds.
     pub(crate) vertex_groups: Option<Arc<Groups>>,
 }
 
@@ -81,7 +81,7 @@ impl<T: Scalar> System<T> {
         &self.handles
     }
 
-    /// The vertices to be moved and the kinds that say where, for use with [`Coloured`](crate::Coloured).
+    /// The vertices to be moved and the kinds that say where, for use with [`Colored`](crate::Colored).
     pub fn projection_parts(&mut self) -> (&mut [Vertex<T>], &[Kind<T>]) {
         (&mut self.vertices, &self.kinds)
     }
@@ -193,22 +193,22 @@ impl<T: Scalar> System<T> {
         Energy { kinetic_j, elastic_j, gravity_j }
     }
 
-    /// Linear momentum, angular momentum about the centre of mass, and the centre of mass.
+    /// Linear momentum, angular momentum about the center of mass, and the center of mass.
     pub fn momentum(&self) -> Momentum {
-        let (mut total, mut centre, mut linear) = (0.0, Vector3::zeros(), Vector3::zeros());
+        let (mut total, mut center, mut linear) = (0.0, Vector3::zeros(), Vector3::zeros());
         for (mass, x, velocity) in self.masses() {
             total += mass;
-            centre += x * mass;
+            center += x * mass;
             linear += velocity * mass;
         }
         if total > 0.0 {
-            centre /= total;
+            center /= total;
         }
-        let angular = self.masses().map(|(mass, x, v)| (x - centre).cross(&v) * mass).sum();
-        Momentum { linear, angular, centre: Point3::from(centre) }
+        let angular = self.masses().map(|(mass, x, v)| (x - center).cross(&v) * mass).sum();
+        Momentum { linear, angular, center: Point3::from(center) }
     }
 
-    /// The largest distance in metres between a vertex and its place in `reference` (caller's coordinates).
+    /// The largest distance in meters between a vertex and its place in `reference` (caller's coordinates).
     ///
     /// # Errors
     /// [`SolverError::VertexLength`] unless `reference` has one position per vertex.

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use cutis_constraints::Scalar;
 use nalgebra::Point3;
 
-/// Position in metres and inverse mass in 1/kg (0 = fixed), four scalars in a row (16 bytes in `f32`).
+/// Position in meters and inverse mass in 1/kg (0 = fixed), four scalars in a row (16 bytes in `f32`).
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct Vertex<T>([T; 4]);
@@ -16,7 +16,7 @@ impl<T: Scalar> Vertex<T> {
         Self([position.x, position.y, position.z, inverse_mass])
     }
 
-    /// Position in metres, relative to [`System::origin`](crate::System::origin).
+    /// Position in meters, relative to [`System::origin`](crate::System::origin).
     #[inline(always)]
     pub fn position(&self) -> Point3<T> {
         Point3::new(self.0[0], self.0[1], self.0[2])

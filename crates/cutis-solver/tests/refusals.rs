@@ -178,8 +178,8 @@ fn measures_agree_with_closed_forms() {
     assert!((energy.elastic_j.unwrap() - (0.25 + 1.0) / 0.2).abs() < 1e-12);
     let momentum = system.momentum();
     assert_eq!(momentum.linear, Vector3::new(0.0, 4.0 - 8.0, 0.0));
-    assert_eq!(momentum.centre.x, (2.0 + 8.0) / 6.0);
-    // About the centre of mass, 5/3: −2/3·4 for one, −1/3·8 for the other.
+    assert_eq!(momentum.center.x, (2.0 + 8.0) / 6.0);
+    // About the center of mass, 5/3: −2/3·4 for one, −1/3·8 for the other.
     assert!((momentum.angular.z + 16.0 / 3.0).abs() < 1e-12, "{momentum:?}");
     let residual = system.residuals()[0];
     assert_eq!((residual.name, residual.max), ("distance", 1.0));

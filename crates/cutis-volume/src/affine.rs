@@ -1,10 +1,10 @@
-//! Voxel index → world millimetres, in the RAS+ frame.
+//! Voxel index → world millimeters, in the RAS+ frame.
 
 use nalgebra::{Matrix4, Point3, Vector3};
 
 use crate::VolumeError;
 
-/// Invertible affine map from continuous voxel index `(i, j, k)` to RAS+ world millimetres.
+/// Invertible affine map from continuous voxel index `(i, j, k)` to RAS+ world millimeters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
     to_mm: Matrix4<f64>,
@@ -25,7 +25,7 @@ impl Affine {
         }
     }
 
-    /// Axis-aligned: `spacing_mm` along +R, +A, +S and the centre of voxel (0, 0, 0) at `origin_mm`.
+    /// Axis-aligned: `spacing_mm` along +R, +A, +S and the center of voxel (0, 0, 0) at `origin_mm`.
     ///
     /// # Errors
     /// As [`Affine::from_rows`], for a spacing of zero or a value that is not finite.

@@ -16,8 +16,8 @@ pub enum VolumeError {
         /// Length of the data.
         found: usize,
     },
-    /// A matrix that maps indices to millimetres must be finite and invertible.
-    #[error("affine {rows:?} is not invertible: it must map voxel indices to distinct millimetre positions")]
+    /// A matrix that maps indices to millimeters must be finite and invertible.
+    #[error("affine {rows:?} is not invertible: it must map voxel indices to distinct millimeter positions")]
     SingularAffine {
         /// The four rows.
         rows: Box<[[f64; 4]; 4]>,
@@ -68,7 +68,7 @@ pub enum VolumeError {
         /// What would be right.
         expected: &'static str,
     },
-    /// Colour, complex or other voxels that are not one real number.
+    /// Color, complex or other voxels that are not one real number.
     #[error(
         "{path}: voxel type {dtype} (code {code}) is not a CT: expected one integer or real number per voxel"
     )]

@@ -1,10 +1,10 @@
-//! A regular grid of points in world space: the voxel centres of a volume, or the vertices of a lattice.
+//! A regular grid of points in world space: the voxel centers of a volume, or the vertices of a lattice.
 
 use nalgebra::Point3;
 
 use crate::Affine;
 
-/// `shape[0] × shape[1] × shape[2]` points, index `i` fastest, placed in world millimetres by an [`Affine`].
+/// `shape[0] × shape[1] × shape[2]` points, index `i` fastest, placed in world millimeters by an [`Affine`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// Points per axis.

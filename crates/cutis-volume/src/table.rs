@@ -39,7 +39,7 @@ pub enum TableKind {
     /// with the points at which GATE and other Monte Carlo codes tabulate it.
     Density,
     /// Stiffness as a factor without unit, to be multiplied with the material's modulus. Presets `uniform` (1 everywhere) and
-    /// `paper`: HU normalised between −449 and 6, the two ends of the paper's transfer function (STC paper, §4.2, normalises by
+    /// `paper`: HU normalized between −449 and 6, the two ends of the paper's transfer function (STC paper, §4.2, normalizes by
     /// density without printing the range).
     Stiffness,
 }
@@ -227,7 +227,7 @@ mod tests {
         for points in [&[][..], &[(0.0, f32::NAN)], &[(f32::INFINITY, 0.0)], &[(1.0, 0.0), (1.0, 2.0)]] {
             assert!(matches!(Table::new("1", points), Err(VolumeError::Table { .. })), "{points:?}");
         }
-        for text in ["", "unit = '1'", "unit = '1'\npoints = []", "unit = '1'\npoints = [[0, 1]]\ncolour = 3"]
+        for text in ["", "unit = '1'", "unit = '1'\npoints = []", "unit = '1'\npoints = [[0, 1]]\ncolor = 3"]
         {
             assert!(matches!(Table::from_toml(text), Err(VolumeError::TableText { .. })), "{text:?}");
         }

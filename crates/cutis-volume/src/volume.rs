@@ -34,7 +34,7 @@ impl Volume {
         Ok(Self { grid, voxels, slope, intercept })
     }
 
-    /// Where the voxel centres lie.
+    /// Where the voxel centers lie.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
@@ -68,7 +68,7 @@ impl Volume {
 
     /// HU at a continuous index, interpolated linearly along each axis.
     ///
-    /// On a voxel centre it is that voxel's value, exactly. Indices outside are moved to the nearest voxel; the value at an index
+    /// On a voxel center it is that voxel's value, exactly. Indices outside are moved to the nearest voxel; the value at an index
     /// that is not finite is air. Where padding (below −1024 HU) meets anything else, it counts as −1024.
     pub fn trilinear(&self, index: Point3<f64>) -> f32 {
         if !index.iter().all(|x| x.is_finite()) {

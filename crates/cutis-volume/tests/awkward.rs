@@ -1,6 +1,6 @@
 //! Odd NIfTI files against what nibabel 5.4.2 says about them.
 //!
-//! Figures are nibabel's, but for `no_form`, where nibabel mirrors and centres the volume, ITK takes the axes for LPS, and we
+//! Figures are nibabel's, but for `no_form`, where nibabel mirrors and centers the volume, ITK takes the axes for LPS, and we
 //! follow the standard's method 1 (voxel sizes alone). SimpleITK 2.5.7 agrees wherever it reads the file, but for `i16_slope0` (it adds
 //! the intercept), `q_s_conflict` (it prefers the qform) and `no_form`.
 
@@ -131,8 +131,8 @@ const ACCEPTED: &[Expected] = &[
     Expected { shape: [40, 33, 1], sum: -497809.0, ..same("single_slice.nii.gz", "int16") },
     same("u16_inter-1024.nii.gz", "uint16"),
     Expected { range: (-1008.0, 2832.0), sum: -18503712.0, ..same("u8_slope16_inter-1024.nii.gz", "uint8") },
-    // nibabel's rows are in metres here.
-    same("units_metre.nii.gz", "int16"),
+    // nibabel's rows are in meters here.
+    same("units_meter.nii.gz", "int16"),
     same("with_extension.nii.gz", "int16"),
 ];
 

@@ -223,7 +223,7 @@ fn the_incision_site_lies_on_the_belly() -> Result<(), VolumeError> {
     Ok(())
 }
 
-/// Volume of what is inside, from the grey values, mm³.
+/// Volume of what is inside, from the gray values, mm³.
 fn tissue_mm3(volume: &Volume, hu_inside: f64) -> f64 {
     let share = |&hu: &i16| (f64::from(hu) + 1024.0) / (hu_inside + 1024.0);
     volume.voxels().iter().map(share).sum::<f64>() * volume.grid().affine.voxel_volume_mm3()

@@ -135,7 +135,7 @@ fn along_axis(mesh: &TetMesh, edge: &[u32; 2]) -> Option<[u32; 2]> {
     (apart == 1).then(|| [a.min(b), a.max(b)])
 }
 
-/// The axis of two neighbours whose numbers are so far apart, as a bit. A lattice has two points along each axis at least.
+/// The axis of two neighbors whose numbers are so far apart, as a bit. A lattice has two points along each axis at least.
 fn axis_bit(apart: u32, [nx, ny, _]: [usize; 3]) -> u8 {
     match apart as usize {
         1 => 1,

@@ -21,7 +21,7 @@ const SEAL: usize = 32;
 pub struct Checkpoint {
     /// Frames done.
     pub frame: u32,
-    /// Local metres.
+    /// Local meters.
     pub positions: Vec<Point3<f32>>,
     /// What the state consists of beside or instead of the positions; three for each vertex at the least.
     pub words: Vec<u32>,

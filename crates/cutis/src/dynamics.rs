@@ -1,4 +1,4 @@
-//! From the cut body to a system that a solver can step: constraints, compliances, colours, handles.
+//! From the cut body to a system that a solver can step: constraints, compliances, colors, handles.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ use crate::scene::{
     VolumeConstraintSection,
 };
 
-/// A system, its settings, and the number of colours of each kind in it.
+/// A system, its settings, and the number of colors of each kind in it.
 pub(crate) struct Dynamics {
     pub(crate) system: System<f32>,
     pub(crate) settings: Settings,

@@ -77,7 +77,7 @@ impl Expense {
         }
     }
 
-    /// Colours that an iteration goes through in vertex block descent; none with another formulation.
+    /// Colors that an iteration goes through in vertex block descent; none with another formulation.
     pub(crate) fn vertex_colors(&self) -> Option<usize> {
         self.descent.as_ref().map(|descent| descent.groups().len())
     }

@@ -107,7 +107,7 @@ fn tables(report: &Report) -> String {
 
 fn constraints(report: &Report) -> String {
     let mut out = String::from(
-        "<h2>Constraints</h2><table><tr><th>kind</th><th>colours</th><th>RMS error / rest size</th><th>largest</th></tr>",
+        "<h2>Constraints</h2><table><tr><th>kind</th><th>colors</th><th>RMS error / rest size</th><th>largest</th></tr>",
     );
     for r in &report.residuals {
         let colors = report.colors.get(&r.kind).map(usize::to_string).unwrap_or_default();

@@ -27,7 +27,7 @@ pub(crate) struct Outcome<'a> {
     pub(crate) loaded: &'a LoadedScene,
     pub(crate) source: &'a Source,
     pub(crate) body: &'a Body,
-    /// Local metres, one per mesh vertex.
+    /// Local meters, one per mesh vertex.
     pub(crate) deformed: &'a [Point3<f32>],
     pub(crate) folder: &'a RunFolder,
 }

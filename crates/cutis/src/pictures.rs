@@ -15,13 +15,13 @@ use crate::scene::Scene;
 const PIXELS: usize = 900;
 /// A close-up shows this many lengths of the incision.
 const CLOSE_UP: f64 = 1.5;
-/// Deeper than this, tissue has the same colour, mm.
+/// Deeper than this, tissue has the same color, mm.
 const DEEPEST_MM: f64 = 20.0;
 
 /// Contours: at rest, deformed.
 const COLORS: [[u8; 3]; 2] = [[90, 160, 255], [255, 170, 60]];
 
-/// Depth below the skin at rest, by which wounds are coloured.
+/// Depth below the skin at rest, by which wounds are colored.
 pub(crate) fn depth(volume: &Volume, scene: &Scene) -> Result<Volume, Error> {
     let finest = volume.grid().affine.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
     Ok(skin_depth(volume, scene.tissue.air_below_hu, finest, DEEPEST_MM)?)
@@ -40,7 +40,7 @@ pub(crate) fn draw(
         let view = View {
             width: PIXELS,
             height: PIXELS,
-            focus: wound.as_ref().map(|w| Focus { centre_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm }),
+            focus: wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm }),
             depth: Some(depth),
             threshold_hu: outcome.loaded.scene.tissue.air_below_hu,
             ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))
@@ -63,7 +63,7 @@ pub(crate) fn draw(
     let cross = |volume: &Volume, contours: &[Contour<'_>]| {
         let view = SliceView {
             contours,
-            focus: wound.as_ref().map(|w| Focus { centre_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm }),
+            focus: wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm }),
             long_side: Some(PIXELS),
             ..SliceView::new(plane, position(plane, middle_mm))
         };

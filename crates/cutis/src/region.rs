@@ -34,7 +34,7 @@ fn fine_zone(scene: &Scene, zone: Zone, even: &Grid) -> [[f64; 2]; 3] {
     let mut add = |mm: [f64; 3], radius_mm: f64| {
         let index = even.affine.to_index(mm.into());
         for axis in 0..3 {
-            // The index rises by so much per millimetre in the direction in which it rises fastest.
+            // The index rises by so much per millimeter in the direction in which it rises fastest.
             let per_mm = Vector3::from_fn(|world, _| {
                 even.affine.to_index(Point3::origin() + Vector3::ith(world, 1.0))[axis]
                     - even.affine.to_index(Point3::origin())[axis]

@@ -30,7 +30,7 @@ pub struct Report {
     /// Quality of the detected skin, if something needed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinQuality>,
-    /// Colours (groups without shared vertices) per constraint kind; absent kinds were left out. In vertex block descent those of
+    /// Colors (groups without shared vertices) per constraint kind; absent kinds were left out. In vertex block descent those of
     /// the vertices, as `descent`, and no others.
     pub colors: std::collections::BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.

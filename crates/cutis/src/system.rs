@@ -9,7 +9,7 @@ use crate::{Error, dynamics, source};
 
 /// What a run of a scene steps, before its first frame.
 pub struct SceneSystem {
-    /// The body at rest: positions in local metres, constraints, handles.
+    /// The body at rest: positions in local meters, constraints, handles.
     pub system: System<f32>,
     /// The scene's section `solver`.
     pub settings: Settings,

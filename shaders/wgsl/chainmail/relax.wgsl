@@ -1,7 +1,7 @@
 // Half a sweep of ChainMail's relaxation: one coordinate of those elements of a slab whose i + j + k is even, or odd. The twin of
 // `Plane::relax`.
 //
-// Such elements have neighbours of the other kind only, so that no thread reads what another writes. All numbers are whole, and
+// Such elements have neighbors of the other kind only, so that no thread reads what another writes. All numbers are whole, and
 // sums wrap as they do in Rust.
 struct Slab {
     // Elements of a row, rows of a plane, planes.
@@ -50,13 +50,13 @@ const BEFORE: u32 = 8u;
 const HELD: u32 = 192u;
 // The length of a link at rest.
 const STEP: i32 = 65536;
-// More than six neighbours within their bounds can ask for together, and few enough to be doubled.
+// More than six neighbors within their bounds can ask for together, and few enough to be doubled.
 const MOST_ASKED: u32 = 1073741824u;
 
 var<workgroup> goes_on: u32;
 var<workgroup> moved_here: atomic<u32>;
 
-// What neighbours ask of an element: how many there are, how far they want it to go together, and between what it stays within
+// What neighbors ask of an element: how many there are, how far they want it to go together, and between what it stays within
 // the bounds of its links.
 struct Asked {
     count: u32,
@@ -70,10 +70,10 @@ fn element(plane: u32, place: u32) -> u32 {
     return (elements[plane * slab.pitch + place / 2u] >> (16u * (place & 1u))) & 0xffffu;
 }
 
-// What is asked once a neighbour along `axis` has asked that is `apart` from the element. `pairs` is where the bounds of the
+// What is asked once a neighbor along `axis` has asked that is `apart` from the element. `pairs` is where the bounds of the
 // element's material begin.
-fn ask(so_far: Asked, apart: i32, pairs: u32, neighbour: u32, axis: u32, after: bool) -> Asked {
-    let bound = bounds[3u * (pairs + (neighbour >> 8u)) + axis];
+fn ask(so_far: Asked, apart: i32, pairs: u32, neighbor: u32, axis: u32, after: bool) -> Asked {
+    let bound = bounds[3u * (pairs + (neighbor >> 8u)) + axis];
     let rest = select(0, STEP, axis == half.coordinate);
     let asked = apart + select(rest, -rest, after);
     let low = apart + select(bound.x, -bound.y, after);

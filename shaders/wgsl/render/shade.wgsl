@@ -1,9 +1,9 @@
-// Light from a surface point: its colour under light from the viewer's side, with ambient occlusion.
+// Light from a surface point: its color under light from the viewer's side, with ambient occlusion.
 
 // Parts of the occlusion's reach at which tissue is looked for.
 const REACHES: array<f32, 3> = array(0.2, 0.5, 1.0);
 
-// ∂HU/∂index: central differences over one voxel to either side, averaged over the position and its six neighbours;
+// ∂HU/∂index: central differences over one voxel to either side, averaged over the position and its six neighbors;
 // 14 times as large.
 fn index_gradient(position: vec3f) -> vec3f {
     let x = vec3f(1.0, 0.0, 0.0);
@@ -21,7 +21,7 @@ fn along(position: vec3f, axis: vec3f) -> f32 {
         + hu_at(position + 2.0 * axis) - hu_at(position - 2.0 * axis);
 }
 
-// The differences along `a` and along `b` between the four neighbours that lie along both.
+// The differences along `a` and along `b` between the four neighbors that lie along both.
 fn across(position: vec3f, a: vec3f, b: vec3f) -> vec2f {
     let both = hu_at(position + a + b);
     let first = hu_at(position + a - b);
@@ -67,10 +67,10 @@ fn openness(index: vec3f, normal: vec3f) -> f32 {
     return select(1.0, lit / max(all, 1e-30), all > 0.0);
 }
 
-// Linear light of a cut face: HU as grey, window 400, level 40.
+// Linear light of a cut face: HU as gray, window 400, level 40.
 fn cut_face(index: vec3f) -> vec3f {
-    let grey = clamp((hu_at(index) + 160.0) / 400.0, 0.0, 1.0);
-    return vec3f(grey * grey * 0.8);
+    let gray = clamp((hu_at(index) + 160.0) / 400.0, 0.0, 1.0);
+    return vec3f(gray * gray * 0.8);
 }
 
 // Linear light of the surface.

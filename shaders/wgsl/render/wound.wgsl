@@ -13,7 +13,7 @@ fn albedo(index: vec3f, normal: vec3f) -> vec3f {
     return view.skin + exposed * (tissue(hu) - view.skin);
 }
 
-// Colour of tissue by HU.
+// Color of tissue by HU.
 fn tissue(hu: f32) -> vec3f {
     var color = view.tissue[0].xyz;
     for (var n = 1u; n < 6u; n++) {

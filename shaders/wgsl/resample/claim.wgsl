@@ -1,7 +1,7 @@
 // Each deformed tet claims the voxels that it holds or comes near: the smallest key wins.
 @group(0) @binding(4) var<storage, read_write> owners: array<atomic<u32>>;
 
-// In the key of a tet that only comes near a centre: any tet that holds it wins.
+// In the key of a tet that only comes near a center: any tet that holds it wins.
 const NEAR: u32 = 0x80000000u;
 
 fn span_of(t: u32) -> u32 {

@@ -44,9 +44,9 @@ fn trilinear(place: vec3f) -> i32 {
     let at = clamp(place, first, last);
     let low = floor(at);
     let f = at - low;
-    let centre = vec3i(grid.centre_i, grid.centre_j, grid.centre_k);
-    let l = vec3i(low) + centre;
-    let h = min(l + vec3i(1), vec3i(last) + centre);
+    let center = vec3i(grid.center_i, grid.center_j, grid.center_k);
+    let l = vec3i(low) + center;
+    let h = min(l + vec3i(1), vec3i(last) + center);
     var v = array<i32, 8>(
         voxel_at(l.x, l.y, l.z), voxel_at(h.x, l.y, l.z), voxel_at(l.x, h.y, l.z), voxel_at(h.x, h.y, l.z),
         voxel_at(l.x, l.y, h.z), voxel_at(h.x, l.y, h.z), voxel_at(l.x, h.y, h.z), voxel_at(h.x, h.y, h.z),
@@ -113,7 +113,7 @@ fn gather(
             let j = (voxel / grid.columns) % grid.rows;
             let k = slab.first + voxel / (grid.columns * grid.rows);
             let point = vec3f(grid.region_x + f32(i), grid.region_y + f32(j), grid.region_z + f32(k));
-            let input = vec3i(point) + vec3i(grid.centre_i, grid.centre_j, grid.centre_k);
+            let input = vec3i(point) + vec3i(grid.center_i, grid.center_j, grid.center_k);
             let owner = owners[voxel];
             let t = (owner & ~NEAR) - chunk.first;
             var value = 0;

@@ -1,6 +1,6 @@
 // The volume, the region of it that is filled, and the way from the positions of vertices to it.
 //
-// Places are voxel indices relative to the voxel `centre` of the volume, so that the numbers are small near the body.
+// Places are voxel indices relative to the voxel `center` of the volume, so that the numbers are small near the body.
 struct Grid {
     // place = linear · position + offset
     xx: f32, xy: f32, xz: f32,
@@ -15,7 +15,7 @@ struct Grid {
     // The volume: places of its first and last voxel, and its voxel at place zero.
     first_x: f32, first_y: f32, first_z: f32,
     last_x: f32, last_y: f32, last_z: f32,
-    centre_i: i32, centre_j: i32, centre_k: i32,
+    center_i: i32, center_j: i32, center_k: i32,
     // Stored values: what a vacated voxel becomes, and the range that is no padding.
     air: i32, scanned_low: i32, scanned_high: i32,
     unused: u32,

@@ -1,4 +1,4 @@
-// A tet over the voxels: on which side of its faces a centre lies, as far as f32 can tell.
+// A tet over the voxels: on which side of its faces a center lies, as far as f32 can tell.
 //
 // Everything is measured from a corner of the tet, so that it is as exact far from the origin as near it. Component c of a
 // vec4f belongs to the face opposite corner c.
@@ -68,7 +68,7 @@ fn tet_of(a: vec3f, b: vec3f, c: vec3f, d: vec3f, tolerance: f32) -> Tet {
     return tet;
 }
 
-// False for a tet whose volume cannot be told from zero, or is beyond f32: it holds no centre.
+// False for a tet whose volume cannot be told from zero, or is beyond f32: it holds no center.
 fn has_volume(tet: Tet) -> bool {
     return is_finite(tet.volume) && is_finite(tet.near.x + ((tet.near.y + tet.near.z) + tet.near.w))
         && tet.volume > tet.rounding.y;

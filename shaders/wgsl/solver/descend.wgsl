@@ -1,4 +1,4 @@
-// Moves the vertices of a chunk of one colour, and leaves their pulls at zero. The twin of `DescentStep::moved`.
+// Moves the vertices of a chunk of one color, and leaves their pulls at zero. The twin of `DescentStep::moved`.
 struct Pull {
     force: vec4f,
     diagonal: vec4f,

@@ -10,7 +10,7 @@ var<private> inverse_reach_squared: f32;
 // Zero, and no compiler can know: entry points set it to whether there are no constraints at all.
 var<private> hidden_zero: u32;
 
-// The value itself, behind a wall that optimisers do not see through. Drivers turn `a * b + a * c` into `a * (b + c)`, which
+// The value itself, behind a wall that optimizers do not see through. Drivers turn `a * b + a * c` into `a * (b + c)`, which
 // rounds differently; `a` behind such a wall is not the same `a`.
 fn exact(value: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(value) | hidden_zero);

@@ -1,4 +1,4 @@
-// Projects a chunk of one colour of one kind: no two of its constraints share a vertex. The twin of `project`.
+// Projects a chunk of one color of one kind: no two of its constraints share a vertex. The twin of `project`.
 @group(0) @binding(0) var<storage, read_write> vertices: array<vec4f>;
 @group(0) @binding(1) var<uniform> settings: Settings;
 @group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;

@@ -1,6 +1,6 @@
 //! P6: the border of a body is moved by an affine map; in equilibrium the interior has followed it.
 //!
-//! Every vertex of the lattice is a centre of symmetry, so that a uniform strain is an equilibrium. With PBD, which has
+//! Every vertex of the lattice is a center of symmetry, so that a uniform strain is an equilibrium. With PBD, which has
 //! no equilibrium of forces, the map is a rotation: then every constraint can be met, and the interior must follow.
 
 use cutis_coloring::greedy;

@@ -2,7 +2,7 @@
 //!
 //! Vertices 0.1 m apart, the face x = 0 fixed, unit masses, PBD with stiffness 1 on every edge, then on every
 //! tetrahedron. Three independent programs give the last vertex the same height to five digits in the lattice's order
-//! of colours; a fourth, in another order of the constraints, differs by less than 2 mm.
+//! of colors; a fourth, in another order of the constraints, differs by less than 2 mm.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Scalar, Volume};
@@ -72,7 +72,7 @@ fn lattice_order_agrees_to_five_digits() {
 }
 
 #[test]
-fn any_other_order_agrees_to_two_millimetres() {
+fn any_other_order_agrees_to_two_millimeters() {
     for (size, height) in REFERENCE {
         in_double(|start| near(in_another_order(start, size), height, 2e-3));
         in_single(|start| near(in_another_order(start, size), height, 2e-3));

@@ -30,7 +30,7 @@ fn reference<T: Scalar>(system: System<T>, settings: Settings) -> Box<dyn Solver
     Box::new(SolverReference::new(system, settings).unwrap())
 }
 
-/// On two threads, where a colour is large enough for them.
+/// On two threads, where a color is large enough for them.
 fn cpu<T: Scalar>(system: System<T>, settings: Settings) -> Box<dyn Solver<T>> {
     Box::new(SolverCpu::new(system, settings, Some(2)).unwrap())
 }

@@ -18,7 +18,7 @@ const STRAIN: f64 = 1e-3;
 fn energy_density<T: Scalar>(k: f64, k_area: f64, strain: Matrix2<f64>, scale: f64) -> f64 {
     let sheet = Sheet::new(12);
     let count = sheet.positions.len();
-    // Neighbouring triangles of a spring: two inside, one on the border.
+    // Neighboring triangles of a spring: two inside, one on the border.
     let share = |spring: &[u32; 2]| {
         let around = sheet.triangles.iter().filter(|triangle| spring.iter().all(|v| triangle.contains(v)));
         around.count() as f64 / 2.0

@@ -1,4 +1,4 @@
-//! Charts of a problem: error against time per frame, a colour for each backend and method, a line for each number of substeps,
+//! Charts of a problem: error against time per frame, a color for each backend and method, a line for each number of substeps,
 //! the front behind them.
 
 use std::collections::BTreeMap;

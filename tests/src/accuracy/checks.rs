@@ -93,7 +93,7 @@ pub fn of_problem(case: &Case, yardstick: &Yardstick, rows: &[Row]) -> Result<Ve
     let refused = error > CONVERGED_STEP;
     check(
         refused,
-        format!("{name}: control: the minimiser of a step 1.1 times as long is refused (E1 {error:.2e})"),
+        format!("{name}: control: the minimizer of a step 1.1 times as long is refused (E1 {error:.2e})"),
     );
     let still = yardstick.e3(yardstick.rest());
     check(

@@ -2,7 +2,7 @@
 //!
 //! | error | what is compared | with |
 //! |---|---|---|
-//! | E1 | one implicit substep from a moving state | its minimiser, by Newton's method in `f64` |
+//! | E1 | one implicit substep from a moving state | its minimizer, by Newton's method in `f64` |
 //! | E2 | the trajectory at a fixed time | an `f64` run with at least 64 times the substeps |
 //! | E3 | the settled body | the equilibrium, by Newton's method in `f64` |
 //! | E4 | residuals of the settled body | those of the equilibrium |
@@ -124,9 +124,9 @@ fn problem(
     let constraints: usize = case.xpbd.kinds().iter().map(|kind| kind.len()).sum();
     writeln!(out, "\n{}: {}; {} configurations", case.name, case.what, configs.len())?;
     let mut yardstick = Yardstick::new(case, &substeps, &tell)?;
-    tell("minimisers of implicit steps by Newton's method");
+    tell("minimizers of implicit steps by Newton's method");
     for &substeps in &substeps {
-        yardstick.minimise(substeps)?;
+        yardstick.minimize(substeps)?;
     }
     let rows: Vec<Row> = sweep::run(case, &configs, &yardstick, &tell)?;
     let checks = checks::of_problem(case, &yardstick, &rows)?;

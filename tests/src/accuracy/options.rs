@@ -9,7 +9,7 @@ use super::cases::NAMES;
 /// Measures error against run time, against a direct solution in f64 that uses none of the solver's code.
 ///
 /// Every configuration (backend, formulation, substeps × iterations) of every problem is timed, and in the same run compared
-/// with the minimiser of its implicit step (E1), with a run of at least 64 times the substeps (E2), and with the equilibrium
+/// with the minimizer of its implicit step (E1), with a run of at least 64 times the substeps (E2), and with the equilibrium
 /// (E3, E4). The exit code is 0 if the checks hold, 1 if not, 2 for a wrong option.
 #[derive(Clone, Debug, Default, Parser)]
 #[command(name = "accuracy", bin_name = "cargo xtask accuracy")]

@@ -49,9 +49,9 @@ A *setting* is written substeps × iterations; a frame has as many sweeps over a
 `vbd` twice as many over all vertices. Times are the
 shortest and the middle one of all frames, in milliseconds; configurations took turns, so that load falls on all alike.
 
-- **E1**, algebraic: one substep from the moving body, against the minimiser of the implicit step, which Newton's method with a
+- **E1**, algebraic: one substep from the moving body, against the minimizer of the implicit step, which Newton's method with a
   sparse direct solution finds in `f64` from the same energies without any code of the solver (`cutis-newton`). Root mean square
-  of the difference over that of the minimiser's own displacement; the largest over the instants.
+  of the difference over that of the minimizer's own displacement; the largest over the instants.
 - **E2**, temporal: positions at one frame, against an `f64` run with at least 64 times the substeps; relative to the displacement
   from rest.
 - **E3**, physical: the settled body against the equilibrium of the same energies by Newton's method, likewise.
@@ -64,7 +64,7 @@ shortest and the middle one of all frames, in milliseconds; configurations took 
 - **Stiffness**: how stiff the settled body seems, over what its material says: by how much more load it would take to move it as
   far as the equilibrium, and where a handle pulls, the reaction on it over that at the equilibrium.
 
-PBD has no E1 and no E2: it minimises nothing, and its result has no limit as substeps grow.
+PBD has no E1 and no E2: it minimizes nothing, and its result has no limit as substeps grow.
 ";
 
 /// The whole page.

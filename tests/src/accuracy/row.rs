@@ -121,7 +121,7 @@ impl Row {
 /// Which error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// Algebraic: one implicit substep against its minimiser.
+    /// Algebraic: one implicit substep against its minimizer.
     E1,
     /// Temporal: the trajectory against many more substeps.
     E2,
@@ -148,7 +148,7 @@ impl Measure {
     /// What it is, for a chart.
     pub fn label(self) -> &'static str {
         match self {
-            Self::E1 => "E1: one substep against its minimiser",
+            Self::E1 => "E1: one substep against its minimizer",
             Self::E2 => "E2: motion against many more substeps",
             Self::E3 => "E3: rest against the equilibrium",
             Self::E4 => "E4: residuals against the equilibrium's",

@@ -100,7 +100,7 @@ impl<'a> Entry<'a> {
     }
 }
 
-/// E1 of a configuration: the largest over the instants; none for PBD, which minimises nothing.
+/// E1 of a configuration: the largest over the instants; none for PBD, which minimizes nothing.
 fn e1(case: &Case, config: &Config, yardstick: &Yardstick) -> Result<Option<f64>, Failure> {
     if !config.has_material() {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! What a problem's configurations are compared with: the minimisers of implicit steps, a run with many more substeps, and the
+//! What a problem's configurations are compared with: the minimizers of implicit steps, a run with many more substeps, and the
 //! equilibrium.
 
 use std::collections::BTreeMap;
@@ -37,7 +37,7 @@ pub struct Yardstick {
     settings: Settings,
     /// The body in motion, at the problem's instants.
     pub states: Vec<State>,
-    /// By instant and substeps: where the substep starts, and its minimiser.
+    /// By instant and substeps: where the substep starts, and its minimizer.
     steps: BTreeMap<(usize, u32), [Vec<Point3<f64>>; 2]>,
     fine: Vec<Point3<f64>>,
     /// Substeps of a frame of the fine run.
@@ -95,11 +95,11 @@ impl Yardstick {
         })
     }
 
-    /// Finds the minimisers of a substep at every instant.
+    /// Finds the minimizers of a substep at every instant.
     ///
     /// # Errors
     /// A search that does not converge.
-    pub fn minimise(&mut self, substeps: u32) -> Result<(), Failure> {
+    pub fn minimize(&mut self, substeps: u32) -> Result<(), Failure> {
         for instant in 0..self.states.len() {
             let Implicit { start, minimum, .. } = self.step_of(instant, substeps, 1.0)?;
             self.steps.insert((instant, substeps), [start, minimum]);
@@ -135,7 +135,7 @@ impl Yardstick {
         }
     }
 
-    /// E1: error of the positions after one substep from the state at `instant`; NaN unless [`minimise`](Self::minimise) was
+    /// E1: error of the positions after one substep from the state at `instant`; NaN unless [`minimize`](Self::minimize) was
     /// called for this number of substeps.
     pub fn e1(&self, found: &[Point3<f64>], instant: usize, substeps: u32) -> f64 {
         let step = self.steps.get(&(instant, substeps));

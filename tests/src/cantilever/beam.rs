@@ -138,7 +138,7 @@ impl Beam {
     /// The same body with a tetrahedron that has no volume constraint: for controls.
     ///
     /// # Errors
-    /// Colours that cannot be; none.
+    /// Colors that cannot be; none.
     pub fn without_tet(&self, tet: usize) -> Result<Self, Failure> {
         let mut beam = self.clone();
         beam.tets.remove(tet);

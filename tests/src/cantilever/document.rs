@@ -175,7 +175,7 @@ fn controls(beam: &Beam, right: &Material) -> Result<BTreeMap<&'static str, [f64
     ]))
 }
 
-/// A coarse beam's colours are too short to be shared.
+/// A coarse beam's colors are too short to be shared.
 fn threads(beam: &Beam) -> Option<usize> {
     if beam.positions.len() < 2000 { Some(1) } else { None }
 }

@@ -22,7 +22,7 @@ pub(super) fn run(scene: &str, set: &[Override], out: &Path) -> Result<Report, F
     Ok(cutis::run(&loaded, &RunOptions { out: out.into(), resume: false }, &Silent)?)
 }
 
-/// As [`run`], with no output but the longest frame, in ms, and where the vertices end up, in local metres.
+/// As [`run`], with no output but the longest frame, in ms, and where the vertices end up, in local meters.
 pub(super) fn positions(
     scene: &str,
     changes: &[Override],

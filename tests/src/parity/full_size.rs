@@ -40,7 +40,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     bench.table.line("  building the body for the device")?;
     let (system, built_s) = timed(system)?;
     for kind in system.kinds() {
-        bench.table.line(&format!("  {}: {} in {} colours", kind.name(), kind.len(), kind.colors()))?;
+        bench.table.line(&format!("  {}: {} in {} colors", kind.name(), kind.len(), kind.colors()))?;
     }
     let (rest, velocities) = (system.positions(), system.velocities().to_vec());
     details.push(("vertices", rest.len() as f64));

@@ -36,7 +36,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME|INDEX", value_parser = |text: &str| text.parse::<Select>())]
     #[serde(serialize_with = "as_text")]
     pub adapter: Option<Select>,
-    /// At most so many items in a chunk, so that every colour is split. The smaller, the more dispatches: a small one takes long.
+    /// At most so many items in a chunk, so that every color is split. The smaller, the more dispatches: a small one takes long.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub chunk_cap: Option<usize>,
     /// Ask the device for exactly WebGPU's default limits.

@@ -47,7 +47,7 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// For `system` with its rest positions in metres.
+    /// For `system` with its rest positions in meters.
     pub fn new<T: Scalar>(system: &System<T>, rest: &[Point3<f64>], settings: &Settings) -> Self {
         let h = settings.substep_s();
         let strain = ROUNDING * T::default_epsilon().to_f64();
@@ -111,7 +111,7 @@ impl Meter {
 
 /// A coordinate is rounded once in prediction and once per projection of its vertex, each time by a number whose variance is that
 /// of half a unit in the last place; the velocities that this makes add up as in a random walk, and a factor of 4 is left for how
-/// errors of neighbours agree.
+/// errors of neighbors agree.
 fn heat<T: Scalar>(system: &System<T>, settings: &Settings) -> f64 {
     let mut roundings = vec![1.0; system.vertices().len()];
     for set in system.kinds() {

@@ -4,14 +4,14 @@
 //! | constraint | vertices | `C` |
 //! |---|---|---|
 //! | [`DihedralBending`] | 4 | `2 sin(θ/2) − 2 sin(θ₀/2)` of the angle between two triangles |
-//! | [`FibreStretch`] | 4 | `|F a| − s` of a tetrahedron along a fibre |
+//! | [`FiberStretch`] | 4 | `|F a| − s` of a tetrahedron along a fiber |
 #![forbid(unsafe_code)]
 
 mod dihedral_bending;
-mod fibre_stretch;
+mod fiber_stretch;
 
 pub use dihedral_bending::DihedralBending;
-pub use fibre_stretch::{Fibre, FibreStretch};
+pub use fiber_stretch::{Fiber, FiberStretch};
 
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/book/adding-a-constraint.md")]

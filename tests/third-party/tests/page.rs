@@ -1,8 +1,8 @@
 //! The page of the book shows what is compiled and tested here, to the letter.
 
 const PAGE: &str = include_str!("../../../docs/book/adding-a-constraint.md");
-const RUST: &str = include_str!("../src/fibre_stretch.rs");
-const WGSL: &str = include_str!("../src/fibre_stretch.wgsl");
+const RUST: &str = include_str!("../src/fiber_stretch.rs");
+const WGSL: &str = include_str!("../src/fiber_stretch.wgsl");
 
 /// The code blocks of the page in a language.
 fn blocks(language: &str) -> Vec<&'static str> {

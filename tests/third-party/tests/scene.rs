@@ -1,4 +1,4 @@
-//! A block of tissue with fibres through it and a skin that resists bending, next to a constraint of Cutis: both backends agree.
+//! A block of tissue with fibers through it and a skin that resists bending, next to a constraint of Cutis: both backends agree.
 
 use cutis_conformance::device;
 use cutis_constraints::Distance;
@@ -7,7 +7,7 @@ use cutis_solver::{Formulation, Settings, Solver, SolverReference, Stiffness, Sy
 use cutis_solver_cpu::SolverCpu;
 use cutis_solver_gpu::SolverGpu;
 use nalgebra::Point3;
-use third_party_constraints::{DihedralBending, Fibre, FibreStretch};
+use third_party_constraints::{DihedralBending, Fiber, FiberStretch};
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
@@ -15,7 +15,7 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 const CELLS: [usize; 3] = [8, 3, 2];
 /// Edge of a cell in m.
 const EDGE: f64 = 0.01;
-/// What the fibres contract to.
+/// What the fibers contract to.
 const CONTRACTION: f64 = 0.8;
 
 /// Positions, tetrahedra, edges and hinges of the upper face.
@@ -75,8 +75,8 @@ fn hinges(triangles: &[[u32; 3]]) -> Vec<[u32; 4]> {
     all.iter().filter_map(hinge).collect()
 }
 
-/// The block, held at one end, with fibres along x that contract. Without them, or without hinges, for comparison.
-fn system(formulation: Formulation, with_fibres: bool, with_hinges: bool) -> Result<System<f32>> {
+/// The block, held at one end, with fibers along x that contract. Without them, or without hinges, for comparison.
+fn system(formulation: Formulation, with_fibers: bool, with_hinges: bool) -> Result<System<f32>> {
     let Block { positions, tets, edges, hinges } = block();
     let count = positions.len();
     let fixed = |p: &Point3<f64>| p.x < EDGE / 2.0;
@@ -92,10 +92,10 @@ fn system(formulation: Formulation, with_fibres: bool, with_hinges: bool) -> Res
         stiffness(0.2, 1e-3),
         &groups,
     )?;
-    if with_fibres {
-        let fibre = Fibre { direction: [1.0, 0.0, 0.0], rest_stretch: CONTRACTION };
+    if with_fibers {
+        let fiber = Fiber { direction: [1.0, 0.0, 0.0], rest_stretch: CONTRACTION };
         let groups = cutis_coloring::greedy(&tets, count)?;
-        builder = builder.add_from_rest::<FibreStretch, 4>(&tets, &fibre, stiffness(0.5, 12.0), &groups)?;
+        builder = builder.add_from_rest::<FiberStretch, 4>(&tets, &fiber, stiffness(0.5, 12.0), &groups)?;
     }
     if with_hinges {
         let groups = cutis_coloring::greedy(&hinges, count)?;
@@ -130,14 +130,14 @@ fn end(positions: &[Point3<f32>]) -> f64 {
 }
 
 #[test]
-fn the_block_contracts_along_its_fibres() -> Result<()> {
-    let run = |with_fibres| -> Result<f64> {
-        let system = system(Formulation::Xpbd, with_fibres, true)?;
+fn the_block_contracts_along_its_fibers() -> Result<()> {
+    let run = |with_fibers| -> Result<f64> {
+        let system = system(Formulation::Xpbd, with_fibers, true)?;
         Ok(end(&run(&mut SolverCpu::new(system, settings(Formulation::Xpbd, 1), None)?)?))
     };
     let length = EDGE * CELLS[0] as f64;
     let (passive, active) = (run(false)? / length, run(true)? / length);
-    println!("length over rest length: {passive:.3} without fibres, {active:.3} with");
+    println!("length over rest length: {passive:.3} without fibers, {active:.3} with");
     assert!(passive > 0.98 && active < 0.9 && active > CONTRACTION, "{passive} {active}");
     Ok(())
 }
@@ -151,12 +151,12 @@ fn the_backends_agree() -> Result<()> {
         let threaded = run(&mut SolverCpu::new(system(formulation, true, true)?, settings, Some(2))?)?;
         assert_eq!(threaded, reference, "{formulation:?}");
         // Controls: both kinds are seen in the result.
-        for (with_fibres, with_hinges) in [(false, true), (true, false)] {
-            let other = system(formulation, with_fibres, with_hinges)?;
+        for (with_fibers, with_hinges) in [(false, true), (true, false)] {
+            let other = system(formulation, with_fibers, with_hinges)?;
             let other = run(&mut SolverReference::new(other, settings)?)?;
             assert!(
                 farthest(&other, &reference) > 1e-3 * EDGE,
-                "{formulation:?} {with_fibres} {with_hinges}"
+                "{formulation:?} {with_fibers} {with_hinges}"
             );
         }
         let Some(gpu) = &gpu else { continue };

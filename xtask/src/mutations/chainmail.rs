@@ -184,7 +184,7 @@ pub const CHAINMAIL: &[Mutation] = &[
         ChainMail,
         "ChainMail, WGSL: limits of another axis",
         "shaders/wgsl/chainmail/relax.wgsl",
-        "(neighbour >> 8u)) + axis]",
-        "(neighbour >> 8u)) + (axis + 1u) % 3u]",
+        "(neighbor >> 8u)) + axis]",
+        "(neighbor >> 8u)) + (axis + 1u) % 3u]",
     ),
 ];

@@ -240,7 +240,7 @@ pub const MUTATIONS: &[Mutation] = &[
     ),
     mutation(
         Problems,
-        "schedule: the last colour of each kind is skipped, on every backend",
+        "schedule: the last color of each kind is skipped, on every backend",
         "crates/cutis-solver/src/schedule.rs",
         "0..set.colors()",
         "0..set.colors().saturating_sub(1)",
@@ -284,14 +284,14 @@ pub const MUTATIONS: &[Mutation] = &[
     // The host's side of the GPU solver.
     mutation(
         Solver,
-        "chunks: one constraint is lost where a colour is split",
+        "chunks: one constraint is lost where a color is split",
         "crates/cutis-solver-gpu/src/kind.rs",
         "end.min(first + most);",
         "end.min(first + most - 1);",
     ),
     mutation(
         Solver,
-        "sweeps: a colour in place of another",
+        "sweeps: a color in place of another",
         "crates/cutis-solver-gpu/src/kind.rs",
         "&self.colors[sweep.color]",
         "&self.colors[0]",
@@ -327,7 +327,7 @@ pub const MUTATIONS: &[Mutation] = &[
     ),
     mutation(
         Resample,
-        "resampling, WGSL: a tet that only comes near wins over one that holds the centre",
+        "resampling, WGSL: a tet that only comes near wins over one that holds the center",
         "shaders/wgsl/resample/claim.wgsl",
         "select(key | NEAR, key,",
         "select(key, key | NEAR,",

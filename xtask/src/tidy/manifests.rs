@@ -1,5 +1,5 @@
 //! One fact in one place: members take versions, lints and dependencies from the workspace manifest; what is published
-//! carries its licences.
+//! carries its licenses.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::Finding;
 use super::files::Files;
 
 /// What every published crate carries, as links to the files of the root.
-const LICENCES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
+const LICENSES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 
 /// Keys of `[package]` that have their one value in the workspace manifest.
 const INHERITED: [&str; 4] = ["version", "edition", "rust-version", "license"];
@@ -64,8 +64,8 @@ pub fn check(path: &str, text: &str) -> Vec<Finding> {
     findings
 }
 
-/// Licence files that are missing beside a member's manifest, unless it is never published.
-pub fn licences(path: &str, text: &str, files: &Files) -> Vec<Finding> {
+/// License files that are missing beside a member's manifest, unless it is never published.
+pub fn licenses(path: &str, text: &str, files: &Files) -> Vec<Finding> {
     let table: toml::Table = text.parse().unwrap_or_default();
     let publish =
         table.get("package").and_then(|package| package.get("publish")).and_then(toml::Value::as_bool);
@@ -73,7 +73,7 @@ pub fn licences(path: &str, text: &str, files: &Files) -> Vec<Finding> {
         return Vec::new();
     }
     let folder = path.trim_end_matches("Cargo.toml");
-    let missing = LICENCES.iter().filter(|name| !files.exists(&format!("{folder}{name}")));
+    let missing = LICENSES.iter().filter(|name| !files.exists(&format!("{folder}{name}")));
     missing
         .map(|name| {
             Finding::failure(path, 0, format!("needs `{name}` beside it: ln -s ../../{name} {folder}"))
@@ -128,11 +128,11 @@ mod tests {
     }
 
     #[test]
-    fn a_published_crate_without_its_licences_is_caught() {
+    fn a_published_crate_without_its_licenses_is_caught() {
         let files = Files::of(&["crates/a/LICENSE-MIT", "crates/a/LICENSE-APACHE", "crates/b/LICENSE-MIT"]);
-        assert_eq!(licences("crates/a/Cargo.toml", GOOD, &files), []);
-        assert_eq!(licences("crates/b/Cargo.toml", GOOD, &files).len(), 1);
+        assert_eq!(licenses("crates/a/Cargo.toml", GOOD, &files), []);
+        assert_eq!(licenses("crates/b/Cargo.toml", GOOD, &files).len(), 1);
         let unpublished = GOOD.replace("[package]", "[package]\npublish = false");
-        assert_eq!(licences("crates/b/Cargo.toml", &unpublished, &files), []);
+        assert_eq!(licenses("crates/b/Cargo.toml", &unpublished, &files), []);
     }
 }

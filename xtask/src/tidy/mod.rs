@@ -97,7 +97,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     for path in manifests::members(&metadata, &workspace.root)? {
         let text = files.read(&path)?;
         findings.extend(manifests::check(&path, &text));
-        findings.extend(manifests::licences(&path, &text, &files));
+        findings.extend(manifests::licenses(&path, &text, &files));
     }
 
     for finding in &findings {

@@ -9,8 +9,8 @@ pub const ALL: &[fn(&Source) -> Vec<Finding>] =
 
 /// The only files that may hold `unsafe`.
 const UNSAFE_ALLOWED: &[&str] = &[
-    "crates/cutis-solver/src/coloured.rs", // proves that no two threads touch one vertex
-    "crates/cutis-chainmail/src/wide.rs",  // asks the processor which vector unit it has
+    "crates/cutis-solver/src/colored.rs", // proves that no two threads touch one vertex
+    "crates/cutis-chainmail/src/wide.rs", // asks the processor which vector unit it has
     "crates/cutis-solver-cpu/tests/allocations.rs", // an allocator that counts
 ];
 
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn unlisted_unsafe_is_caught() {
-        let text = "// SAFETY: indices of a colour are disjoint.\nunsafe { f() }\n";
+        let text = "// SAFETY: indices of a color are disjoint.\nunsafe { f() }\n";
         assert_eq!(count(unsafe_is_listed_and_explained, UNSAFE_ALLOWED[0], text), 0);
         assert_eq!(count(unsafe_is_listed_and_explained, "crates/cutis/src/lib.rs", text), 1);
         let harmless = "#![forbid(unsafe_code)] // unsafe\nlet a = \"unsafe\";\n";

@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn a_missing_title_is_caught() {
-        assert_eq!(lines(begins_with_title, SHADER, "// Projects a colour.\n"), NONE);
+        assert_eq!(lines(begins_with_title, SHADER, "// Projects a color.\n"), NONE);
         for text in ["", "//\n", "//  \n", "\n// Late.\n", "const a = 1; // Beside.\n", "/* Block. */\n"] {
             assert_eq!(lines(begins_with_title, SHADER, text), [1], "{text:?}");
         }

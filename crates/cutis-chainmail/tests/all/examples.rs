@@ -38,7 +38,7 @@ fn a_row_is_pulled_and_pushed_link_by_link() {
 fn a_sheet_shears_and_moves_along() {
     let mut sheet = chain([5, 5, 1], &[SOFT], |_| 0);
     drag(&mut sheet, [0, 2, 0], [0.0, 1.0, 0.0]);
-    // Across the links along x, each neighbour may lag a quarter of a step behind.
+    // Across the links along x, each neighbor may lag a quarter of a step behind.
     let along =
         |j: usize| (0..5).map(|i| sheet.displacement(sheet.element([i, j, 0]))[1]).collect::<Vec<_>>();
     assert_eq!(along(2), [1.0, 0.75, 0.5, 0.25, 0.0]);
@@ -233,9 +233,9 @@ fn links_are_cut_by_name_as_by_asking() {
     let (mut named, mut asked) = (body(), body());
     assert_eq!((named.links(), named.cut_links(&[[4, 1], [3, 4], [0, 4], [4, 77], [3, 4]])), (12, 2));
     assert_eq!(asked.cut(|_, a, b| [[1, 4], [3, 4]].contains(&[a, b])), 2);
-    let neighbours =
-        |chain: &Chain| (0..9).map(|e| chain.neighbours(e).collect::<Vec<_>>()).collect::<Vec<_>>();
-    assert_eq!((neighbours(&named), named.links()), (neighbours(&asked), 10));
+    let neighbors =
+        |chain: &Chain| (0..9).map(|e| chain.neighbors(e).collect::<Vec<_>>()).collect::<Vec<_>>();
+    assert_eq!((neighbors(&named), named.links()), (neighbors(&asked), 10));
 }
 
 #[test]

@@ -43,7 +43,7 @@ fn part_of(chain: &Chain, from: u32) -> Vec<bool> {
     let mut open = vec![from];
     part[from as usize] = true;
     while let Some(element) = open.pop() {
-        for next in chain.neighbours(element) {
+        for next in chain.neighbors(element) {
             if !std::mem::replace(&mut part[next as usize], true) {
                 open.push(next);
             }

@@ -59,7 +59,7 @@ pub fn sweep(chain: &Chain, k: impl Fn(u32) -> f64, held: &[u32]) -> (Vec<[i32; 
             }
             for c in 0..3 {
                 let own = i64::from(x[element as usize][c]);
-                // Where each neighbour asks it to be, and from where to where it lets it be.
+                // Where each neighbor asks it to be, and from where to where it lets it be.
                 let mut asked = Vec::new();
                 for axis in 0..3 {
                     let rest = if axis == c { one } else { 0 };

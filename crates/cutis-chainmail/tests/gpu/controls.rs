@@ -34,8 +34,8 @@ fn another_k_and_a_link_less_are_seen() {
 const MUTATIONS: &[(&str, &str)] = &[
     ("plane * slab.pitch + place / 2u", "plane * slab.pitch + (place + 1u) / 2u"),
     ("16u * (place & 1u)", "16u * (1u - (place & 1u))"),
-    ("3u * (pairs + (neighbour >> 8u)) + axis", "3u * (pairs + (neighbour >> 8u)) + half.coordinate"),
-    ("pairs + (neighbour >> 8u)", "pairs"),
+    ("3u * (pairs + (neighbor >> 8u)) + axis", "3u * (pairs + (neighbor >> 8u)) + half.coordinate"),
+    ("pairs + (neighbor >> 8u)", "pairs"),
     ("axis == half.coordinate", "axis == 0u"),
     ("select(rest, -rest, after)", "select(-rest, rest, after)"),
     ("select(bound.x, -bound.y, after)", "select(bound.x, bound.y, after)"),

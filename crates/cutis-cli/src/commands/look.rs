@@ -120,7 +120,7 @@ impl From<Split> for cutis::mesh::Split {
 pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error> {
     let focus = match (&look.focus, look.zoom) {
         (Some(text), Some(size_mm)) => {
-            Some(Focus { centre_mm: numbers("--focus", text, ',', "x,y,z in mm")?, size_mm })
+            Some(Focus { center_mm: numbers("--focus", text, ',', "x,y,z in mm")?, size_mm })
         }
         _ => None,
     };

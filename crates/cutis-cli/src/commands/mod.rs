@@ -47,7 +47,7 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
     }
 }
 
-/// JSON for people and machines. Serialising plain data cannot fail.
+/// JSON for people and machines. Serializing plain data cannot fail.
 fn pretty(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"))
 }

@@ -137,7 +137,7 @@ fn ledger(plan: &Plan) -> Vec<String> {
     let bytes = |bytes: usize| if bytes == 0 { String::new() } else { bytes.to_string() };
     let mut lines = vec![
         "cost of the solver:".to_owned(),
-        row("part", "colours", "host, bytes", "GPU, bytes", "ms per frame"),
+        row("part", "colors", "host, bytes", "GPU, bytes", "ms per frame"),
     ];
     lines.extend(plan.ledger.parts.iter().map(|part| {
         let colors = plan.colors.get(&part.part).map(usize::to_string).unwrap_or_default();

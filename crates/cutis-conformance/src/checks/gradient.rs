@@ -15,7 +15,7 @@ const STEP: f64 = 1e-4;
 /// The gradient against central finite differences of fourth order, in `f64`, relative to its own length: at most 1e-6.
 ///
 /// Of a constraint with [`direction_only`](Subject::direction_only) the directions are compared. Controls: each gradient off by
-/// 1e-3, and neighbours swapped, must be seen.
+/// 1e-3, and neighbors swapped, must be seen.
 pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "gradient");
     let cases = subject.cases();

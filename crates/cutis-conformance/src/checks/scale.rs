@@ -13,7 +13,7 @@ const LENGTH: f64 = 1e-6;
 /// The same shapes at 1 mm, 1 m and 1 km have the same value over rest size, and the same gradient times length over rest size:
 /// in `f64`, to 1e-9. An absolute length or an absolute epsilon in the formula shows here.
 ///
-/// Left out for constraints [`with_own_length`](Subject::with_own_length). Control: a micrometre added to one coordinate must be
+/// Left out for constraints [`with_own_length`](Subject::with_own_length). Control: a micrometer added to one coordinate must be
 /// seen.
 pub fn scale<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let check = "scale";
@@ -23,12 +23,12 @@ pub fn scale<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Repor
     let mut report = Report::new(C::NAME, check);
     let cases = subject.similar_cases();
     let per_scale = cases.len() / SCALES.len();
-    let metre = &cases[per_scale..2 * per_scale];
+    let meter = &cases[per_scale..2 * per_scale];
     let error = |absolute: f64| {
         let mut worst = 0.0;
-        for (case, of_metre) in cases.chunks(per_scale.max(1)).flat_map(|scale| scale.iter().zip(metre)) {
+        for (case, of_meter) in cases.chunks(per_scale.max(1)).flat_map(|scale| scale.iter().zip(meter)) {
             let (expected, found) =
-                (without_unit::<C, N>(of_metre, absolute), without_unit::<C, N>(case, absolute));
+                (without_unit::<C, N>(of_meter, absolute), without_unit::<C, N>(case, absolute));
             let size = numbers(&expected).map(f64::abs).fold(0.0, largest);
             let difference = numbers(&expected).zip(numbers(&found)).map(|(a, b)| (a - b).abs());
             worst = largest(difference.fold(0.0, largest) / size, worst);

@@ -14,7 +14,7 @@ use crate::{Case, ConformanceError, Report, Subject};
 /// [`Case::size`]. The device may deviate at most 4 times as much as the CPU; on a software adapter every number must be that
 /// of the CPU.
 ///
-/// Controls: the shader with the value or one gradient off by 1e-3, or with neighbouring gradients swapped, must be seen.
+/// Controls: the shader with the value or one gradient off by 1e-3, or with neighboring gradients swapped, must be seen.
 ///
 /// # Errors
 /// [`ConformanceError::Gpu`] if the shader is refused or the device fails.

@@ -91,7 +91,7 @@ stretch!(
     )
 );
 stretch!(
-    /// Takes a tenth of a millimetre for zero.
+    /// Takes a tenth of a millimeter for zero.
     AbsoluteEpsilon,
     |x, p| {
         let length = length(x) + T::constant(1e-4);
@@ -117,7 +117,7 @@ stretch!(
 );
 stretch!(
     /// Adds and takes away ten thousand lengths.
-    Cancelling,
+    Canceling,
     |x, p| {
         let detour = p[0] * T::constant(1e4);
         let Eval { c, grad } = stretch(x, p);

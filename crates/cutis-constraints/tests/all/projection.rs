@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::checks::project;
 use crate::shapes::{SCALES, shape};
 
-/// Regular tetrahedron or triangle with its centre at the origin.
+/// Regular tetrahedron or triangle with its center at the origin.
 fn regular(scale: f64) -> [Point3<f64>; 4] {
     [[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]]
         .map(|p| Point3::from(p) * scale)

@@ -30,7 +30,7 @@ pub enum SkinMode {
     ///
     /// *Body*: the largest face-connected component of all-tissue tets. *Outside*: points reached from the lateral sides of the box over
     /// lattice edges, through air and through the other components (a scanner table does not shade the back that lies on it).
-    /// Lattice edges are the right neighbourhood here: the air points and edges left over by the tissue's complex are connected exactly
+    /// Lattice edges are the right neighborhood here: the air points and edges left over by the tissue's complex are connected exactly
     /// where the space around that complex is. The flood does not start at the first and last slice, which open lungs and bowel.
     #[default]
     Exterior,

@@ -1,4 +1,4 @@
-//! Graded lattices: the same numbering and colours as even ones, with the points elsewhere.
+//! Graded lattices: the same numbering and colors as even ones, with the points elsewhere.
 
 use cutis_mesh::{
     Cut, Grading, Incision, Lattice, MeshError, Planes, SkinMode, SkinOptions, Slit, Split, TetMesh, Tissue,

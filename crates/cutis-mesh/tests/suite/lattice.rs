@@ -80,7 +80,7 @@ proptest! {
     }
 
     #[test]
-    fn colours_share_no_vertex((lattice, air) in random_body()) {
+    fn colors_share_no_vertex((lattice, air) in random_body()) {
         let tissue = Tissue { air: &air, cut_away: &[], largest_component: false };
         let Ok(mesh) = TetMesh::build(&lattice, &vec![0.0; air.len()], &tissue) else { return Ok(()) };
         let (most_edges, most_tets) = if lattice.split() == Split::Kuhn6 { (14, 24) } else { (18, 40) };

@@ -85,7 +85,7 @@ proptest! {
         for edge in points(&all, &all.edges) {
             prop_assert!(edges.contains(&edge) || !edge.iter().any(|&point| inside[point as usize]));
         }
-        // Colours are those of the whole body.
+        // Colors are those of the whole body.
         let classes = |mesh: &TetMesh, tets: &[[u32; 4]]| -> BTreeMap<[u32; 4], u16> {
             let keys = tets.iter().map(|tet| sorted(tet.map(|v| mesh.lattice_index[v as usize])));
             keys.zip(mesh.tet_classes(tets)).collect()

@@ -12,7 +12,7 @@ use cutis_solver::{Stiffness, System, SystemBuilder};
 pub use lattice::Kuhn;
 use nalgebra::Point3;
 
-/// A block of `n³` vertices of 1 kg at `scale` metres from each other, whose top is held: springs of 1 N/m, volumes.
+/// A block of `n³` vertices of 1 kg at `scale` meters from each other, whose top is held: springs of 1 N/m, volumes.
 pub fn hanging(n: usize, scale: f64) -> System<f64> {
     let lattice = Kuhn::new([n; 3], scale);
     let top = (n - 1) as f64 * scale;
@@ -43,7 +43,7 @@ pub fn hanging_at(n: usize, scale: f64, positions: &[Point3<f64>], inverse_masse
         .build()
 }
 
-/// A block of all kinds of constraints whose bottom is held; the skin on one side pulls. `scale` metres from vertex to vertex.
+/// A block of all kinds of constraints whose bottom is held; the skin on one side pulls. `scale` meters from vertex to vertex.
 pub fn skinned(size: [usize; 3], scale: f64) -> System<f64> {
     let lattice = Kuhn::new(size, scale);
     let count = lattice.positions.len();

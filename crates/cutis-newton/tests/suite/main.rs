@@ -1,4 +1,4 @@
-//! Minimisers against closed forms, differences, and a solver of another kind.
+//! Minimizers against closed forms, differences, and a solver of another kind.
 
 mod blocks;
 mod closed_forms;

@@ -1,7 +1,7 @@
 //! Agreement with a solver that shares none of this crate's code: the scalar reference of XPBD, run to convergence.
 //!
 //! XPBD takes its gradients along the way of a step, not at its end, so that what it converges to with iterations differs from the
-//! minimiser by an error of the order of h². Halving h must take a quarter of it.
+//! minimizer by an error of the order of h². Halving h must take a quarter of it.
 
 use cutis_newton::{Options, Problem, relative_rms};
 use cutis_solver::{Formulation, Settings, Solver, SolverReference};

@@ -56,7 +56,7 @@ const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 440.0;
 /// Plot area: left, top, right, bottom.
 const AREA: [f64; 4] = [76.0, 44.0, 700.0, 384.0];
-/// Colours that can be told apart without full colour vision (Okabe and Ito, 2008).
+/// Colors that can be told apart without full color vision (Okabe and Ito, 2008).
 const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 
 /// An SVG document of several series with title, axes, ticks and legend. With more than [`INSIDE`] series the legend stands
@@ -100,13 +100,13 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
         ));
     }
     add(format_args!("<path d=\"M{left} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"black\"/>\n"));
-    let (middle, centre) = ((left + right) / 2.0, (top + bottom) / 2.0);
+    let (middle, center) = ((left + right) / 2.0, (top + bottom) / 2.0);
     let text = |x: f64, y: f64, rest: &str, label: &str| {
         format!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\"{rest}>{}</text>\n", escape(label))
     };
     add(format_args!("{}", text(middle, 26.0, " font-size=\"16\" font-weight=\"bold\"", title)));
     add(format_args!("{}", text(middle, HEIGHT - 12.0, "", x.label)));
-    add(format_args!("{}", text(20.0, centre, &format!(" transform=\"rotate(-90 20 {centre})\""), y.label)));
+    add(format_args!("{}", text(20.0, center, &format!(" transform=\"rotate(-90 20 {center})\""), y.label)));
     let legend = if beside { [right, top] } else { legend_corner(series, &across, &upward) };
     let bands_first = (0..series.len()).filter(|&n| series[n].mark == Mark::Band);
     let then_the_others = (0..series.len()).filter(|&n| series[n].mark != Mark::Band);

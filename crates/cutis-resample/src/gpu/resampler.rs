@@ -109,7 +109,7 @@ impl ResamplerGpu {
         Ok(resampler)
     }
 
-    /// Resamples through these positions, local metres, one per vertex. Does not wait for the device.
+    /// Resamples through these positions, local meters, one per vertex. Does not wait for the device.
     ///
     /// # Errors
     /// [`ResampleError::VertexCount`], [`ResampleError::NotFinite`], [`ResampleError::Gpu`].
@@ -127,7 +127,7 @@ impl ResamplerGpu {
         done
     }
 
-    /// Resamples through positions that lie on the device: x, y, z local metres less
+    /// Resamples through positions that lie on the device: x, y, z local meters less
     /// [`offset`](ResamplerOptions::offset), w ignored; vertices beyond the mesh's are ignored. Nothing is read back, and the
     /// host does not wait. A tet with a position that is not finite holds no voxel.
     ///

@@ -22,7 +22,7 @@ const MOST_TETS: usize = (u32::MAX >> 1) as usize;
 pub struct ResamplerOptions {
     /// The box of voxels to fill; the whole volume if there is none.
     pub region: Option<[Range<usize>; 3]>,
-    /// Positions on the device are local metres less this: the same `f32` subtraction for rest and deformed ones. A point in
+    /// Positions on the device are local meters less this: the same `f32` subtraction for rest and deformed ones. A point in
     /// the middle of the body serves precision best.
     pub offset: [f32; 3],
     /// Slices that are filled at a time. The result does not depend on it. Without it as many as memory limits allow.
@@ -31,7 +31,7 @@ pub struct ResamplerOptions {
 
 impl ResamplerOptions {
     /// The whole volume, with positions relative to the middle of the body at rest.
-    pub fn centred(warp: &Warp<'_>) -> Self {
+    pub fn centerd(warp: &Warp<'_>) -> Self {
         let widen = |(low, high): (Point3<f32>, Point3<f32>), p: &Point3<f32>| (low.inf(p), high.sup(p));
         let offset = warp.rest.first().map_or([0.0; 3], |&first| {
             let (low, high) = warp.rest.iter().fold((first, first), widen);
@@ -100,13 +100,13 @@ fn grid(
     let shape = volume.grid().shape;
     let space = IndexSpace::new(&volume.grid().affine, origin_mm, [&[], &[]]);
     let middle = space.linear * Vector3::from(offset.map(f64::from)) + space.offset;
-    let centre: [i32; 3] =
+    let center: [i32; 3] =
         std::array::from_fn(|axis| middle[axis].round().clamp(0.0, (shape[axis] - 1) as f64) as i32);
-    let place = |voxel: usize, axis: usize| (voxel as i64 - i64::from(centre[axis])) as f32;
+    let place = |voxel: usize, axis: usize| (voxel as i64 - i64::from(center[axis])) as f32;
     let first = std::array::from_fn(|axis| place(0, axis));
     let last = std::array::from_fn(|axis| place(shape[axis] - 1, axis));
     let linear = std::array::from_fn(|row| std::array::from_fn(|column| space.linear[(row, column)] as f32));
-    let offset = std::array::from_fn(|axis| (middle[axis] - f64::from(centre[axis])) as f32);
+    let offset = std::array::from_fn(|axis| (middle[axis] - f64::from(center[axis])) as f32);
 
     let amax = |p: &[f32; 4]| p[0].abs().max(p[1].abs()).max(p[2].abs());
     let body = f64::from(rest.par_iter().map(amax).reduce(|| 0.0, f32::max));
@@ -121,7 +121,7 @@ fn grid(
         shape: region.each_ref().map(|range| range.len() as u32),
         first,
         last,
-        centre,
+        center,
         air: i32::from(air),
         scanned: scanned_range(volume, air).map(i32::from),
         unused: 0,

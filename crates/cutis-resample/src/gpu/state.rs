@@ -2,7 +2,7 @@
 
 use crate::report::ResampleReport;
 
-/// In the key of an owner that only comes near a centre: any tet that holds it wins.
+/// In the key of an owner that only comes near a center: any tet that holds it wins.
 pub const NEAR: u32 = 1 << 31;
 /// The owner of a voxel that no tet claims.
 pub const NONE: u32 = u32::MAX;
@@ -10,7 +10,7 @@ pub const NONE: u32 = u32::MAX;
 /// The voxels of a slab after the passes over it, on the GPU or by its [`twin`](crate::twin).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlabState {
-    /// Key of the tet that each voxel belongs to: its number, with the highest bit set if it only comes near the centre;
+    /// Key of the tet that each voxel belongs to: its number, with the highest bit set if it only comes near the center;
     /// `u32::MAX` for none.
     pub owners: Vec<u32>,
     /// Three planes of a bit for each voxel, 32 voxels to a word: held strictly by a body tet, by two, covered at rest by a
@@ -69,7 +69,7 @@ impl SlabState {
 
     /// How far two states of a slab are apart; they have the same number of voxels.
     ///
-    /// On hardware that contracts `a * b + c` a centre within the rounding of a face can have another owner, and a value another
+    /// On hardware that contracts `a * b + c` a center within the rounding of a face can have another owner, and a value another
     /// rounding. [`SlabDifference`] tells such from errors.
     pub fn difference(&self, other: &Self) -> SlabDifference {
         let mut found = SlabDifference::default();

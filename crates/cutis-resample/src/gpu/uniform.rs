@@ -4,11 +4,11 @@ use bytemuck::{Pod, Zeroable};
 
 /// `struct Grid` of the kernels: the volume, the region of it that is filled, and the way from positions to places.
 ///
-/// A place is a voxel index relative to the voxel `centre` of the volume, so that `f32` is fine near the body.
+/// A place is a voxel index relative to the voxel `center` of the volume, so that `f32` is fine near the body.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Grid {
-    /// Rows of the matrix that turns positions (metres) into places (voxels).
+    /// Rows of the matrix that turns positions (meters) into places (voxels).
     pub linear: [[f32; 3]; 3],
     /// Place of the position zero.
     pub offset: [f32; 3],
@@ -23,7 +23,7 @@ pub struct Grid {
     /// Place of its last voxel.
     pub last: [f32; 3],
     /// The voxel at place zero.
-    pub centre: [i32; 3],
+    pub center: [i32; 3],
     /// Stored value of a vacated voxel.
     pub air: i32,
     /// Stored values that are no padding, both ends included.

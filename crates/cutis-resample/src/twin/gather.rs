@@ -22,8 +22,8 @@ fn trilinear(place: Vec3, volume: &Volume, grid: &Grid) -> i32 {
     let at: Vec3 = std::array::from_fn(|n| place[n].clamp(grid.first[n], grid.last[n]));
     let low = at.map(f32::floor);
     let f: Vec3 = std::array::from_fn(|n| at[n] - low[n]);
-    let l: [i32; 3] = std::array::from_fn(|n| low[n] as i32 + grid.centre[n]);
-    let h: [i32; 3] = std::array::from_fn(|n| (l[n] + 1).min(grid.last[n] as i32 + grid.centre[n]));
+    let l: [i32; 3] = std::array::from_fn(|n| low[n] as i32 + grid.center[n]);
+    let h: [i32; 3] = std::array::from_fn(|n| (l[n] + 1).min(grid.last[n] as i32 + grid.center[n]));
     let mut v: [i32; 8] = std::array::from_fn(|n| {
         let pick = |axis: usize| if n >> axis & 1 == 1 { h[axis] } else { l[axis] };
         voxel_at(volume, pick(0), pick(1), pick(2))
@@ -64,7 +64,7 @@ pub fn gather(mesh: &Mesh<'_>, slab: &Range<u32>, tets: &[[u32; 4]], volume: &Vo
         let at = voxel as u32;
         let index = [at % columns, at / columns % rows, slab.start + at / (columns * rows)];
         let point: Vec3 = std::array::from_fn(|n| grid.region[n] + index[n] as f32);
-        let [i, j, k]: [i32; 3] = std::array::from_fn(|n| point[n] as i32 + grid.centre[n]);
+        let [i, j, k]: [i32; 3] = std::array::from_fn(|n| point[n] as i32 + grid.center[n]);
         let owner = state.owners[voxel];
         let value = if owner == NONE {
             let gone = state.is_marked(2, voxel);

@@ -7,7 +7,7 @@ pub type Vec3 = [f32; 3];
 /// Four components of a `vec4f`.
 pub type Vec4 = [f32; 4];
 
-/// A tet over the voxels: on which side of its faces a centre lies, as far as `f32` can tell. Component c of a [`Vec4`] belongs to
+/// A tet over the voxels: on which side of its faces a center lies, as far as `f32` can tell. Component c of a [`Vec4`] belongs to
 /// the face opposite corner c.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tet {
@@ -81,7 +81,7 @@ pub fn tet_of(a: Vec3, b: Vec3, c: Vec3, d: Vec3, tolerance: f32) -> Tet {
     }
 }
 
-/// False for a tet whose volume cannot be told from zero, or is beyond `f32`: it holds no centre.
+/// False for a tet whose volume cannot be told from zero, or is beyond `f32`: it holds no center.
 pub fn has_volume(tet: &Tet) -> bool {
     tet.volume.is_finite()
         && (tet.near[0] + ((tet.near[1] + tet.near[2]) + tet.near[3])).is_finite()

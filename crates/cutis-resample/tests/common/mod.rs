@@ -4,7 +4,7 @@
 use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::Point3;
 
-/// Lattice mesh: rest positions in local metres, six tets per cell.
+/// Lattice mesh: rest positions in local meters, six tets per cell.
 pub struct Mesh {
     pub origin_mm: Point3<f64>,
     pub rest: Vec<Point3<f32>>,
@@ -45,7 +45,7 @@ pub fn lattice(grid: &Grid, cells: [usize; 3], low: [f64; 3], high: [f64; 3]) ->
     Mesh { origin_mm, rest, tets }
 }
 
-/// HU-like values in −1024…1976 that differ between all neighbours.
+/// HU-like values in −1024…1976 that differ between all neighbors.
 pub fn noise(grid: Grid, seed: u64) -> Volume {
     let value = |index: usize| {
         let mut x = (index as u64).wrapping_add(seed).wrapping_mul(0x9E37_79B9_7F4A_7C15);

@@ -163,7 +163,7 @@ fn padding_does_not_bleed_into_tissue() {
 }
 
 #[test]
-fn no_hu_is_invented_and_no_centre_falls_between_tets() {
+fn no_hu_is_invented_and_no_center_falls_between_tets() {
     let Some(gpu) = gpu() else { return };
     for (seed, cells) in [(1_u64, 1_usize), (2, 2), (3, 3), (4, 4), (5, 5), (6, 4), (7, 3), (8, 2)] {
         let grid = Grid { shape: [15, 14, 13], affine: oblique() };
@@ -197,7 +197,7 @@ fn a_region_equals_its_part_of_the_whole() {
     let scene = scenes::wave_with_shell_and_removed();
     let (whole, _) = run(&gpu, &scene);
     let region = [3..20, 4..5, 2..17];
-    let options = ResamplerOptions { region: Some(region), ..ResamplerOptions::centred(&scene.warp()) };
+    let options = ResamplerOptions { region: Some(region), ..ResamplerOptions::centerd(&scene.warp()) };
     let mut resampler = ResamplerGpu::new(&gpu, &scene.volume, &scene.warp(), &options).unwrap();
     resampler.resample(&scene.deformed).unwrap();
     let part = resampler.volume(&|_, _| {}).unwrap();

@@ -10,7 +10,7 @@ use crate::{gpu, open};
 fn quiet(_done: usize, _total: usize) {}
 
 fn resampler(gpu: &cutis_gpu::Gpu, scene: &Scene) -> ResamplerGpu {
-    ResamplerGpu::new(gpu, &scene.volume, &scene.warp(), &ResamplerOptions::centred(&scene.warp())).unwrap()
+    ResamplerGpu::new(gpu, &scene.volume, &scene.warp(), &ResamplerOptions::centerd(&scene.warp())).unwrap()
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn no_way_to_split_the_work_changes_a_bit() {
         assert_ne!(expected.0, scene.volume, "control: {} changes something", scene.name);
         for (gpu, slab) in [(&tiny, 1), (&odd, 2), (&baseline, 5), (&baseline, 1000)] {
             let options =
-                ResamplerOptions { slab_slices: Some(slab), ..ResamplerOptions::centred(&scene.warp()) };
+                ResamplerOptions { slab_slices: Some(slab), ..ResamplerOptions::centerd(&scene.warp()) };
             let mut resampler = ResamplerGpu::new(gpu, &scene.volume, &scene.warp(), &options).unwrap();
             resampler.resample(&scene.deformed).unwrap();
             assert_eq!(resampler.slabs(), scene.volume.grid().shape[2].div_ceil(slab));

@@ -29,8 +29,8 @@ struct Tet {
 
 impl Tet {
     /// `largest` is the largest place that matters; a corner may be farther away, and is less exact then.
-    fn new(corners: [Point3<f64>; 4], centre: Vector3<f64>, largest: f64) -> Self {
-        let place = |c: &Point3<f64>| (c.coords - centre).amax();
+    fn new(corners: [Point3<f64>; 4], center: Vector3<f64>, largest: f64) -> Self {
+        let place = |c: &Point3<f64>| (c.coords - center).amax();
         let place_error = PLACE_ERROR * corners.iter().map(place).fold(largest, f64::max);
         let middle = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / 4.0;
         let size: f64 = (0..3)
@@ -96,19 +96,19 @@ impl Oracle {
             let along = || rest.iter().map(|p| p[axis]);
             (along().fold(f64::MIN, f64::max) + along().fold(f64::MAX, f64::min)) / 2.0
         };
-        let centre = Vector3::from_fn(|axis, _| middle(axis).clamp(0.0, shape[axis]));
-        // Half a voxel because the GPU's centre is a voxel's.
+        let center = Vector3::from_fn(|axis, _| middle(axis).clamp(0.0, shape[axis]));
+        // Half a voxel because the GPU's center is a voxel's.
         let largest = rest
             .iter()
             .map(|p| p.coords)
             .chain([Vector3::zeros(), Vector3::from(shape)])
-            .fold(0.0, |most, p| (p - centre).amax().max(most))
+            .fold(0.0, |most, p| (p - center).amax().max(most))
             + 0.5;
         let tolerance = 2.0 * 16.0 * ROUNDING * largest;
         let pick = |positions: &[Point3<f64>], tet: &[u32; 4]| tet.map(|v| positions[v as usize]);
         let moved = |tet: &[u32; 4]| tet.iter().any(|&v| mesh.rest[v as usize] != deformed[v as usize]);
         let tets = |positions: &[Point3<f64>], list: &[[u32; 4]]| {
-            list.iter().map(|tet| Tet::new(pick(positions, tet), centre, largest)).collect::<Vec<_>>()
+            list.iter().map(|tet| Tet::new(pick(positions, tet), center, largest)).collect::<Vec<_>>()
         };
         let current = tets(&now, &mesh.tets);
         let left: Vec<[u32; 4]> = mesh.tets.iter().filter(|tet| moved(tet)).chain(removed).copied().collect();
@@ -122,12 +122,12 @@ impl Oracle {
             most: ResampleReport::default(),
         };
         for voxel in 0..grid.len() {
-            let centre = Point3::from(grid.point(voxel).map(|n| n as f64));
+            let center = Point3::from(grid.point(voxel).map(|n| n as f64));
             let mut allowed = Vec::new();
             let (mut is_sure, mut strict, mut may_be_moved, mut may_be_at_rest) =
                 (false, [0, 0], false, false);
             for (t, tet) in current.iter().enumerate() {
-                let distances = tet.distances(centre);
+                let distances = tet.distances(center);
                 let all = |slack: f64, errors: f64| tet.holds(&distances, slack, errors);
                 if !all(-tolerance, -1.0) {
                     continue;
@@ -156,7 +156,7 @@ impl Oracle {
             }
             let may_be_covered = !allowed.is_empty();
             let reach = |slack: f64, errors: f64| {
-                left.iter().any(|tet| tet.holds(&tet.distances(centre), slack, errors))
+                left.iter().any(|tet| tet.holds(&tet.distances(center), slack, errors))
             };
             let (mut may_be_vacated, mut is_vacated) = (false, false);
             if !is_sure {
@@ -269,7 +269,7 @@ impl<'a> Sampler<'a> {
         Vector3::from_fn(|axis, _| p[axis].clamp(0.0, shape[axis] as f64 - 1.0))
     }
 
-    /// The trilinear value as the contract has it; and that of the voxel itself where the place may be its centre.
+    /// The trilinear value as the contract has it; and that of the voxel itself where the place may be its center.
     fn at(&self, p: Vector3<f64>, error: f64) -> Vec<f64> {
         let p = self.clamped(p);
         let low: [i64; 3] = std::array::from_fn(|axis| p[axis].floor() as i64);

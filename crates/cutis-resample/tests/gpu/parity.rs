@@ -16,7 +16,7 @@ use crate::scenes::{self, Scene};
 const SLAB: usize = 7;
 
 fn options(scene: &Scene) -> ResamplerOptions {
-    ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centred(&scene.warp()) }
+    ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centerd(&scene.warp()) }
 }
 
 /// State of every slab and number of inverted tets, by kernels with changed sources.

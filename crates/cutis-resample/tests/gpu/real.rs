@@ -55,7 +55,7 @@ fn an_abdomen_is_the_same_but_for_roundings() {
     );
     // One of 256 places in a step between voxels rounds otherwise, for steps of up to 2000 HU and an error of 10⁻⁴ voxels.
     assert!(more_than(0) * 256 < apart.len());
-    // More than that only where one has air: a centre within the rounding of the body's surface, some 70 000 voxel faces large.
+    // More than that only where one has air: a center within the rounding of the body's surface, some 70 000 voxel faces large.
     let lowest = found.voxels().iter().copied().min().unwrap_or(0);
     let air = lowest.max(-1024);
     for ((&a, &b), &apart) in found.voxels().iter().zip(of_cpu.voxels()).zip(&apart) {
@@ -65,7 +65,7 @@ fn an_abdomen_is_the_same_but_for_roundings() {
     assert_eq!(report.inverted_tets, report_of_cpu.inverted_tets);
 
     if gpu.adapter().kind == AdapterKind::Software {
-        let options = ResamplerOptions::centred(&scene.warp());
+        let options = ResamplerOptions::centerd(&scene.warp());
         let (of_twin, report_of_twin) = twin::resample(&scene.volume, &scene.warp(), &options).unwrap();
         assert!(of_twin == found && report_of_twin == report);
     }

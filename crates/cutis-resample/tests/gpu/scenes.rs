@@ -22,7 +22,7 @@ impl Scene {
         Self { name, volume, mesh, deformed, body_tets, removed: Vec::new() }
     }
 
-    /// Each vertex through a map of local metres.
+    /// Each vertex through a map of local meters.
     pub fn moved(mut self, map: impl Fn(Point3<f64>) -> Point3<f64>) -> Self {
         self.deformed = self.mesh.rest.iter().map(|p| map(p.map(f64::from)).map(|c| c as f32)).collect();
         self
@@ -113,7 +113,7 @@ pub fn far() -> Scene {
     scene
 }
 
-/// Every vertex lies on a voxel's centre at rest, and beside one by about a rounding of its place afterwards.
+/// Every vertex lies on a voxel's center at rest, and beside one by about a rounding of its place afterwards.
 pub fn almost_whole_voxels() -> Scene {
     let grid = Grid { shape: [23, 19, 17], affine: oblique() };
     let [x, y, z] = [0, 1, 2].map(|axis| grid.affine.step_mm(axis) / 1000.0);

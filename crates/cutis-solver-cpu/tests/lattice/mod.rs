@@ -1,4 +1,4 @@
-//! A block of cubes cut into six tetrahedra each (Kuhn), with its colours in closed form. Shared by tests and benches;
+//! A block of cubes cut into six tetrahedra each (Kuhn), with its colors in closed form. Shared by tests and benches;
 //! it knows nothing of volumes, so that solver tests do not depend on how meshes are made from scans.
 
 use nalgebra::Point3;
@@ -12,20 +12,20 @@ const WALKS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 
 
 /// Vertices in rows along x, then y, then z.
 pub struct Kuhn {
-    /// In metres, from the origin.
+    /// In meters, from the origin.
     pub positions: Vec<Point3<f64>>,
     /// Two vertices each.
     pub edges: Vec<[u32; 2]>,
-    /// Direction × parity along the first axis of the direction: 14 colours.
+    /// Direction × parity along the first axis of the direction: 14 colors.
     pub edge_colors: Vec<u16>,
     /// Four vertices each, positively oriented.
     pub tets: Vec<[u32; 4]>,
-    /// Walk × (i + j + k) mod 4 of the cube: 24 colours.
+    /// Walk × (i + j + k) mod 4 of the cube: 24 colors.
     pub tet_colors: Vec<u16>,
 }
 
 impl Kuhn {
-    /// `size` vertices along each axis, `spacing` metres apart.
+    /// `size` vertices along each axis, `spacing` meters apart.
     pub fn new(size: [usize; 3], spacing: f64) -> Self {
         let points = || cells(size);
         let index = |p: [usize; 3]| (p[0] + size[0] * (p[1] + size[1] * p[2])) as u32;

@@ -79,9 +79,9 @@ fn every_kind_alone() {
     });
 }
 
-/// Every colour and the vertices split many times, and the limits no better than WebGPU asks for.
+/// Every color and the vertices split many times, and the limits no better than WebGPU asks for.
 #[test]
-fn split_colours_and_baseline_limits() {
+fn split_colors_and_baseline_limits() {
     for chunk_cap in [Some(7), Some(100), None] {
         on_each_adapter(GpuOptions { chunk_cap, baseline_limits: true, ..GpuOptions::default() }, |gpu| {
             for iterations in [1, 2] {

@@ -1,4 +1,4 @@
-//! Storage of one kind of constraint: flat arrays ordered by colour, checked when they are made.
+//! Storage of one kind of constraint: flat arrays ordered by color, checked when they are made.
 
 mod access;
 mod project;
@@ -12,7 +12,7 @@ use cutis_coloring::{Groups, Incidence};
 use cutis_constraints::{Constraint, Scalar};
 use nalgebra::Point3;
 
-use crate::coloured::SharedVertices;
+use crate::colored::SharedVertices;
 use crate::{Pull, SolverError, Step, Stiffness, Vertex};
 
 pub use access::{Load, Store};
@@ -48,7 +48,7 @@ pub trait Project<T: Scalar> {
     fn vertex_count(&self) -> usize;
 }
 
-/// All constraints of the kind `C`. No two of one colour share a vertex; every index is below `vertex_count`.
+/// All constraints of the kind `C`. No two of one color share a vertex; every index is below `vertex_count`.
 pub(crate) struct Batch<C, const N: usize, T, P> {
     vertex_count: usize,
     offsets: Vec<u32>,
@@ -59,7 +59,7 @@ pub(crate) struct Batch<C, const N: usize, T, P> {
 }
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
-    /// Checks everything that the inner loops rely on, then sorts the constraints by colour.
+    /// Checks everything that the inner loops rely on, then sorts the constraints by color.
     pub(crate) fn new(
         vertex_count: usize,
         indices: &[[u32; N]],

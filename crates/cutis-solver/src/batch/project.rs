@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use simba::simd::SimdValue;
 
 use super::{Batch, MOST_LANES, Project, Store};
-use crate::coloured::SharedVertices;
+use crate::colored::SharedVertices;
 use crate::{Pbd, Pull, Rule, Step, Values, Vertex, Xpbd, project};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
@@ -37,7 +37,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         }
     }
 
-    /// Projects constraints of one colour side by side, as many at once as there are lanes, and the rest one by one:
+    /// Projects constraints of one color side by side, as many at once as there are lanes, and the rest one by one:
     /// the same bits, since they share no vertex and each lane does what the scalar does.
     fn side_by_side<S: Store<T>, R: Rule<T>, L: Rule<T::Lanes>>(
         &self,

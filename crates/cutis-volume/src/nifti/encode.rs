@@ -9,7 +9,7 @@ use crate::{Affine, Grid, VolumeError};
 /// Where the voxels start: the header and an empty list of extensions.
 const VOXEL_OFFSET: usize = 352;
 const INT16: i16 = 4;
-const MILLIMETRE: u8 = 2;
+const MILLIMETER: u8 = 2;
 /// `NIFTI_XFORM_SCANNER_ANAT`.
 const SCANNER: i16 = 1;
 
@@ -31,7 +31,7 @@ pub(super) fn encode(path: &Path, grid: &Grid, slope: f32, intercept: f32) -> Re
     let (quaternion, handedness) = rotation(&grid.affine);
     header.f32(76, &[handedness, dx, dy, dz, 1.0, 1.0, 1.0, 1.0]);
     header.f32(108, &[VOXEL_OFFSET as f64, f64::from(slope), f64::from(intercept)]);
-    header.0[123] = MILLIMETRE;
+    header.0[123] = MILLIMETER;
     header.0[148..153].copy_from_slice(b"Cutis");
     header.i16(252, &[SCANNER, SCANNER]);
     let rows = grid.affine.rows();

@@ -36,12 +36,12 @@ pub struct HuStats {
 
 /// Reads NIfTI-1 or NIfTI-2, either byte order, compressed or not, with any integer or real voxel type.
 ///
-/// Position: sform if its code is above 0, else qform, else voxel sizes; metres and micrometres become millimetres. A slope of 0
+/// Position: sform if its code is above 0, else qform, else voxel sizes; meters and micrometers become millimeters. A slope of 0
 /// or NaN means unscaled. Memory: the int16 voxels and little else. Types above 16 bits are rounded to whole HU.
 ///
 /// # Errors
 /// Each names the file: [`VolumeError::Io`], [`VolumeError::MissingPartner`], [`VolumeError::NotNifti`],
-/// [`VolumeError::Header`], [`VolumeError::VoxelType`] for colour and complex voxels, [`VolumeError::SeveralVolumes`],
+/// [`VolumeError::Header`], [`VolumeError::VoxelType`] for color and complex voxels, [`VolumeError::SeveralVolumes`],
 /// [`VolumeError::Truncated`], [`VolumeError::TooLarge`], [`VolumeError::Range`], [`VolumeError::Infinite`].
 pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
     let path = path.as_ref();

@@ -1,4 +1,4 @@
-//! NIfTI-1 out: int16, millimetres, qform and sform the same with code 1.
+//! NIfTI-1 out: int16, millimeters, qform and sform the same with code 1.
 
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};

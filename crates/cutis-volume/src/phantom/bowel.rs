@@ -8,7 +8,7 @@ use super::solid::{Blob, Solid, norm, subtract};
 use super::tube;
 
 const GAS_HU: f32 = -955.0;
-/// Distance between neighbouring loops of small bowel, mm.
+/// Distance between neighboring loops of small bowel, mm.
 const LOOP_MM: f32 = 26.0;
 
 /// Stomach, small bowel and colon, in painting order.
@@ -26,7 +26,7 @@ fn stomach(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let antrum =
         Blob::new(person.place([-20.0, 52.0, 10.0]), [48.0, 22.0, 22.0].map(|r| r * size)).turned(1, -0.25);
     let blobs = [fundus, antrum];
-    let level = fundus.centre[1] + random.between(14.0, 30.0);
+    let level = fundus.center[1] + random.between(14.0, 30.0);
     vec![
         Part::new(blobs.map(Solid::Blob), [layer(0.0, 45.0), grainy(4.5, 22.0, 22.0)])
             .wobbly(3.0)
@@ -74,7 +74,7 @@ fn colon(person: &Habitus, random: &mut Random) -> Vec<Part> {
     parts
 }
 
-/// Loops through a jittered lattice of points, each joined to its nearest free neighbour.
+/// Loops through a jittered lattice of points, each joined to its nearest free neighbor.
 fn small_bowel(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let mut free = Vec::new();
     for k in -4..=4 {

@@ -12,8 +12,8 @@ const GENERATIONS: usize = 6;
 /// All parts of the chest, in painting order: lungs first, so that domes and heart press into them.
 pub(super) fn parts(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let lungs = [-1.0, 1.0].map(|side| {
-        let centre = person.place([side * 74.0, -4.0, 152.0]);
-        Solid::Blob(Blob::new(centre, [70.0, 100.0, 145.0]).squared(0.6))
+        let center = person.place([side * 74.0, -4.0, 152.0]);
+        Solid::Blob(Blob::new(center, [70.0, 100.0, 145.0]).squared(0.6))
     });
     let vessels: Vec<Solid> =
         [-1.0, 1.0].into_iter().flat_map(|side| vessel_tree(person, side, random)).collect();
@@ -59,8 +59,8 @@ fn domes(person: &Habitus, random: &mut Random) -> Vec<Part> {
     [(-1.0, 80.0), (1.0, 96.0)]
         .map(|(side, top)| {
             let top: f32 = top + random.between(-8.0, 8.0);
-            let centre = person.place([side * 72.0, -2.0, 0.0]);
-            let dome = Blob::new(centre, [82.0, 98.0, top]).squared(0.3);
+            let center = person.place([side * 72.0, -2.0, 0.0]);
+            let dome = Blob::new(center, [82.0, 98.0, top]).squared(0.3);
             Part::new([Solid::Blob(dome)], [layer(0.0, 48.0), grainy(3.0, -98.0, 14.0)])
                 .wobbly(1.5)
                 .in_cavity(0.0)

@@ -1,6 +1,6 @@
 //! Build of the person: outlines of skin, muscle and body cavity, the course of the spine, and the scanner table.
 //!
-//! RAS+ millimetres: x to the right, y to the front, z to the head; the lowest rib arch is near z = 0.
+//! RAS+ millimeters: x to the right, y to the front, z to the head; the lowest rib arch is near z = 0.
 
 use super::outline::Outline;
 use super::part::{Layer, Part, grainy, layer};

@@ -73,11 +73,11 @@ impl Phantom {
         let [nx, ny, nz] = shape.map(|n| n as f64);
         let (sx, sy) = (FIELD_OF_VIEW_MM / nx, FIELD_OF_VIEW_MM / ny);
         let length = (nz * sx.min(sy)).clamp(LENGTH_MM[0], LENGTH_MM[1]);
-        let grid = centred_grid(shape, [sx, sy, length / nz])?;
+        let grid = centerd_grid(shape, [sx, sy, length / nz])?;
         Ok(Self { grid, seed, anatomy: Anatomy::new(seed) })
     }
 
-    /// Where the voxel centres lie.
+    /// Where the voxel centers lie.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
@@ -163,7 +163,7 @@ fn zeros(shape: [usize; 3]) -> Result<Vec<i16>, VolumeError> {
 }
 
 /// The grid along +x, +y, +z whose middle is the origin.
-fn centred_grid(shape: [usize; 3], spacing_mm: [f64; 3]) -> Result<Grid, VolumeError> {
+fn centerd_grid(shape: [usize; 3], spacing_mm: [f64; 3]) -> Result<Grid, VolumeError> {
     let origin_mm = std::array::from_fn(|c| -0.5 * (shape[c] as f64 - 1.0) * spacing_mm[c]);
     Ok(Grid { shape, affine: Affine::from_spacing(spacing_mm, origin_mm)? })
 }

@@ -25,8 +25,8 @@ pub(super) fn rear_parts(person: &Habitus) -> Vec<Part> {
 fn upper_organs(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let size = random.between(0.93, 1.06);
     let shift = random.between(-8.0, 8.0);
-    let blob = |centre: [f32; 3], radii: [f32; 3]| {
-        Blob::new(person.place([centre[0], centre[1], centre[2] + shift]), radii.map(|r| r * size))
+    let blob = |center: [f32; 3], radii: [f32; 3]| {
+        Blob::new(person.place([center[0], center[1], center[2] + shift]), radii.map(|r| r * size))
     };
     let right_lobe = blob([74.0, 4.0, 44.0], [76.0, 82.0, 57.0]).squared(0.3).turned(1, 0.16);
     let left_lobe = blob([8.0, 48.0, 58.0], [74.0, 36.0, 32.0]).turned(1, 0.2);

@@ -49,7 +49,7 @@ fn catmull_rom(p: [f32; 4], t: f32) -> f32 {
     p[1] + t * (slope + t * (curve + t * twist))
 }
 
-/// A smooth path through `[x, y, z, radius]` points, with `steps` pieces between neighbours.
+/// A smooth path through `[x, y, z, radius]` points, with `steps` pieces between neighbors.
 pub(super) fn smooth_path(points: &[[f32; 4]], steps: usize) -> Vec<[f32; 4]> {
     let Some(last) = points.len().checked_sub(1) else { return Vec::new() };
     let mut path = Vec::with_capacity(last * steps + 1);

@@ -15,7 +15,7 @@ fn unit(hash: u64) -> f32 {
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Nearly normal, mean 0 and variance 1: the sum of the eight bytes of a hash, centred and scaled (Irwin–Hall, n = 8).
+/// Nearly normal, mean 0 and variance 1: the sum of the eight bytes of a hash, centerd and scaled (Irwin–Hall, n = 8).
 pub(super) fn normal(hash: u64) -> f32 {
     const PAIRS: u64 = 0x00FF_00FF_00FF_00FF;
     let pairs = (hash & PAIRS) + ((hash >> 8) & PAIRS);
@@ -42,9 +42,9 @@ impl Random {
         low + (high - low) * unit(hash(self.key, self.counter))
     }
 
-    /// A point with each coordinate within `reach` of `centre`.
-    pub(super) fn near(&mut self, centre: [f32; 3], reach: f32) -> [f32; 3] {
-        centre.map(|c| c + self.between(-reach, reach))
+    /// A point with each coordinate within `reach` of `center`.
+    pub(super) fn near(&mut self, center: [f32; 3], reach: f32) -> [f32; 3] {
+        center.map(|c| c + self.between(-reach, reach))
     }
 }
 

@@ -47,9 +47,9 @@ pub(super) fn fill(grid: &Grid, seed: u64, anatomy: &Anatomy, first: usize, out:
     let [nx, ny, _] = grid.shape;
     let [xs, ys, zs] = [0, 1, 2].map(|axis| Samples::new(grid, axis));
     let blend_mm = (xs.step + ys.step + zs.step) / 3.0;
-    let centres: Vec<f32> = (0..nx).map(|i| grid.mm([i, 0, 0]).x as f32).collect();
+    let centers: Vec<f32> = (0..nx).map(|i| grid.mm([i, 0, 0]).x as f32).collect();
     let noise =
-        Noise { key: hash(seed, NOISE_STREAM), edge_mm: -(centres[0] - 0.5 * xs.step * xs.factor as f32) };
+        Noise { key: hash(seed, NOISE_STREAM), edge_mm: -(centers[0] - 0.5 * xs.step * xs.factor as f32) };
 
     out.par_chunks_mut(nx * ny).enumerate().for_each(|(slice, out)| {
         let k = first + slice;
@@ -72,7 +72,7 @@ pub(super) fn fill(grid: &Grid, seed: u64, anatomy: &Anatomy, first: usize, out:
                 let y = grid.mm([0, j, 0]).y as f32;
                 let counter = grid.index([0, j, k]) as u64;
                 for (i, voxel) in out.iter_mut().enumerate() {
-                    *voxel = stored(sums[i] * scale + noise.at(centres[i], y, counter + i as u64));
+                    *voxel = stored(sums[i] * scale + noise.at(centers[i], y, counter + i as u64));
                 }
             },
         );
@@ -101,11 +101,11 @@ fn stored(hu: f32) -> i16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phantom::centred_grid;
+    use crate::phantom::centerd_grid;
 
     #[test]
-    fn samples_are_centred_on_their_voxels() -> Result<(), crate::VolumeError> {
-        let grid = centred_grid([4, 4, 2], [1.0, 6.0, 2.5])?;
+    fn samples_are_centerd_on_their_voxels() -> Result<(), crate::VolumeError> {
+        let grid = centerd_grid([4, 4, 2], [1.0, 6.0, 2.5])?;
         assert_eq!(Samples::new(&grid, 0).at, [-1.5, -0.5, 0.5, 1.5]);
         assert_eq!(Samples::new(&grid, 1).of(2), [1.0, 3.0, 5.0]);
         assert_eq!(Samples::new(&grid, 2).at, [-1.25, 1.25]);

@@ -11,17 +11,17 @@ use super::tube;
 const BONE: [Layer; 2] = [grainy(0.0, 720.0, 90.0), grainy(2.0, 240.0, 90.0)];
 /// Slender bone is mostly shell.
 const THIN_BONE: [Layer; 2] = [grainy(0.0, 680.0, 80.0), grainy(2.6, 330.0, 80.0)];
-/// Centre of the fifth lumbar vertebra, mm.
+/// Center of the fifth lumbar vertebra, mm.
 const LOWEST_MM: f32 = -138.0;
 const RIB_PAIRS: usize = 12;
 
-/// Centre and height of each vertebra with its disc, from the fifth lumbar one upwards.
+/// Center and height of each vertebra with its disc, from the fifth lumbar one upwards.
 fn vertebrae() -> impl Iterator<Item = (f32, f32)> {
     let height = |n: usize| (34.0 - n as f32).max(24.0);
     (0..18).scan(LOWEST_MM, move |z, n| {
-        let centre = *z;
+        let center = *z;
         *z += 0.5 * (height(n) + height(n + 1));
-        Some((centre, height(n)))
+        Some((center, height(n)))
     })
 }
 
@@ -100,7 +100,7 @@ fn ribs(person: &Habitus, random: &mut Random) -> Vec<Solid> {
     solids
 }
 
-/// A point of the half circle from the back (0) over the side to the front (1), by the rational parametrisation.
+/// A point of the half circle from the back (0) over the side to the front (1), by the rational parametrization.
 fn half_circle(along: f32) -> [f32; 2] {
     let t = (2.0 * along - 1.0).clamp(-1.0, 1.0);
     let scale = 1.0 / (1.0 + t * t);
@@ -172,9 +172,9 @@ mod tests {
 
     #[test]
     fn the_spine_has_five_lumbar_vertebrae_below_the_ribs() {
-        let centres: Vec<f32> = vertebrae().map(|(z, _)| z).collect();
-        assert!(centres.windows(2).all(|pair| pair[1] > pair[0] + 20.0));
-        assert!(centres[5] > 0.0 && centres[5] < 40.0, "the lowest rib starts at {}", centres[5]);
-        assert!(centres[17] > 300.0);
+        let centers: Vec<f32> = vertebrae().map(|(z, _)| z).collect();
+        assert!(centers.windows(2).all(|pair| pair[1] > pair[0] + 20.0));
+        assert!(centers[5] > 0.0 && centers[5] < 40.0, "the lowest rib starts at {}", centers[5]);
+        assert!(centers[17] > 300.0);
     }
 }

@@ -62,7 +62,7 @@ pub(super) fn norm(a: [f32; 3]) -> f32 {
 
 /// First-order distance to `q = 1` where `q² = (1 − s) Σu² + s √Σu⁴` blends an ellipsoid (`s = 0`) towards a rounded box.
 ///
-/// `gradient` maps the derivative by `u` to that by mm; `inradius` keeps the centre, where both vanish, well defined.
+/// `gradient` maps the derivative by `u` to that by mm; `inradius` keeps the center, where both vanish, well defined.
 #[inline(always)]
 pub(super) fn gauge_distance(
     u: [f32; 3],
@@ -82,15 +82,15 @@ pub(super) fn gauge_distance(
 /// An ellipsoid, turned at will and squared towards a rounded box.
 #[derive(Clone, Copy)]
 pub(super) struct Blob {
-    pub(super) centre: [f32; 3],
+    pub(super) center: [f32; 3],
     radii: [f32; 3],
     axes: [[f32; 3]; 3],
     squareness: f32,
 }
 
 impl Blob {
-    pub(super) fn new(centre: [f32; 3], radii: [f32; 3]) -> Self {
-        Self { centre, radii, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], squareness: 0.0 }
+    pub(super) fn new(center: [f32; 3], radii: [f32; 3]) -> Self {
+        Self { center, radii, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], squareness: 0.0 }
     }
 
     /// Towards a rounded box: 0 is the ellipsoid, 1 the superellipsoid of exponent 4.
@@ -117,17 +117,17 @@ impl Blob {
     fn bounds(&self) -> Bounds {
         let reach = |c: usize| (0..3).map(|a| self.axes[a][c].abs() * self.radii[a]).sum::<f32>();
         Bounds {
-            low: std::array::from_fn(|c| self.centre[c] - reach(c)),
-            high: std::array::from_fn(|c| self.centre[c] + reach(c)),
+            low: std::array::from_fn(|c| self.center[c] - reach(c)),
+            high: std::array::from_fn(|c| self.center[c] + reach(c)),
         }
     }
 
     fn lower_row(&self, xs: &[f32], y: f32, z: f32, distance: &mut [f32]) {
         let rows: [[f32; 3]; 3] = std::array::from_fn(|a| self.axes[a].map(|c| c / self.radii[a]));
-        let base = rows.map(|row| row[1] * (y - self.centre[1]) + row[2] * (z - self.centre[2]));
+        let base = rows.map(|row| row[1] * (y - self.center[1]) + row[2] * (z - self.center[2]));
         let inradius = self.radii[0].min(self.radii[1]).min(self.radii[2]);
         for (d, &x) in distance.iter_mut().zip(xs) {
-            let u: [f32; 3] = std::array::from_fn(|a| base[a] + rows[a][0] * (x - self.centre[0]));
+            let u: [f32; 3] = std::array::from_fn(|a| base[a] + rows[a][0] * (x - self.center[0]));
             let near = gauge_distance(u, self.squareness, inradius, |h| {
                 std::array::from_fn(|c| rows[0][c] * h[0] + rows[1][c] * h[1] + rows[2][c] * h[2])
             });

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{centred_grid, zeros};
+use super::{centerd_grid, zeros};
 use crate::{AIR_HU, Volume, VolumeError};
 
 /// A ball of `hu_inside` in air, in the middle of the grid, which is at the origin.
@@ -57,7 +57,7 @@ fn concentric(
         return Err(VolumeError::SphereRadii { radii_mm: radii_mm.to_vec() });
     }
     let mut voxels = zeros(shape)?;
-    let grid = centred_grid(shape, spacing_mm)?;
+    let grid = centerd_grid(shape, spacing_mm)?;
     let blend = grid.affine.spacing_mm().iter().sum::<f64>() / 3.0;
     let [nx, ny, _] = shape;
     let (air, inside) = (f64::from(AIR_HU), f64::from(hu_inside));

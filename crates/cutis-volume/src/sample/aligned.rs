@@ -98,17 +98,17 @@ fn reduce(volume: &Volume, k: usize, x: &[Taps], y: &[Taps]) -> Vec<f32> {
 
 /// The tent around a stop.
 fn taps(axis: Axis, stop: Stop) -> Taps {
-    let centre = axis.start + stop.at * axis.step;
+    let center = axis.start + stop.at * axis.step;
     let last = (axis.voxels - 1) as f64;
-    // Half a voxel beyond the last centre is still that voxel.
-    if !(-0.5..=last + 0.5).contains(&centre) {
+    // Half a voxel beyond the last center is still that voxel.
+    if !(-0.5..=last + 0.5).contains(&center) {
         return Taps { first: 0, weights: Vec::new() };
     }
-    let centre = centre.clamp(0.0, last);
+    let center = center.clamp(0.0, last);
     let radius = (stop.reach * axis.step).abs().max(1.0);
-    let first = (centre - radius).floor().max(0.0) as usize;
-    let end = (centre + radius).ceil().min(last) as usize;
-    let weight = |voxel: usize| (1.0 - (voxel as f64 - centre).abs() / radius).max(0.0);
+    let first = (center - radius).floor().max(0.0) as usize;
+    let end = (center + radius).ceil().min(last) as usize;
+    let weight = |voxel: usize| (1.0 - (voxel as f64 - center).abs() / radius).max(0.0);
     let used: Vec<usize> = (first..=end).filter(|&voxel| weight(voxel) > 0.0).collect();
     let sum: f64 = used.iter().map(|&voxel| weight(voxel)).sum();
     Taps { first: used[0], weights: used.iter().map(|&voxel| (weight(voxel) / sum) as f32).collect() }

@@ -13,7 +13,7 @@ const MOST_VERTICES: u64 = u32::MAX as u64;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LatticeSize {
-    /// A vertex on every voxel centre.
+    /// A vertex on every voxel center.
     Native,
     /// The spacing nearest to this, mm, that divides the extent of the volume evenly.
     SpacingMm(f64),
@@ -42,7 +42,7 @@ impl FromStr for LatticeSize {
     }
 }
 
-/// The grid of a lattice over `voxels`: along each axis from the first voxel centre to the last one.
+/// The grid of a lattice over `voxels`: along each axis from the first voxel center to the last one.
 ///
 /// # Errors
 /// [`VolumeError::LatticeSpacing`] for a spacing that is no positive length; [`VolumeError::LatticeSize`] for fewer than two

@@ -34,7 +34,7 @@ pub fn to_grid(volume: &Volume, grid: &Grid) -> Vec<f32> {
 
 /// HU at the points of planes that need not lie evenly: `planes` holds their positions along the three axes in steps of `grid`,
 /// ascending. The result has a value for each combination of planes, the first axis fastest. Half the width of the tent around a
-/// plane is the mean of the steps to its two neighbours. Where the planes are those of `grid`, the bits are those of [`to_grid`].
+/// plane is the mean of the steps to its two neighbors. Where the planes are those of `grid`, the bits are those of [`to_grid`].
 ///
 /// ```
 /// use cutis_volume::{Affine, Grid, Volume, sample};

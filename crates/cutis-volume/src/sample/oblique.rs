@@ -25,25 +25,25 @@ pub(super) fn sample(volume: &Volume, map: &IndexMap, stops: &[Vec<Stop>; 3]) ->
     out.par_iter_mut().enumerate().with_min_len(256).for_each(|(n, hu)| {
         let stop = [n % nx, n / nx % ny, n / (nx * ny)];
         let [i, j, k] = std::array::from_fn(|axis| stops[axis][stop[axis]].at);
-        let centre = map.origin + map.steps[0] * i + map.steps[1] * j + map.steps[2] * k;
-        *hu = at(volume, centre, std::array::from_fn(|axis| &tents[axis][stop[axis]]));
+        let center = map.origin + map.steps[0] * i + map.steps[1] * j + map.steps[2] * k;
+        *hu = at(volume, center, std::array::from_fn(|axis| &tents[axis][stop[axis]]));
     });
     out
 }
 
-fn at(volume: &Volume, centre: Point3<f64>, along: [&Tent; 3]) -> f32 {
-    // Half a voxel beyond the last centre is still that voxel.
+fn at(volume: &Volume, center: Point3<f64>, along: [&Tent; 3]) -> f32 {
+    // Half a voxel beyond the last center is still that voxel.
     let inside = |index: &Point3<f64>| {
         (0..3).all(|axis| (-0.5..=volume.grid().shape[axis] as f64 - 0.5).contains(&index[axis]))
     };
-    if !inside(&centre) {
+    if !inside(&center) {
         return AIR_HU;
     }
     let (mut sum, mut total) = (0.0, 0.0);
     for (z, weight_z) in along[2] {
         for (y, weight_y) in along[1] {
             for (x, weight_x) in along[0] {
-                let index = centre + x + y + z;
+                let index = center + x + y + z;
                 if inside(&index) {
                     let weight = weight_x * weight_y * weight_z;
                     sum += weight * f64::from(volume.trilinear(index).max(AIR_HU));

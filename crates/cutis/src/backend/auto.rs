@@ -5,9 +5,9 @@ use cutis_solver::Vertex;
 
 use super::Work;
 
-/// Constraints of a colour, on average, or vertices in vertex block descent, from which `auto` takes a GPU of its own memory.
+/// Constraints of a color, on average, or vertices in vertex block descent, from which `auto` takes a GPU of its own memory.
 ///
-/// A colour is one dispatch, and colours run one after the other. What a dispatch costs before it computes anything (launch,
+/// A color is one dispatch, and colors run one after the other. What a dispatch costs before it computes anything (launch,
 /// and the barrier to the one before) is of the order of 10 µs on a GPU; the CPU backend projects about 40 constraints per
 /// microsecond and core (the demo on two cores: 57 million projections in 0.7 s). With fewer constraints than
 /// 40 × 10 µs × cores, several thousand on a common machine, the CPU is done before a GPU has begun; and a large GPU needs
@@ -40,7 +40,7 @@ pub(super) fn weigh(
     let per_sweep = work.elements / work.sweeps.max(1);
     if per_sweep < MIN_PER_SWEEP {
         return Ok(Verdict::Cpu(format!(
-            "{per_sweep} {element} of a colour are too few for a GPU, which pays from about {MIN_PER_SWEEP}"
+            "{per_sweep} {element} of a color are too few for a GPU, which pays from about {MIN_PER_SWEEP}"
         )));
     }
     if work.evaluations < MIN_EVALUATIONS {
@@ -61,7 +61,7 @@ pub(super) fn weigh(
         match objection(adapter).or_else(|| too_small_for(adapter, work, per_sweep)) {
             Some(why) => first_objection = first_objection.or(Some(why)),
             None => {
-                let reason = format!("{per_sweep} {element} of a colour keep a {} GPU busy", adapter.kind);
+                let reason = format!("{per_sweep} {element} of a color keep a {} GPU busy", adapter.kind);
                 return Ok(Verdict::Gpu(adapter.clone(), reason));
             }
         }
@@ -90,7 +90,7 @@ fn too_small_for(adapter: &Adapter, work: &Work, per_sweep: u64) -> Option<Strin
     let pays_from = MIN_PER_SWEEP * SHARED_MEMORY_FACTOR;
     if adapter.kind == AdapterKind::Integrated && per_sweep < pays_from {
         return Some(format!(
-            "{per_sweep} {} of a colour are too few for {}, which shares the processor's memory and pays from about \
+            "{per_sweep} {} of a color are too few for {}, which shares the processor's memory and pays from about \
              {pays_from}",
             work.element, adapter.name
         ));

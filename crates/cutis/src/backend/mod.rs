@@ -38,7 +38,7 @@ pub(crate) struct Work {
     pub(crate) element: &'static str,
     /// Of these, all that an iteration goes through.
     pub(crate) elements: u64,
-    /// Colours that an iteration executes one after the other.
+    /// Colors that an iteration executes one after the other.
     pub(crate) sweeps: u64,
     /// Projections of the whole run, or steps of a vertex.
     pub(crate) projections: u64,

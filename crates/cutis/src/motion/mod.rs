@@ -30,7 +30,7 @@ pub(crate) trait Motion {
     /// Time since the start of the first frame, s.
     fn time_s(&self) -> f64;
 
-    /// Where chosen vertices are, in local metres.
+    /// Where chosen vertices are, in local meters.
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error>;
 
     /// The state after so many frames.
@@ -43,7 +43,7 @@ pub(crate) trait Motion {
 /// The end of a run.
 #[derive(Default)]
 pub(crate) struct End {
-    /// Local metres, one per vertex.
+    /// Local meters, one per vertex.
     pub(crate) positions: Vec<Point3<f32>>,
     pub(crate) residuals: Vec<KindResidual>,
     pub(crate) chainmail: Option<ChainmailReport>,

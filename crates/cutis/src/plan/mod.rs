@@ -1,4 +1,4 @@
-//! What a scene will do, before it does it: sizes, colours, memory, what is left out, and which backend.
+//! What a scene will do, before it does it: sizes, colors, memory, what is left out, and which backend.
 
 mod costs;
 
@@ -30,7 +30,7 @@ pub struct Plan {
     pub backend: Backend,
     /// Element counts.
     pub sizes: Sizes,
-    /// Colours per constraint kind; in vertex block descent those of the vertices, as `descent`, and no others.
+    /// Colors per constraint kind; in vertex block descent those of the vertices, as `descent`, and no others.
     pub colors: BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
@@ -114,7 +114,7 @@ pub(crate) fn prepare(
     let body = clock.stage("lattice, skin, incision", 0, |_| Body::build(loaded, &source.volume))?;
     let matter = match loaded.scene.model {
         Model::Pbd => {
-            let dynamics = clock.stage("constraints and colours", 0, |_| dynamics::build(loaded, &body))?;
+            let dynamics = clock.stage("constraints and colors", 0, |_| dynamics::build(loaded, &body))?;
             Matter::Dynamics(Box::new(dynamics))
         }
         Model::Chainmail => {

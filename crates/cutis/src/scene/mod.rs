@@ -1,6 +1,6 @@
 //! The scene file: everything that a run depends on, as plain data with units in the key names.
 //!
-//! Positions are world millimetres in the volume's RAS+ frame. Unknown keys are refused. [`Scene::load`] reads a
+//! Positions are world millimeters in the volume's RAS+ frame. Unknown keys are refused. [`Scene::load`] reads a
 //! file, applies overrides and checks every value; each section is a struct of this module.
 
 mod choice;
@@ -25,7 +25,7 @@ pub struct Scene {
     pub model: Model,
     /// Where the CT comes from.
     pub volume: VolumeSection,
-    /// The tetrahedral lattice laid over the volume. Left out: one vertex on every voxel centre.
+    /// The tetrahedral lattice laid over the volume. Left out: one vertex on every voxel center.
     #[serde(default)]
     pub lattice: LatticeSection,
     /// What is tissue, and what it weighs.

@@ -10,7 +10,7 @@ const HEAD: &str = "# Scene reference
 
 Written by `cutis scene reference` from the schema of the program; do not edit by hand.
 
-A scene is a TOML file. Lengths are millimetres and positions world millimetres in the volume's RAS+ frame (x right,
+A scene is a TOML file. Lengths are millimeters and positions world millimeters in the volume's RAS+ frame (x right,
 y anterior, z superior); everything else is SI. Moduli, lengths, factors and durations are above 0 unless their row says
 otherwise. Unknown keys and values out of range are refused by name. `cutis scene new` prints a scene to start from.
 ";

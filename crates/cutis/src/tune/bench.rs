@@ -37,7 +37,7 @@ pub(super) struct Run {
     pub(super) fields: Vec<Field>,
     /// What each wound opened by, mm: mean distance of its lips, last frame less before the first.
     pub(super) growths_mm: Vec<f64>,
-    /// Local metres, one per vertex of the body, at the end; empty if it was stopped before.
+    /// Local meters, one per vertex of the body, at the end; empty if it was stopped before.
     pub(super) positions: Vec<Point3<f32>>,
     pub(super) residuals: Vec<Residual>,
     /// Of the solver, on the host and on the device.

@@ -7,13 +7,13 @@ use nalgebra::{Point3, Vector3};
 /// Rounding, as a share of the body's extent.
 const ROUNDING: f64 = 1e-6;
 
-/// The vertices that can move, and where they are at rest, in local metres.
+/// The vertices that can move, and where they are at rest, in local meters.
 pub(super) struct Movable {
     vertices: Vec<u32>,
     rest: Vec<Point3<f64>>,
 }
 
-/// One displacement per vertex that can move, metres.
+/// One displacement per vertex that can move, meters.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field(pub(super) Vec<Vector3<f32>>);
 
@@ -33,7 +33,7 @@ impl Movable {
         &self.vertices
     }
 
-    /// The longest side of their bounding box at rest, metres.
+    /// The longest side of their bounding box at rest, meters.
     fn extent(&self) -> f64 {
         let side = |axis: usize| {
             let values = self.rest.iter().map(|position| position[axis]);
@@ -43,7 +43,7 @@ impl Movable {
         (0..3).map(side).fold(0.0, f64::max)
     }
 
-    /// Displacements of this length, metres, are made by the rounding of the rest shape to `f32`.
+    /// Displacements of this length, meters, are made by the rounding of the rest shape to `f32`.
     pub(super) fn rounding(&self) -> f64 {
         ROUNDING * self.extent()
     }
@@ -59,12 +59,12 @@ impl Movable {
 }
 
 impl Field {
-    /// Root of the mean square, metres.
+    /// Root of the mean square, meters.
     pub(super) fn rms(&self) -> f64 {
         self.mean(self.0.iter().map(|d| d.map(f64::from).norm_squared()))
     }
 
-    /// Root of the mean squared distance to another field of the same vertices, metres.
+    /// Root of the mean squared distance to another field of the same vertices, meters.
     pub(super) fn rms_to(&self, other: &Self) -> f64 {
         let apart =
             |(a, b): (&Vector3<f32>, &Vector3<f32>)| (a.map(f64::from) - b.map(f64::from)).norm_squared();

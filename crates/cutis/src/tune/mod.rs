@@ -76,7 +76,7 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
     let mut clock = Clock::new(progress);
     let Prepared { source, body, backend, plan, .. } =
         plan::prepare(loaded, Request::of(loaded)?, &mut clock)?;
-    // With the colours of the vertices, which every formulation but one passes by.
+    // With the colors of the vertices, which every formulation but one passes by.
     let Dynamics { system, settings, .. } = clock.stage("constraints of all formulations", 0, |_| {
         let mut all = loaded.clone();
         all.scene.solver.formulation = FormulationChoice::Vbd;

@@ -83,7 +83,7 @@ impl<'a> Sampler<'a> {
         })
     }
 
-    /// The displacement of a point in mm, in metres: zero where there is no tetrahedron near.
+    /// The displacement of a point in mm, in meters: zero where there is no tetrahedron near.
     pub(super) fn displacement(&self, mm: Point3<f64>) -> Vector3<f32> {
         let point: Point3<f64> = self.mesh.frame.to_local(mm).cast();
         let [x, y, z] = self.around(mm);

@@ -1,4 +1,4 @@
-//! A start from a coarser level: the substep is first minimised among displacements that a coarse grid interpolates.
+//! A start from a coarser level: the substep is first minimized among displacements that a coarse grid interpolates.
 //!
 //! The grid spans the body at rest, trilinear between its nodes, and knows nothing of a cut; Gauss–Newton with a direct
 //! solution and a line search, so that no better start is to be had from this space.
@@ -77,7 +77,7 @@ fn moved(shares: &Shares, moves: &DVector<f64>) -> Vector3<f64> {
     shares.iter().map(|&(node, share)| moves.fixed_rows::<3>(3 * node) * share).sum()
 }
 
-/// What the substep minimises, in J.
+/// What the substep minimizes, in J.
 fn objective(step: &Step<'_>, x: &[Point3<f64>]) -> f64 {
     let free = (0..x.len()).filter(|&v| step.moves(v));
     let inertia: f64 = free

@@ -1,4 +1,4 @@
-//! Trials of accelerations: how many sweeps a substep takes with each, serial and in `f64`, against its minimiser.
+//! Trials of accelerations: how many sweeps a substep takes with each, serial and in `f64`, against its minimizer.
 //!
 //! What wins here and is not dearer belongs into the solvers; what does not is reported and stays out of them. The sweeps are
 //! this module's own, written from the formulas; that they are those of the solvers is one of the checks.
@@ -34,7 +34,7 @@ pub const SUBSTEPS: [u32; 4] = [1, 5, 10, 20];
 /// An error beyond this is not one of an iteration that converges.
 const DIVERGED: f64 = 1e3;
 
-/// Which sweeps go through the colours backwards.
+/// Which sweeps go through the colors backwards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     /// None.

@@ -64,14 +64,14 @@ pub fn page(origin: &Origin, tried: &[Tried]) -> String {
          How many sweeps an implicit substep takes until its error E1 (see [accuracy.md](accuracy.md)) stays below {one} / {two}, \
          serially and in `f64`, of at most {MOST_SWEEPS}. The moment is the first instant of the problem, when the body moves most. \
          In brackets the least error where {one} is not reached. What a recipe costs beside its sweeps (dot products of \
-         Anderson's, the coarse solution) is left out, in favour of the recipes.\n\n\
+         Anderson's, the coarse solution) is left out, in favor of the recipes.\n\n\
          - *ω*: each change is taken so many times.\n\
-         - *there and back*: every other sweep goes through the colours backwards, as in symmetric Gauss–Seidel.\n\
+         - *there and back*: every other sweep goes through the colors backwards, as in symmetric Gauss–Seidel.\n\
          - *half there, half back*: the second half of the sweeps does; their number was raised by a quarter at a time.\n\
          - *Chebyshev ρ*: semi-iterative weights for an assumed spectral radius, from the second sweep on.\n\
          - *Anderson m*: the combination of the last m + 1 iterates whose changes cancel best; for XPBD the multipliers are combined \
          with the same weights.\n\
-         - *coarse start*: the substep is first minimised among the displacements that a grid of {COARSER} times the lattice's mean \
+         - *coarse start*: the substep is first minimized among the displacements that a grid of {COARSER} times the lattice's mean \
          edge interpolates, by Gauss–Newton to its end; a multilevel method could start from nothing better.\n",
         origin.command,
         origin.commit.as_deref().unwrap_or("unknown"),

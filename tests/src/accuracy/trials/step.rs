@@ -97,7 +97,7 @@ impl<'a> Step<'a> {
         self.system.kinds()
     }
 
-    /// One sweep, `relaxed` as in over-relaxation, in the order of the colours or against it.
+    /// One sweep, `relaxed` as in over-relaxation, in the order of the colors or against it.
     pub fn sweep(&self, method: Method, iterate: &mut Iterate, relaxed: f64, backwards: bool) {
         match method {
             Method::Xpbd => self.project_all(iterate, relaxed, backwards),

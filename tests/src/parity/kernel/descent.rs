@@ -1,4 +1,4 @@
-//! Vertex block descent: one iteration over all colours, there and back, from a body out of shape.
+//! Vertex block descent: one iteration over all colors, there and back, from a body out of shape.
 
 use cutis_conformance::Alteration;
 use cutis_gpu::{BindGroup, Gpu, Kernel};
@@ -23,7 +23,7 @@ enum Wrong {
     Pull([&'static str; 2]),
     /// The same of `descend`.
     Descend([&'static str; 2]),
-    /// The colours are gone through one way only.
+    /// The colors are gone through one way only.
     OneWay,
 }
 
@@ -167,7 +167,7 @@ impl Body {
         Ok(gpu.read(&vertices, 0..vertices.len())?)
     }
 
-    /// A colour's vertices, and the constraints on them.
+    /// A color's vertices, and the constraints on them.
     fn color(&self, gpu: &Gpu, [pull, descend]: [&Kernel; 2], chosen: &[u32]) -> Result<Color, Failure> {
         let (set, descent) = (self.set(), self.descent()?);
         let moved = chosen.len();
@@ -179,7 +179,7 @@ impl Body {
                 shares.push([n, start, places.len() as u32]);
             }
         }
-        let order = gpu.buffer("vertices of a colour", chosen)?;
+        let order = gpu.buffer("vertices of a color", chosen)?;
         let chosen = gpu.bind(descend, 1, &[(0, order.whole())])?;
         if shares.is_empty() {
             return Ok(Color { chosen, len: moved, acting: None });
@@ -206,7 +206,7 @@ impl Body {
 
 struct Color {
     chosen: BindGroup,
-    /// Vertices of the colour.
+    /// Vertices of the color.
     len: usize,
     /// Nothing where no constraint acts.
     acting: Option<(BindGroup, usize)>,

@@ -33,7 +33,7 @@ struct Scene {
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     let name = "resample: one slab";
     let scene = Scene::new()?;
-    let options = ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centred(&scene.warp()) };
+    let options = ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centerd(&scene.warp()) };
     let expected =
         twin::resample_slab(&scene.volume, &scene.warp(), &options, NUMBER * SLAB..(NUMBER + 1) * SLAB)?;
     let measure = |gpu: &Gpu, policy, deformed: &[Point3<f32>]| {

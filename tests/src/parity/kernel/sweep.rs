@@ -1,4 +1,4 @@
-//! One sweep over all colours of a kind: PBD, XPBD, and XPBD a second time with the multipliers of the first.
+//! One sweep over all colors of a kind: PBD, XPBD, and XPBD a second time with the multipliers of the first.
 
 use std::ops::Range;
 
@@ -21,9 +21,9 @@ type Swept = (Vec<[f32; 4]>, Vec<f32>);
 enum Wrong {
     Nothing,
     Shader(Alteration),
-    /// A colour is skipped.
+    /// A color is skipped.
     Skipped,
-    /// The last constraint of each colour is.
+    /// The last constraint of each color is.
     Short,
 }
 
@@ -82,8 +82,8 @@ fn compare(
     for (what, wrong) in [
         ("value × 1.001", Wrong::Shader(Alteration::Value)),
         ("gradients 0 and 1 swapped", Wrong::Shader(Alteration::Swapped(0, 1))),
-        ("a skipped colour", Wrong::Skipped),
-        ("a colour one short", Wrong::Short),
+        ("a skipped color", Wrong::Skipped),
+        ("a color one short", Wrong::Short),
     ] {
         bench.control(Ring::Kernel, &name, what, |gpu, policy| measure(gpu, policy, wrong))?;
     }
@@ -194,7 +194,7 @@ impl Body {
         Ok((gpu.read(&vertices, 0..vertices.len())?, found))
     }
 
-    /// The constraints of each dispatch: colours, split where they are too large.
+    /// The constraints of each dispatch: colors, split where they are too large.
     fn chunks(&self, gpu: &Gpu, wrong: Wrong) -> Vec<Range<usize>> {
         let set = &*self.simulation.system().kinds()[0];
         let most = gpu.chunk_len(size_of::<f32>() * set.arity().max(set.param_count()));

@@ -10,7 +10,7 @@ const HEADER: usize = 8 + 32 + 4 + 8;
 /// The checksum behind the state.
 const SEAL: usize = 32;
 
-/// Positions in local metres and velocities in m/s, x, y, z of each vertex in turn.
+/// Positions in local meters and velocities in m/s, x, y, z of each vertex in turn.
 pub struct State {
     pub positions: Vec<f32>,
     pub velocities: Vec<f32>,

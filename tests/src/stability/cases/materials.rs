@@ -108,7 +108,7 @@ fn amplifications() -> Vec<Case> {
     cases
 }
 
-/// Neighbours a million times as heavy.
+/// Neighbors a million times as heavy.
 fn masses() -> Vec<Case> {
     let mut cases = Vec::new();
     for law in [Law::SOFT, Law::RIGID, Law::PBD, Law::DESCENT] {

@@ -1,4 +1,4 @@
-//! What elements and links look like. Colours can be told apart without full colour vision (Okabe and Ito, 2008), and shapes, sizes
+//! What elements and links look like. Colors can be told apart without full color vision (Okabe and Ito, 2008), and shapes, sizes
 //! and widths say the same.
 
 use super::svg::{Point, Svg};

@@ -26,7 +26,7 @@ pub struct Panel {
 pub enum Sample {
     Element(Look, &'static str),
     Link(Line, &'static str),
-    /// Colours of distances up to so many steps.
+    /// Colors of distances up to so many steps.
     Distances(f64),
 }
 

@@ -32,7 +32,7 @@ impl Svg {
         self.add(format_args!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" {style}/>\n"));
     }
 
-    /// A square by its centre and half its side.
+    /// A square by its center and half its side.
     pub fn square(&mut self, [x, y]: Point, half: f64, style: &str) {
         let (left, top, side) = (x - half, y - half, 2.0 * half);
         self.add(format_args!(

@@ -81,7 +81,7 @@ pub struct IncisionSection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandleSection {
-    /// Centre of the sphere that is grabbed, mm.
+    /// Center of the sphere that is grabbed, mm.
     pub at_mm: [f64; 3],
     /// Radius of the sphere, mm.
     pub radius_mm: f64,

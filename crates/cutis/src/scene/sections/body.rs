@@ -42,11 +42,11 @@ pub struct PhantomSection {
     pub seed: u64,
 }
 
-/// The lattice: at most one of `spacing_mm` and `vertices`; neither puts a vertex on every voxel centre.
+/// The lattice: at most one of `spacing_mm` and `vertices`; neither puts a vertex on every voxel center.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LatticeSection {
-    /// Distance between neighbouring vertices, mm.
+    /// Distance between neighboring vertices, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spacing_mm: Option<f64>,
     /// Vertices per axis, at least 2.
@@ -94,7 +94,7 @@ pub struct GradingSection {
     /// Highest corner of the box, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_mm: Option<[f64; 3]>,
-    /// Largest ratio of neighbouring steps along an axis: above 1, at most 2.
+    /// Largest ratio of neighboring steps along an axis: above 1, at most 2.
     #[serde(default = "GradingSection::default_growth")]
     pub growth: f64,
     /// Longest step, in steps of the fine zone: above 1, at most 8.

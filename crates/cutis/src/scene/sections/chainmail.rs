@@ -54,7 +54,7 @@ pub struct ChainMaterialSection {
     pub longest: PerAxis,
     /// Farthest that the ends of a link move apart across it, 0 to 16.
     pub shear: PerAxis,
-    /// How near to where its neighbours ask it to be relaxation leaves an element, in lattice steps, 0 to 4096; 0 is elastic.
+    /// How near to where its neighbors ask it to be relaxation leaves an element, in lattice steps, 0 to 4096; 0 is elastic.
     #[serde(default)]
     pub k_steps: f64,
 }

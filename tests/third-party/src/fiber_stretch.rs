@@ -1,9 +1,9 @@
-//! Fibre stretch: a tetrahedron keeps its length along a fibre.
+//! Fiber stretch: a tetrahedron keeps its length along a fiber.
 
 use cutis_constraints::{Constraint, Eval, Real};
 use nalgebra::{Point3, Vector3};
 
-/// A tetrahedron keeps its length along a fibre.
+/// A tetrahedron keeps its length along a fiber.
 ///
 /// ```text
 /// f   = F a = b1 e1 + b2 e2 + b3 e3,  e_i = x_i − x_0
@@ -11,32 +11,32 @@ use nalgebra::{Point3, Vector3};
 /// ∇iC = b_i f/|f|,  ∇0C = −(b1 + b2 + b3) f/|f|       [1/m]
 /// ```
 ///
-/// `F` is the deformation gradient and `a` the direction of the fibre at rest; `b = D⁻¹ a`, where the columns of `D` are the edges
-/// at rest. Parameters `[b1, b2, b3, s]`, `b` in 1/m. The gradient is zero where the fibre has shrunk to a point.
+/// `F` is the deformation gradient and `a` the direction of the fiber at rest; `b = D⁻¹ a`, where the columns of `D` are the edges
+/// at rest. Parameters `[b1, b2, b3, s]`, `b` in 1/m. The gradient is zero where the fiber has shrunk to a point.
 #[derive(Clone, Copy, Debug)]
-pub struct FibreStretch;
+pub struct FiberStretch;
 
-/// How a [`FibreStretch`] is built from its rest shape.
+/// How a [`FiberStretch`] is built from its rest shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fibre {
+pub struct Fiber {
     /// Direction at rest; of any length but 0.
     pub direction: [f64; 3],
-    /// Rest length over initial length: below 1 the fibre contracts.
+    /// Rest length over initial length: below 1 the fiber contracts.
     pub rest_stretch: f64,
 }
 
-impl Constraint<4> for FibreStretch {
-    const NAME: &'static str = "fibre_stretch";
-    const WGSL: &'static str = include_str!("fibre_stretch.wgsl");
+impl Constraint<4> for FiberStretch {
+    const NAME: &'static str = "fiber_stretch";
+    const WGSL: &'static str = include_str!("fiber_stretch.wgsl");
     type Params<T: Real> = [T; 4];
-    type Material = Fibre;
+    type Material = Fiber;
 
-    fn from_rest<T: Real>([x0, x1, x2, x3]: &[Point3<T>; 4], fibre: &Fibre) -> [T; 4] {
+    fn from_rest<T: Real>([x0, x1, x2, x3]: &[Point3<T>; 4], fiber: &Fiber) -> [T; 4] {
         let (e1, e2, e3) = (x1 - x0, x2 - x0, x3 - x0);
-        let a = Vector3::from(fibre.direction).normalize().map(T::constant);
+        let a = Vector3::from(fiber.direction).normalize().map(T::constant);
         let determinant = e1.dot(&e2.cross(&e3));
         let b = [e2.cross(&e3), e3.cross(&e1), e1.cross(&e2)].map(|normal| a.dot(&normal) / determinant);
-        [b[0], b[1], b[2], T::constant(fibre.rest_stretch)]
+        [b[0], b[1], b[2], T::constant(fiber.rest_stretch)]
     }
 
     #[inline(always)]
@@ -56,10 +56,10 @@ impl Constraint<4> for FibreStretch {
 
 #[cfg(test)]
 cutis_conformance::conformance!(
-    FibreStretch,
+    FiberStretch,
     4,
     cutis_conformance::Subject::new([
-        Fibre { direction: [1.0, 0.0, 0.0], rest_stretch: 1.0 },
-        Fibre { direction: [1.0, -2.0, 0.5], rest_stretch: 0.8 },
+        Fiber { direction: [1.0, 0.0, 0.0], rest_stretch: 1.0 },
+        Fiber { direction: [1.0, -2.0, 0.5], rest_stretch: 0.8 },
     ])
 );

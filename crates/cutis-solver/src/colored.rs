@@ -1,14 +1,14 @@
-//! The only unsafe code: several threads move the vertices of one colour at the same time.
+//! The only unsafe code: several threads move the vertices of one color at the same time.
 //!
 //! Why that is sound. (1) A batch checks at build that each index is below the number of vertices, and
-//! `Groups::verify` that no two constraints of one colour share a vertex; its fields are private and never change.
-//! (2) [`Coloured`] borrows the vertices mutably for its whole life, so that nobody else reads or moves them.
-//! (3) A chunk is a range of one colour, taken from an atomic counter that only grows: each constraint is handed
+//! `Groups::verify` that no two constraints of one color share a vertex; its fields are private and never change.
+//! (2) [`Colored`] borrows the vertices mutably for its whole life, so that nobody else reads or moves them.
+//! (3) A chunk is a range of one color, taken from an atomic counter that only grows: each constraint is handed
 //! out once. So two threads never touch the same vertex or the same multiplier.
 //!
 //! For groups of vertices the same holds. (1) A `Descent` and the system that it was made from lie in one
 //! `Simulation`; its incidences are those of the system's kinds, and `Groups::verify_vertices` has checked that no two vertices of
-//! a colour are in one constraint, and that each is named once. (2) [`ColouredVertices`] borrows the system mutably for its
+//! a color are in one constraint, and that each is named once. (2) [`ColoredVertices`] borrows the system mutably for its
 //! whole life. (3) A chunk is handed out once; who has it moves its vertices, and reads those that are in constraints with
 //! them, which nobody moves meanwhile.
 #![allow(unsafe_code)]
@@ -26,10 +26,10 @@ use crate::{ConstraintSet, Descent, Kind, Pull, Step, System, Turn, Vertex};
 /// Constraints that a thread takes at a time. Fixed; results do not depend on it.
 const CHUNK: usize = 1024;
 
-/// One colour of one kind, shared between the threads that project it.
+/// One color of one kind, shared between the threads that project it.
 ///
 /// ```
-/// # use cutis_solver::{Coloured, Stiffness, Step, SystemBuilder};
+/// # use cutis_solver::{Colored, Stiffness, Step, SystemBuilder};
 /// # use cutis_constraints::Distance;
 /// # use nalgebra::Point3;
 /// # let positions = [Point3::new(0.0, 0.0, 0.0), Point3::new(1.1, 0.0, 0.0)];
@@ -38,7 +38,7 @@ const CHUNK: usize = 1024;
 /// # let mut system = SystemBuilder::<f64>::new(&positions, &[0.0, 1.0])?
 /// #     .add::<Distance, 2>(&spring, &[[1.0]], Stiffness::pbd(1.0), &groups)?.build();
 /// let (vertices, kinds) = system.projection_parts();
-/// let color = Coloured::new(vertices, &*kinds[0], 0, Step::Pbd, &mut []);
+/// let color = Colored::new(vertices, &*kinds[0], 0, Step::Pbd, &mut []);
 /// std::thread::scope(|scope| {
 ///     for _ in 0..2 {
 ///         scope.spawn(|| while color.project_next_chunk() {});
@@ -46,7 +46,7 @@ const CHUNK: usize = 1024;
 /// });
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Coloured<'a, T: Scalar> {
+pub struct Colored<'a, T: Scalar> {
     set: &'a dyn ConstraintSet<T>,
     range: Range<usize>,
     step: Step<T>,
@@ -57,11 +57,11 @@ pub struct Coloured<'a, T: Scalar> {
     borrow: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: sharing a `Coloured` only lets threads take distinct chunks (see the top of the file), which touch distinct
+// SAFETY: sharing a `Colored` only lets threads take distinct chunks (see the top of the file), which touch distinct
 // vertices and multipliers; `T` is plain data that may be used from any thread.
-unsafe impl<T: Scalar> Sync for Coloured<'_, T> {}
+unsafe impl<T: Scalar> Sync for Colored<'_, T> {}
 
-impl<'a, T: Scalar> Coloured<'a, T> {
+impl<'a, T: Scalar> Colored<'a, T> {
     /// Prepares `color` of `set`. `multipliers` holds one number per constraint of the whole set, or none.
     ///
     /// # Panics
@@ -120,8 +120,8 @@ impl<'a, T: Scalar> Coloured<'a, T> {
 /// Vertices that a thread takes at a time. Fixed; results do not depend on it.
 const VERTEX_CHUNK: usize = 128;
 
-/// One colour of vertices, shared between the threads that move them.
-pub struct ColouredVertices<'a, T: Scalar> {
+/// One color of vertices, shared between the threads that move them.
+pub struct ColoredVertices<'a, T: Scalar> {
     kinds: &'a [Kind<T>],
     descent: &'a Descent<T>,
     range: Range<usize>,
@@ -134,10 +134,10 @@ pub struct ColouredVertices<'a, T: Scalar> {
 }
 
 // SAFETY: sharing it only lets threads take distinct chunks, as above.
-unsafe impl<T: Scalar> Sync for ColouredVertices<'_, T> {}
+unsafe impl<T: Scalar> Sync for ColoredVertices<'_, T> {}
 
-impl<'a, T: Scalar> ColouredVertices<'a, T> {
-    /// Prepares a colour of `descent`, which must be that of `system`.
+impl<'a, T: Scalar> ColoredVertices<'a, T> {
+    /// Prepares a color of `descent`, which must be that of `system`.
     pub(crate) fn new(system: &'a mut System<T>, descent: &'a Descent<T>, turn: Turn) -> Self {
         let System { vertices, previous, velocities, kinds, .. } = system;
         Self {
@@ -169,7 +169,7 @@ impl<'a, T: Scalar> ColouredVertices<'a, T> {
         true
     }
 
-    /// Moves all vertices of the colour one by one, in safe scalar code.
+    /// Moves all vertices of the color one by one, in safe scalar code.
     pub fn move_one_by_one(self) {
         // SAFETY: `self` is consumed, so that no thread shares it any more, and was made from this exclusive borrow.
         let vertices = unsafe { std::slice::from_raw_parts_mut(self.vertices, self.vertex_count) };

@@ -1,4 +1,4 @@
-// Fibre stretch: a tetrahedron keeps its length along a fibre. The twin of `FibreStretch::eval`.
+// Fiber stretch: a tetrahedron keeps its length along a fiber. The twin of `FiberStretch::eval`.
 struct Params {
     b1: f32,
     b2: f32,
