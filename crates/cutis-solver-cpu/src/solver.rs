@@ -1,7 +1,7 @@
 //! The solver of this backend: a simulation and, if more than one thread is asked for, its own pool.
 
 use cutis_constraints::Scalar;
-use cutis_solver::{Execute, Ledger, Settings, Simulation, Solver, SolverError, System, Timed};
+use cutis_solver::{Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed};
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -75,8 +75,8 @@ impl<T: Scalar> Solver<T> for SolverCpu<T> {
         self.run(frames, |parallel| parallel)
     }
 
-    fn step_timed(&mut self, frames: usize, ledger: &mut Ledger) -> Result<(), SolverError> {
-        self.run(frames, |parallel| Timed::new(parallel, ledger))
+    fn step_timed(&mut self, frames: usize, profile: &mut StepProfile) -> Result<(), SolverError> {
+        self.run(frames, |parallel| Timed::new(parallel, profile))
     }
 
     fn restore(

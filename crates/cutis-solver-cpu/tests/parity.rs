@@ -7,7 +7,7 @@ use std::time::Instant;
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
 use cutis_solver::{
-    Formulation, Handle, Ledger, Settings, Solver, SolverError, SolverReference, Stiffness, System,
+    Formulation, Handle, Settings, Solver, SolverError, SolverReference, StepProfile, Stiffness, System,
     SystemBuilder, Values,
 };
 use cutis_solver_cpu::{CpuError, SolverCpu};
@@ -152,20 +152,20 @@ fn a_timed_step_has_the_same_bits_and_tells_its_parts() {
             Box::new(SolverCpu::new(body(Formulation::Xpbd), settings(iterations), Some(3)).unwrap()),
         ];
         for solver in &mut timed {
-            let mut ledger = Ledger::default();
+            let mut profile = StepProfile::default();
             let start = Instant::now();
-            solver.step_timed(1, &mut ledger).unwrap();
-            solver.step_timed(1, &mut ledger).unwrap();
+            solver.step_timed(1, &mut profile).unwrap();
+            solver.step_timed(1, &mut profile).unwrap();
             let wall = start.elapsed().as_secs_f64();
             assert!(solver.positions().unwrap() == plain.positions().unwrap());
             assert!(solver.velocities().unwrap() == plain.velocities().unwrap());
-            let names: Vec<&str> = ledger.parts().iter().map(|part| part.name).collect();
+            let names: Vec<&str> = profile.parts().iter().map(|part| part.name).collect();
             let clear: &[&str] = if iterations > 1 { &["multipliers"] } else { &[] };
             let expected =
                 [&["vertices", "handles"], clear, &["distance", "stc", "volume", "check"]].concat();
             assert_eq!(names, expected);
-            assert!(ledger.parts().iter().all(|part| part.seconds > 0.0));
-            assert!(ledger.total_s() <= wall && ledger.total_s() > 0.5 * wall, "{ledger:?} of {wall} s");
+            assert!(profile.parts().iter().all(|part| part.seconds > 0.0));
+            assert!(profile.total_s() <= wall && profile.total_s() > 0.5 * wall, "{profile:?} of {wall} s");
         }
     }
 }

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use cutis_gpu::{Gpu, GpuError, Pass};
-use cutis_solver::Ledger;
+use cutis_solver::StepProfile;
 
 /// A pass under way.
 pub(crate) struct Recorder<'a> {
@@ -14,15 +14,15 @@ pub(crate) struct Recorder<'a> {
 }
 
 struct Timed<'a> {
-    ledger: &'a mut Ledger,
+    profile: &'a mut StepProfile,
     /// What the pass under way holds.
     part: &'static str,
 }
 
 impl<'a> Recorder<'a> {
-    /// Begins; with a ledger, the time of each part goes there.
-    pub(crate) fn new(gpu: &'a Gpu, ledger: Option<&'a mut Ledger>) -> Self {
-        let timed = ledger.map(|ledger| Timed { ledger, part: Ledger::VERTICES });
+    /// Begins; with a profile, the time of each part goes there.
+    pub(crate) fn new(gpu: &'a Gpu, profile: Option<&'a mut StepProfile>) -> Self {
+        let timed = profile.map(|profile| Timed { profile, part: StepProfile::VERTICES });
         Self { gpu, pass: gpu.pass("frame"), timed }
     }
 
@@ -45,14 +45,14 @@ impl<'a> Recorder<'a> {
     /// As the device gives them.
     pub(crate) fn submit(&mut self) -> Result<(), GpuError> {
         let pass = std::mem::replace(&mut self.pass, self.gpu.pass("frame, further on"));
-        let Some(Timed { ledger, part }) = &mut self.timed else { return pass.submit() };
+        let Some(Timed { profile, part }) = &mut self.timed else { return pass.submit() };
         self.gpu.wait()?;
         let start = Instant::now();
         pass.submit()?;
         self.gpu.wait()?;
         let waited_s = start.elapsed().as_secs_f64();
         let stamped_s = self.gpu.last_pass_ns()?.map(|ns| ns as f64 * 1e-9);
-        ledger.add(part, stamped_s.unwrap_or(waited_s));
+        profile.add(part, stamped_s.unwrap_or(waited_s));
         Ok(())
     }
 }

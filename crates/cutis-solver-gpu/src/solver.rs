@@ -2,7 +2,7 @@
 
 use cutis_gpu::{Buffer, Gpu, GpuError};
 use cutis_solver::{
-    Clock, Ledger, MemoryPart, Method, Residual, Settings, Simulation, Solver, SolverError, System,
+    Clock, MemoryPart, Method, Residual, Settings, Simulation, Solver, SolverError, StepProfile, System,
 };
 use nalgebra::{Point3, Vector3};
 
@@ -93,7 +93,7 @@ impl Constraints {
             }
             Self::Pulling(descent) => {
                 for turn in schedule.turns_of(iteration) {
-                    descent.turn(recorder.part(Ledger::DESCENT)?, turn);
+                    descent.turn(recorder.part(StepProfile::DESCENT)?, turn);
                 }
             }
         }
@@ -171,18 +171,18 @@ impl SolverGpu {
         device_bytes(self.simulation.system(), self.simulation.settings())
     }
 
-    /// Runs whole frames and the rest of one that was begun; with a ledger, part by part.
-    fn run(&mut self, frames: usize, mut ledger: Option<&mut Ledger>) -> Result<(), Stop> {
+    /// Runs whole frames and the rest of one that was begun; with a profile, part by part.
+    fn run(&mut self, frames: usize, mut profile: Option<&mut StepProfile>) -> Result<(), Stop> {
         let end = self.simulation.clock().frame.saturating_add(frames as u64);
         while self.simulation.clock().frame < end {
             let look = end.min(self.simulation.clock().frame.saturating_add(FRAMES_PER_LOOK));
-            self.run_unseen(look, ledger.as_deref_mut())?;
+            self.run_unseen(look, profile.as_deref_mut())?;
         }
         Ok(())
     }
 
     /// Runs up to frame `end` and then looks whether the body is finite.
-    fn run_unseen(&mut self, end: u64, mut ledger: Option<&mut Ledger>) -> Result<(), Stop> {
+    fn run_unseen(&mut self, end: u64, mut profile: Option<&mut StepProfile>) -> Result<(), Stop> {
         let settings = *self.simulation.settings();
         let mut clock = self.simulation.clock();
         self.bring_device_up_to_date()?;
@@ -196,7 +196,7 @@ impl SolverGpu {
                 let paths = self.simulation.system().handles();
                 handles.write_paths(&self.gpu, paths, clock, &settings, done)?;
             }
-            let mut recorder = Recorder::new(&self.gpu, ledger.as_deref_mut());
+            let mut recorder = Recorder::new(&self.gpu, profile.as_deref_mut());
             let mut encoded = Load::default();
             while clock.frame == frame {
                 if encoded.dispatches > DISPATCHES_PER_SUBMIT || encoded.threads > THREADS_PER_SUBMIT {
@@ -205,20 +205,20 @@ impl SolverGpu {
                 }
                 encoded.dispatches += self.substep.dispatches;
                 encoded.threads = encoded.threads.saturating_add(self.substep.threads);
-                self.body.begin_substep(recorder.part(Ledger::VERTICES)?, begun);
+                self.body.begin_substep(recorder.part(StepProfile::VERTICES)?, begun);
                 begun = true;
                 if let Some(handles) = &self.handles {
-                    handles.carry(recorder.part(Ledger::HANDLES)?);
+                    handles.carry(recorder.part(StepProfile::HANDLES)?);
                 }
                 for iteration in 0..self.simulation.schedule().iterations {
                     self.constraints.encode(&mut recorder, &self.simulation, iteration)?;
                 }
-                self.body.check.run(recorder.part(Ledger::CHECK)?);
+                self.body.check.run(recorder.part(StepProfile::CHECK)?);
                 clock.tick(&settings);
                 done += 1;
             }
             if clock.frame == end {
-                self.body.finish.run(recorder.part(Ledger::VERTICES)?);
+                self.body.finish.run(recorder.part(StepProfile::VERTICES)?);
             }
             recorder.submit()?;
         }
@@ -306,8 +306,8 @@ impl Solver<f32> for SolverGpu {
         done.map_err(|stop| self.error(stop))
     }
 
-    fn step_timed(&mut self, frames: usize, ledger: &mut Ledger) -> Result<(), SolverError> {
-        let done = self.run(frames, Some(ledger));
+    fn step_timed(&mut self, frames: usize, profile: &mut StepProfile) -> Result<(), SolverError> {
+        let done = self.run(frames, Some(profile));
         done.map_err(|stop| self.error(stop))
     }
 

@@ -56,7 +56,7 @@ pub struct Momentum {
     pub center: Point3<f64>,
 }
 
-/// One line of the memory ledger.
+/// One line of the memory profile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryPart {
     /// What is stored: `vertices`, or a kind of constraint.

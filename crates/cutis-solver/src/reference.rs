@@ -4,8 +4,8 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    ColoredVertices, ConstraintSet, Execute, Ledger, Settings, Simulation, Solver, SolverError, Step, Sweep,
-    System, Timed, Vertex, VertexBlock,
+    ColoredVertices, ConstraintSet, Execute, Settings, Simulation, Solver, SolverError, Step, StepProfile,
+    Sweep, System, Timed, Vertex, VertexBlock,
 };
 
 /// Runs every pass on the calling thread, in ascending order.
@@ -63,8 +63,8 @@ impl<T: Scalar> Solver<T> for SolverReference<T> {
         self.simulation.run(frames, &Serial)
     }
 
-    fn step_timed(&mut self, frames: usize, ledger: &mut Ledger) -> Result<(), SolverError> {
-        self.simulation.run(frames, &Timed::new(Serial, ledger))
+    fn step_timed(&mut self, frames: usize, profile: &mut StepProfile) -> Result<(), SolverError> {
+        self.simulation.run(frames, &Timed::new(Serial, profile))
     }
 
     fn restore(

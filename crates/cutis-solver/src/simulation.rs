@@ -6,8 +6,8 @@ use nalgebra::{Point3, Vector3};
 use crate::descent::suits;
 use crate::passes::Integrator;
 use crate::{
-    Clock, ColoredVertices, ConstraintSet, Descent, Formulation, Ledger, Motion, Schedule, Settings,
-    SolverError, Step, Sweep, System, Vertex, VertexBlock,
+    Clock, ColoredVertices, ConstraintSet, Descent, Formulation, Motion, Schedule, Settings, SolverError,
+    Step, StepProfile, Sweep, System, Vertex, VertexBlock,
 };
 
 /// How the passes of a substep are executed on the host: one after the other, or by several threads.
@@ -28,7 +28,7 @@ pub trait Execute<T: Scalar> {
     /// Moves the vertices of one color.
     fn turn(&self, color: ColoredVertices<'_, T>);
 
-    /// Runs what one thread does between the passes; `part` is its name in a [`Ledger`](crate::Ledger).
+    /// Runs what one thread does between the passes; `part` is its name in a [`StepProfile`](crate::StepProfile).
     fn alone(&self, _part: &'static str, work: &mut dyn FnMut()) {
         work();
     }
@@ -180,7 +180,7 @@ impl<T: Scalar> Simulation<T> {
             self.begin_substep(begun, execute);
             if !self.system.handles.is_empty() {
                 let time_s = self.time_s() + self.settings.substep_s();
-                execute.alone(Ledger::HANDLES, &mut || self.system.carry_handles(time_s));
+                execute.alone(StepProfile::HANDLES, &mut || self.system.carry_handles(time_s));
             }
             self.solve(execute);
             if let Some(vertex) = execute.first_not_finite(&self.system.vertices) {
@@ -235,7 +235,7 @@ impl<T: Scalar> Simulation<T> {
         if self.settings.keeps_multipliers() {
             let multipliers = &mut self.multipliers;
             let clear = &mut || multipliers.iter_mut().for_each(|kind| kind.fill(T::zero()));
-            execute.alone(Ledger::MULTIPLIERS, clear);
+            execute.alone(StepProfile::MULTIPLIERS, clear);
         }
         for iteration in 0..self.schedule.iterations {
             match &self.method {

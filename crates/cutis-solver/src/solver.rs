@@ -4,7 +4,7 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    Energy, Ledger, MemoryPart, Momentum, Residual, Schedule, Settings, Simulation, SolverError, System,
+    Energy, MemoryPart, Momentum, Residual, Schedule, Settings, Simulation, SolverError, StepProfile, System,
 };
 
 /// A backend with a body in it. Object-safe; what is measured is computed when it is asked for.
@@ -21,14 +21,14 @@ pub trait Solver<T: Scalar>: Send {
     /// [`SolverError::NotFinite`]: see [`Simulation::run`]; [`SolverError::Device`] if a device fails.
     fn step(&mut self, frames: usize) -> Result<(), SolverError>;
 
-    /// As [`step`](Self::step), with the same bits, and enters into `ledger` how long each part took: on a CPU backend at no
+    /// As [`step`](Self::step), with the same bits, and enters into `profile` how long each part took: on a CPU backend at no
     /// cost to speak of; on a device each part is waited for, so that the parts take longer than a plain step. What ran
     /// before an error is entered too.
     ///
     /// # Errors
     /// As [`step`](Self::step).
-    fn step_timed(&mut self, frames: usize, ledger: &mut Ledger) -> Result<(), SolverError> {
-        ledger.time(Ledger::STEP, || self.step(frames))
+    fn step_timed(&mut self, frames: usize, profile: &mut StepProfile) -> Result<(), SolverError> {
+        profile.time(StepProfile::STEP, || self.step(frames))
     }
 
     /// Goes on from a saved state: positions in the caller's coordinates (m), velocities (m/s), frames done so far.

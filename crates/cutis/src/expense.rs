@@ -1,6 +1,6 @@
 //! What stepping a system takes, as far as it can be counted before: bytes on the host, and the work of a run.
 
-use cutis_solver::{Descent, Formulation, Kind, Ledger, Settings, SolverError, System};
+use cutis_solver::{Descent, Formulation, Kind, Settings, SolverError, StepProfile, System};
 
 use crate::backend::Work;
 use crate::report::MemoryPart;
@@ -31,7 +31,7 @@ impl Expense {
         };
         if settings.keeps_multipliers() {
             let count: usize = system.kinds().iter().map(|kind| kind.len()).sum();
-            add(Ledger::MULTIPLIERS, count * size_of::<f32>());
+            add(StepProfile::MULTIPLIERS, count * size_of::<f32>());
         }
         add("incidences", descent.as_ref().map_or(0, Descent::bytes));
         Ok(Self { memory, descent })

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use cutis_mesh::{Gape, WoundGape};
-use cutis_solver::{Ledger, SolverError};
+use cutis_solver::{SolverError, StepProfile};
 
 use crate::files::{self, RunFolder};
 use crate::motion::{End, Motion};
@@ -45,7 +45,7 @@ pub(crate) enum Timing {
 
 /// Times of the solver's parts.
 pub(crate) struct Times {
-    ledger: Ledger,
+    ledger: StepProfile,
     frames: u32,
     timing: Timing,
 }
@@ -104,7 +104,7 @@ impl Course<'_> {
             Ok::<_, Error>(FrameRow { frame, time_s: motion.time_s(), ms, gapes: lips.measure(motion)? })
         };
         let mut rows = vec![row(motion, self.done(), 0.0)?];
-        let mut times = Times { ledger: Ledger::default(), frames: 0, timing: self.timing };
+        let mut times = Times { ledger: StepProfile::default(), frames: 0, timing: self.timing };
         for frame in self.done() + 1..=frames {
             at.frame = frame;
             let start = Instant::now();

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use cutis_solver::{Ledger, Settings, System};
+use cutis_solver::{Settings, StepProfile, System};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -51,7 +51,7 @@ impl CostLedger {
     }
 
     /// The same with the times of `frames` frames. `how` they were measured.
-    pub(crate) fn with_times(mut self, times: &Ledger, frames: f64, how: &str) -> Self {
+    pub(crate) fn with_times(mut self, times: &StepProfile, frames: f64, how: &str) -> Self {
         for time in times.parts() {
             *self.part(time.name).ms_per_frame.get_or_insert(0.0) += time.seconds * 1e3 / frames;
         }
@@ -92,7 +92,7 @@ pub(crate) fn of_substeps(
     let iterations = settings.iterations.min(MOST_ITERATIONS);
     let substep = Settings { dt_s: settings.substep_s(), substeps: 1, iterations, ..settings };
     let mut solver = backend.start(system, substep)?.solver;
-    let (mut times, mut done) = (Ledger::default(), 0.0);
+    let (mut times, mut done) = (StepProfile::default(), 0.0);
     if let Err(error) = solver.step(1) {
         return Ok(CostLedger { time: format!("not measured: {error}"), ..bytes });
     }
@@ -103,10 +103,11 @@ pub(crate) fn of_substeps(
         }
         done += 1.0;
     }
-    let mut whole = Ledger::default();
+    let mut whole = StepProfile::default();
     for part in times.parts() {
         let once =
-            [Ledger::VERTICES, Ledger::HANDLES, Ledger::MULTIPLIERS, Ledger::CHECK].contains(&part.name);
+            [StepProfile::VERTICES, StepProfile::HANDLES, StepProfile::MULTIPLIERS, StepProfile::CHECK]
+                .contains(&part.name);
         let times = if once { 1.0 } else { f64::from(settings.iterations) / f64::from(iterations) };
         whole.add(part.name, part.seconds * times);
     }
@@ -119,7 +120,7 @@ pub(crate) fn of_substeps(
 /// # Errors
 /// As the frame gives them.
 pub(crate) fn of_first_frame(motion: &mut dyn Motion, bytes: CostLedger) -> Result<CostLedger, Error> {
-    let mut times = Ledger::default();
+    let mut times = StepProfile::default();
     motion.step_timed(&mut times)?;
     Ok(bytes.with_times(&times, 1.0, "the first frame, on this machine as busy as it is now"))
 }
@@ -137,7 +138,7 @@ mod tests {
         let (host, device) = ([bytes("vertices", 40), bytes("stc", 12)], [bytes("vertices", 48)]);
         let without = CostLedger::of_memory(&host, &device, "no device");
         assert_eq!((without.ms_per_frame(), without.time.as_str()), (None, "no device"));
-        let mut times = Ledger::default();
+        let mut times = StepProfile::default();
         times.add("stc", 0.5);
         times.add("check", 0.25);
         let with = without.with_times(&times, 2.0, "by hand");

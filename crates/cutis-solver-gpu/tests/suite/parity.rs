@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use cutis_gpu::{Gpu, GpuOptions};
-use cutis_solver::{Formulation, Ledger, Settings, Solver, SolverReference};
+use cutis_solver::{Formulation, Settings, Solver, SolverReference, StepProfile};
 use cutis_solver_gpu::SolverGpu;
 use nalgebra::{Point3, Vector3};
 
@@ -105,14 +105,14 @@ fn a_timed_step_has_the_same_bits_and_tells_its_parts() {
                 let mut plain = SolverGpu::new(gpu, body(parts), settings).unwrap();
                 let mut timed = SolverGpu::new(gpu, body(parts), settings).unwrap();
                 plain.step(3).unwrap();
-                let (mut ledger, start) = (Ledger::default(), Instant::now());
-                timed.step_timed(1, &mut ledger).unwrap();
-                timed.step_timed(2, &mut ledger).unwrap();
+                let (mut profile, start) = (StepProfile::default(), Instant::now());
+                timed.step_timed(1, &mut profile).unwrap();
+                timed.step_timed(2, &mut profile).unwrap();
                 let wall = start.elapsed().as_secs_f64();
                 assert!(state(&mut timed) == state(&mut plain));
-                let names: Vec<&str> = ledger.parts().iter().map(|part| part.name).collect();
+                let names: Vec<&str> = profile.parts().iter().map(|part| part.name).collect();
                 assert_eq!(names, expected);
-                assert!(ledger.parts().iter().all(|part| part.seconds > 0.0) && ledger.total_s() < wall);
+                assert!(profile.parts().iter().all(|part| part.seconds > 0.0) && profile.total_s() < wall);
             });
         }
     }

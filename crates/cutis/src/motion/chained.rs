@@ -1,7 +1,7 @@
 //! A body that follows as a chain.
 
 use cutis_chainmail::{Drag, LinkViolation, Order};
-use cutis_solver::{Ledger, SolverError};
+use cutis_solver::{SolverError, StepProfile};
 use cutis_solver_cpu::CpuError;
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -205,10 +205,10 @@ impl Motion for Chained<'_> {
     }
 
     fn step(&mut self) -> Result<(), Error> {
-        self.step_timed(&mut Ledger::default())
+        self.step_timed(&mut StepProfile::default())
     }
 
-    fn step_timed(&mut self, ledger: &mut Ledger) -> Result<(), Error> {
+    fn step_timed(&mut self, ledger: &mut StepProfile) -> Result<(), Error> {
         let mut changed = false;
         if !self.chain.cuts.is_empty() {
             changed = ledger.time(CUTS, || self.cut());

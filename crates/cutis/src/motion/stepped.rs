@@ -1,6 +1,6 @@
 //! A body that a solver steps.
 
-use cutis_solver::{Ledger, Solver};
+use cutis_solver::{Solver, StepProfile};
 use nalgebra::{Point3, Vector3};
 
 use super::{End, Motion};
@@ -32,7 +32,7 @@ impl Motion for Stepped {
         Ok(self.solver.step(1)?)
     }
 
-    fn step_timed(&mut self, ledger: &mut Ledger) -> Result<(), Error> {
+    fn step_timed(&mut self, ledger: &mut StepProfile) -> Result<(), Error> {
         Ok(self.solver.step_timed(1, ledger)?)
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use cutis_solver::Ledger;
+use cutis_solver::StepProfile;
 
 use crate::Error;
 use crate::backend::{Chosen, Request};
@@ -38,7 +38,7 @@ pub(super) fn of_dynamics(
     let work = expense.work(system, settings, loaded.scene.run.frames);
     let backend = request.settle(loaded, &work)?;
     let colors = match expense.vertex_colors() {
-        Some(number) => BTreeMap::from([(Ledger::DESCENT.to_owned(), number)]),
+        Some(number) => BTreeMap::from([(StepProfile::DESCENT.to_owned(), number)]),
         None => dynamics.colors.clone(),
     };
     let removed = removed(body);

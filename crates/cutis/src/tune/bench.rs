@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use cutis_constraints::Scalar;
 use cutis_mesh::Gape;
-use cutis_solver::{Formulation, Ledger, Residual, Settings, Solver, System};
+use cutis_solver::{Formulation, Residual, Settings, Solver, StepProfile, System};
 use cutis_solver_cpu::SolverCpu;
 use nalgebra::Point3;
 
@@ -167,9 +167,9 @@ impl<'a> Bench<'a> {
     }
 
     /// Where the time of a setting goes: one frame part by part, after one to touch all memory.
-    pub(super) fn ledger(&self, setting: Setting) -> Result<Ledger, Error> {
+    pub(super) fn ledger(&self, setting: Setting) -> Result<StepProfile, Error> {
         let mut running = self.backend.start(self.system.clone(), setting.settings(&self.settings))?;
-        let mut ledger = Ledger::default();
+        let mut ledger = StepProfile::default();
         running.solver.step(1)?;
         running.solver.step_timed(1, &mut ledger)?;
         Ok(ledger)

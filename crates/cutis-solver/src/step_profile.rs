@@ -10,7 +10,7 @@ use crate::{ColoredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, Vertex
 /// Time of one part of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimePart {
-    /// One of the constants of [`Ledger`], or the name of a kind of constraint.
+    /// One of the constants of [`StepProfile`], or the name of a kind of constraint.
     pub name: &'static str,
     /// Wall time in seconds.
     pub seconds: f64,
@@ -18,11 +18,11 @@ pub struct TimePart {
 
 /// Wall time of steps by part, added up over as many steps as it is given to.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Ledger {
+pub struct StepProfile {
     parts: Vec<TimePart>,
 }
 
-impl Ledger {
+impl StepProfile {
     /// Prediction and velocities.
     pub const VERTICES: &'static str = "vertices";
     /// Vertices that handles carry.
@@ -71,19 +71,19 @@ impl Ledger {
 /// Executes as another does, with the same bits, and enters the time of every pass.
 pub struct Timed<'a, E> {
     inner: E,
-    ledger: RefCell<&'a mut Ledger>,
+    profile: RefCell<&'a mut StepProfile>,
 }
 
 impl<'a, E> Timed<'a, E> {
-    /// Enters what `inner` takes into `ledger`.
-    pub fn new(inner: E, ledger: &'a mut Ledger) -> Self {
-        Self { inner, ledger: RefCell::new(ledger) }
+    /// Enters what `inner` takes into `profile`.
+    pub fn new(inner: E, profile: &'a mut StepProfile) -> Self {
+        Self { inner, profile: RefCell::new(profile) }
     }
 }
 
 impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
     fn vertices(&self, block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync)) {
-        self.ledger.borrow_mut().time(Ledger::VERTICES, || self.inner.vertices(block, pass));
+        self.profile.borrow_mut().time(StepProfile::VERTICES, || self.inner.vertices(block, pass));
     }
 
     fn sweep(
@@ -95,19 +95,19 @@ impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
         multipliers: &mut [T],
     ) {
         let work = || self.inner.sweep(sweep, set, vertices, step, multipliers);
-        self.ledger.borrow_mut().time(set.name(), work);
+        self.profile.borrow_mut().time(set.name(), work);
     }
 
     fn turn(&self, color: ColoredVertices<'_, T>) {
-        self.ledger.borrow_mut().time(Ledger::DESCENT, || self.inner.turn(color));
+        self.profile.borrow_mut().time(StepProfile::DESCENT, || self.inner.turn(color));
     }
 
     fn alone(&self, part: &'static str, work: &mut dyn FnMut()) {
-        self.ledger.borrow_mut().time(part, || self.inner.alone(part, work));
+        self.profile.borrow_mut().time(part, || self.inner.alone(part, work));
     }
 
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {
-        self.ledger.borrow_mut().time(Ledger::CHECK, || self.inner.first_not_finite(vertices))
+        self.profile.borrow_mut().time(StepProfile::CHECK, || self.inner.first_not_finite(vertices))
     }
 }
 
@@ -117,11 +117,11 @@ mod tests {
 
     #[test]
     fn parts_add_up_and_keep_their_order() {
-        let mut ledger = Ledger::default();
-        ledger.add("b", 1.0);
-        ledger.add("a", 2.0);
-        ledger.add("b", 0.5);
-        assert_eq!(ledger.parts().iter().map(|part| part.name).collect::<Vec<_>>(), ["b", "a"]);
-        assert_eq!((ledger.seconds("b"), ledger.seconds("c"), ledger.total_s()), (1.5, 0.0, 3.5));
+        let mut profile = StepProfile::default();
+        profile.add("b", 1.0);
+        profile.add("a", 2.0);
+        profile.add("b", 0.5);
+        assert_eq!(profile.parts().iter().map(|part| part.name).collect::<Vec<_>>(), ["b", "a"]);
+        assert_eq!((profile.seconds("b"), profile.seconds("c"), profile.total_s()), (1.5, 0.0, 3.5));
     }
 }
