@@ -146,19 +146,19 @@ fn a_budget_is_kept_and_the_front_is_one() {
     assert!(affordable.filter_map(|c| c.error).all(|error| error >= picked.error.unwrap()));
 }
 
-/// The ledger is that of a run of the tuned scene, and not of the scene as it was.
+/// The cost report is that of a run of the tuned scene, and not of the scene as it was.
 #[test]
-fn the_ledger_is_that_of_the_picked_setting() {
+fn the_cost_report_is_that_of_the_picked_setting() {
     let folder = tempfile::tempdir().unwrap();
     let own = [("run.frames", "2"), ("solver.formulation", "\"vbd\""), ("solver.substeps", "4")];
     let loaded = scene(&own);
     let (tuning, tuned) = tuned(&loaded, folder.path(), Demand::Error(0.5));
     let stored = |loaded: &LoadedScene| cutis::check(loaded, &Silent).unwrap().memory;
-    let parts = tuning.ledger.parts.iter().filter(|part| part.host_bytes > 0);
+    let parts = tuning.costs.parts.iter().filter(|part| part.host_bytes > 0);
     let parts: Vec<(&str, usize)> = parts.map(|part| (part.part.as_str(), part.host_bytes)).collect();
     let expected = stored(&tuned);
     assert_eq!(parts, expected.iter().map(|part| (part.part.as_str(), part.bytes)).collect::<Vec<_>>());
-    assert!(tuning.ledger.ms_per_frame() > Some(0.0));
+    assert!(tuning.costs.ms_per_frame() > Some(0.0));
     assert_ne!(expected, stored(&loaded), "nothing to tell apart: {:?}", tuning.picked);
 }
 
@@ -178,7 +178,7 @@ fn what_can_be_left_out_is_measured() {
     );
     assert!((stc.change.unwrap() - 1.0).abs() < 0.01);
     for kind in ["distance", "volume", "stc"] {
-        let part = tuning.ledger.parts.iter().find(|part| part.part == kind).unwrap();
+        let part = tuning.costs.parts.iter().find(|part| part.part == kind).unwrap();
         assert!(find(kind).saved_bytes >= part.host_bytes as i64, "{kind}");
         assert!(find(kind).residuals.len() == 2 && find(kind).change > Some(0.0), "{kind}");
     }

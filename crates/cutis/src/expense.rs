@@ -132,7 +132,7 @@ mod tests {
             assert_eq!(work.sweeps as usize, schedule.sweeps.len() + 2 * schedule.turns.len());
             let passes = u64::from(schedule.iterations) * u64::from(schedule.substeps);
             assert_eq!(work.elements * passes, schedule.projections_per_frame());
-            let host = plan.ledger.parts.iter().filter(|part| part.host_bytes > 0);
+            let host = plan.costs.parts.iter().filter(|part| part.host_bytes > 0);
             let host: Vec<_> =
                 host.map(|part| MemoryPart { part: part.part.clone(), bytes: part.host_bytes }).collect();
             assert_eq!(host, stored);

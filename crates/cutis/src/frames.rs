@@ -11,7 +11,7 @@ use crate::files::{self, RunFolder};
 use crate::motion::{End, Motion};
 use crate::report::Frames;
 use crate::scene::RunSection;
-use crate::{CostLedger, Error, Progress};
+use crate::{CostReport, Error, Progress};
 
 /// One line of `frames.csv`.
 #[derive(Clone, Debug)]
@@ -45,20 +45,20 @@ pub(crate) enum Timing {
 
 /// Times of the solver's parts.
 pub(crate) struct Times {
-    ledger: StepProfile,
+    profile: StepProfile,
     frames: u32,
     timing: Timing,
 }
 
 impl Times {
     /// Enters the times where there are any.
-    pub(crate) fn enter(&self, costs: CostLedger) -> CostLedger {
+    pub(crate) fn enter(&self, costs: CostReport) -> CostReport {
         let how = match (self.timing, self.frames) {
             (Timing::No, _) => {
-                return CostLedger { time: "not measured: no report was asked for".into(), ..costs };
+                return CostReport { time: "not measured: no report was asked for".into(), ..costs };
             }
             (_, 0) => {
-                return CostLedger { time: "not measured: there was no frame to measure".into(), ..costs };
+                return CostReport { time: "not measured: there was no frame to measure".into(), ..costs };
             }
             (Timing::Throughout, frames) => format!("mean of the {frames} frames of this run"),
             (Timing::OneMore, _) => {
@@ -66,7 +66,7 @@ impl Times {
                     .into()
             }
         };
-        costs.with_times(&self.ledger, self.frames.into(), &how)
+        costs.with_times(&self.profile, self.frames.into(), &how)
     }
 }
 
@@ -104,12 +104,12 @@ impl Course<'_> {
             Ok::<_, Error>(FrameRow { frame, time_s: motion.time_s(), ms, gapes: lips.measure(motion)? })
         };
         let mut rows = vec![row(motion, self.done(), 0.0)?];
-        let mut times = Times { ledger: StepProfile::default(), frames: 0, timing: self.timing };
+        let mut times = Times { profile: StepProfile::default(), frames: 0, timing: self.timing };
         for frame in self.done() + 1..=frames {
             at.frame = frame;
             let start = Instant::now();
             if self.timing == Timing::Throughout {
-                motion.step_timed(&mut times.ledger)?;
+                motion.step_timed(&mut times.profile)?;
                 times.frames += 1;
             } else {
                 motion.step()?;
@@ -124,7 +124,7 @@ impl Course<'_> {
         }
         let end = motion.end()?;
         // What happens to the body from here on is nobody's business, and a failure no reason to lose the run.
-        if self.timing == Timing::OneMore && rows.len() > 1 && motion.step_timed(&mut times.ledger).is_ok() {
+        if self.timing == Timing::OneMore && rows.len() > 1 && motion.step_timed(&mut times.profile).is_ok() {
             times.frames = 1;
         }
         Ok(Finish { rows, end, times })

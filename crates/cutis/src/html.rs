@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use base64::Engine;
 
-use crate::CostLedger;
+use crate::CostReport;
 use crate::report::{ChainmailReport, Report, Wound};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
@@ -94,7 +94,7 @@ fn tables(report: &Report) -> String {
     }
     out.push_str("</table>");
     out.push_str(&report.chainmail.as_ref().map_or_else(|| constraints(report), chainmail));
-    out.push_str(&costs(&report.ledger));
+    out.push_str(&cost_table(&report.costs));
     if let Some(r) = &report.resample {
         let _ = write!(
             out,
@@ -138,14 +138,14 @@ fn chainmail(told: &ChainmailReport) -> String {
     format!("<h2>ChainMail</h2><table>{}</table>", rows.iter().map(row).collect::<String>())
 }
 
-/// The cost ledger.
-fn costs(ledger: &CostLedger) -> String {
+/// The cost report.
+fn cost_table(costs: &CostReport) -> String {
     let mut out = String::from(
         "<h2>What the solver costs</h2><table><tr><th>part</th><th>memory</th><th>on the GPU</th><th>per frame</th></tr>",
     );
     let megabytes =
         |bytes: usize| if bytes == 0 { String::new() } else { format!("{:.1} MB", bytes as f64 / 1e6) };
-    for part in &ledger.parts {
+    for part in &costs.parts {
         let time = part.ms_per_frame.map(|ms| format!("{ms:.2} ms")).unwrap_or_default();
         let _ = write!(
             out,
@@ -155,7 +155,7 @@ fn costs(ledger: &CostLedger) -> String {
             megabytes(part.device_bytes),
         );
     }
-    let _ = write!(out, "</table><p>Time: {}.</p>", escape(&ledger.time));
+    let _ = write!(out, "</table><p>Time: {}.</p>", escape(&costs.time));
     out
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CostLedger, Error, Scene, files};
+use crate::{CostReport, Error, Scene, files};
 
 /// Version of the report's layout; the number grows when a key changes its meaning or goes.
 pub const SCHEMA: &str = "cutis-report/1";
@@ -38,7 +38,8 @@ pub struct Report {
     /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend.
     pub device_memory: Vec<MemoryPart>,
     /// Bytes and time of the solver by part; a run without a report measures no times.
-    pub ledger: CostLedger,
+    #[serde(rename = "ledger")]
+    pub costs: CostReport,
     /// What the GPU did; none on a CPU backend.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<DeviceWork>,
@@ -238,7 +239,7 @@ pub struct Resample {
     pub vacated_voxels: u64,
 }
 
-/// What ChainMail did. What its parts took is in the ledger.
+/// What ChainMail did. What its parts took is in the cost report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ChainmailReport {
     /// Elements (vertices of the cut body) that are not where they rest.

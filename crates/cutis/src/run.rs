@@ -140,7 +140,7 @@ fn run_with(
         colors: plan.colors,
         memory: plan.memory,
         device_memory: plan.device_memory,
-        ledger: times.enter(plan.ledger),
+        costs: times.enter(plan.costs),
         device: device.as_ref().map(Metered::work),
         stages: clock.stages.clone(),
         frames: frame_times(&rows),

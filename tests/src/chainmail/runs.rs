@@ -78,7 +78,7 @@ impl Whole {
 
     /// Milliseconds of a frame in one part.
     pub(super) fn part_ms(&self, name: &str) -> f64 {
-        let parts = &self.report.ledger.parts;
+        let parts = &self.report.costs.parts;
         parts.iter().filter(|part| part.part == name).filter_map(|part| part.ms_per_frame).sum()
     }
 

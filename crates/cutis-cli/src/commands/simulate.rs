@@ -116,7 +116,7 @@ fn table(plan: &Plan) -> String {
         format!("projections      {}", plan.projections),
         format!("memory, CT       {:.1} MB", plan.volume_bytes as f64 / 1e6),
     ];
-    lines.extend(ledger(plan));
+    lines.extend(cost_lines(plan));
     if !plan.device_memory.is_empty() {
         let parts: Vec<&str> = plan.device_memory.iter().map(|part| part.part.as_str()).collect();
         lines.push(format!("GPU, kernels     for {}", parts.join(", ")));
@@ -127,8 +127,8 @@ fn table(plan: &Plan) -> String {
     lines.join("\n")
 }
 
-/// The cost ledger: bytes exactly, times as measured.
-fn ledger(plan: &Plan) -> Vec<String> {
+/// The cost report: bytes exactly, times as measured.
+fn cost_lines(plan: &Plan) -> Vec<String> {
     let on_device = !plan.device_memory.is_empty();
     let row = |part: &str, colors: &str, host: &str, device: &str, time: &str| {
         let device = if on_device { format!("  {device:>12}") } else { String::new() };
@@ -139,15 +139,15 @@ fn ledger(plan: &Plan) -> Vec<String> {
         "cost of the solver:".to_owned(),
         row("part", "colors", "host, bytes", "GPU, bytes", "ms per frame"),
     ];
-    lines.extend(plan.ledger.parts.iter().map(|part| {
+    lines.extend(plan.costs.parts.iter().map(|part| {
         let colors = plan.colors.get(&part.part).map(usize::to_string).unwrap_or_default();
         let time = part.ms_per_frame.map(|ms| format!("{ms:.3}")).unwrap_or_default();
         row(&part.part, &colors, &bytes(part.host_bytes), &bytes(part.device_bytes), &time)
     }));
-    let sum = |of: fn(&cutis::CostPart) -> usize| bytes(plan.ledger.parts.iter().map(of).sum());
-    let time = plan.ledger.ms_per_frame().map(|ms| format!("{ms:.3}")).unwrap_or_default();
+    let sum = |of: fn(&cutis::CostPart) -> usize| bytes(plan.costs.parts.iter().map(of).sum());
+    let time = plan.costs.ms_per_frame().map(|ms| format!("{ms:.3}")).unwrap_or_default();
     lines.push(row("all", "", &sum(|part| part.host_bytes), &sum(|part| part.device_bytes), &time));
-    lines.push(format!("  time: {}", plan.ledger.time));
+    lines.push(format!("  time: {}", plan.costs.time));
     lines
 }
 

@@ -15,7 +15,7 @@ use crate::checkpoint::Checkpoint;
 use crate::report::ChainmailReport;
 use crate::scene::LoadedScene;
 
-/// Parts of a frame, as the cost ledger names them.
+/// Parts of a frame, as the cost report names them.
 const CUTS: &str = "cuts";
 const PROPAGATION: &str = "propagation";
 const RELAXATION: &str = "relaxation";
@@ -208,14 +208,14 @@ impl Motion for Chained<'_> {
         self.step_timed(&mut StepProfile::default())
     }
 
-    fn step_timed(&mut self, ledger: &mut StepProfile) -> Result<(), Error> {
+    fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error> {
         let mut changed = false;
         if !self.chain.cuts.is_empty() {
-            changed = ledger.time(CUTS, || self.cut());
+            changed = profile.time(CUTS, || self.cut());
         }
         self.frame += 1;
         if !self.held.is_empty() && (changed || self.frame <= self.last_drag) {
-            ledger.time(PROPAGATION, || self.propagate())?;
+            profile.time(PROPAGATION, || self.propagate())?;
             changed = true;
             if self.frame == self.last_drag {
                 self.told.energy_before = self.energy();
@@ -223,7 +223,7 @@ impl Motion for Chained<'_> {
         }
         self.settled &= !changed;
         if self.chain.relax_per_frame > 0 && !self.settled {
-            ledger.time(RELAXATION, || self.relax())?;
+            profile.time(RELAXATION, || self.relax())?;
         }
         Ok(())
     }

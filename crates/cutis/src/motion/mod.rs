@@ -22,7 +22,7 @@ pub(crate) trait Motion {
     fn step(&mut self) -> Result<(), Error>;
 
     /// As [`step`](Self::step), with the same bits, and enters how long each part took.
-    fn step_timed(&mut self, ledger: &mut StepProfile) -> Result<(), Error>;
+    fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error>;
 
     /// Whether each part of a frame is over before the next one begins, so that to time them costs nothing.
     fn waits(&self) -> bool;

@@ -32,8 +32,8 @@ impl Motion for Stepped {
         Ok(self.solver.step(1)?)
     }
 
-    fn step_timed(&mut self, ledger: &mut StepProfile) -> Result<(), Error> {
-        Ok(self.solver.step_timed(1, ledger)?)
+    fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error> {
+        Ok(self.solver.step_timed(1, profile)?)
     }
 
     fn waits(&self) -> bool {

@@ -16,7 +16,7 @@ use crate::motion::Chained;
 use crate::report::{Backend, MemoryPart, Sizes, Stage};
 use crate::scene::{LoadedScene, Model};
 use crate::source::{self, Source};
-use crate::{CostLedger, Error, Progress, ledger, region};
+use crate::{CostReport, Error, Progress, cost_report, region};
 
 use costs::Costs;
 
@@ -38,7 +38,8 @@ pub struct Plan {
     /// no part here has none.
     pub device_memory: Vec<MemoryPart>,
     /// Bytes and time of the solver by part.
-    pub ledger: CostLedger,
+    #[serde(rename = "ledger")]
+    pub costs: CostReport,
     /// Bytes of the volume's voxels.
     pub volume_bytes: usize,
     /// Projections of the run, steps of a vertex in vertex block descent, or visits of an element by the relaxation of ChainMail, at
@@ -75,17 +76,19 @@ pub(crate) enum Matter {
 pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Error> {
     let mut clock = Clock::new(progress);
     let Prepared { body, matter, backend, mut plan, .. } = prepare(loaded, Request::of(loaded)?, &mut clock)?;
-    plan.ledger = match matter {
-        _ if backend.on_gpu() => plan.ledger,
+    plan.costs = match matter {
+        _ if backend.on_gpu() => plan.costs,
         Matter::Dynamics(dynamics) => {
             let Dynamics { system, settings, .. } = *dynamics;
             clock
-                .stage("time a substep", 0, |_| ledger::of_substeps(&backend, system, settings, plan.ledger))
+                .stage("time a substep", 0, |_| {
+                    cost_report::of_substeps(&backend, system, settings, plan.costs)
+                })
                 .map_err(loaded.blame("solver"))?
         }
         Matter::Chain(chain) => clock.stage("time a frame", 0, |_| {
             let mut motion = Chained::new(loaded, *chain, &body, backend.chain_threads(), None)?;
-            ledger::of_first_frame(&mut motion, plan.ledger)
+            cost_report::of_first_frame(&mut motion, plan.costs)
         })?,
     };
     plan.stages = clock.stages;
@@ -146,7 +149,7 @@ pub(crate) fn prepare(
         backend: backend.report.clone(),
         sizes,
         colors,
-        ledger: CostLedger::of_memory(&memory, &device_memory, NO_DEVICE),
+        costs: CostReport::of_memory(&memory, &device_memory, NO_DEVICE),
         memory,
         device_memory,
         volume_bytes: 2 * source.volume.voxels().len(),

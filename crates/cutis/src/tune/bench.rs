@@ -13,7 +13,7 @@ use super::field::{Field, Movable};
 use super::setting::{Line, Model, Setting};
 use crate::backend::Chosen;
 use crate::expense::Expense;
-use crate::{CostLedger, Error, Progress};
+use crate::{CostReport, Error, Progress};
 
 /// Time after which the measurement of a substep ends, s.
 const LONG_ENOUGH_S: f64 = 0.1;
@@ -167,20 +167,20 @@ impl<'a> Bench<'a> {
     }
 
     /// Where the time of a setting goes: one frame part by part, after one to touch all memory.
-    pub(super) fn ledger(&self, setting: Setting) -> Result<StepProfile, Error> {
+    pub(super) fn profile(&self, setting: Setting) -> Result<StepProfile, Error> {
         let mut running = self.backend.start(self.system.clone(), setting.settings(&self.settings))?;
-        let mut ledger = StepProfile::default();
+        let mut profile = StepProfile::default();
         running.solver.step(1)?;
-        running.solver.step_timed(1, &mut ledger)?;
-        Ok(ledger)
+        running.solver.step_timed(1, &mut profile)?;
+        Ok(profile)
     }
 
     /// What a setting takes of memory, part by part.
-    pub(super) fn bytes(&self, setting: Setting) -> Result<CostLedger, Error> {
+    pub(super) fn bytes(&self, setting: Setting) -> Result<CostReport, Error> {
         let settings = setting.settings(&self.settings);
         let Expense { memory, .. } = Expense::of(self.system, &settings)?;
         let on_device = self.backend.device_memory(self.system, &settings);
-        Ok(CostLedger::of_memory(&memory, &on_device, "not measured"))
+        Ok(CostReport::of_memory(&memory, &on_device, "not measured"))
     }
 
     fn one_substep(&self, formulation: Formulation, iterations: u32) -> Settings {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Demand, Omission, ReferenceReport, Setting};
 use crate::report::{Backend, Machine, Stage};
-use crate::{CostLedger, Error};
+use crate::{CostReport, Error};
 
 /// Version of the layout of a calibration; the number grows when a key changes its meaning or goes.
 pub const SCHEMA: &str = "cutis-tune/1";
@@ -38,7 +38,8 @@ pub struct Tuning {
     /// The tuned copy of the scene; none if no setting meets the demand.
     pub scene_file: Option<PathBuf>,
     /// Bytes and time of the picked setting by part; no parts if none was picked.
-    pub ledger: CostLedger,
+    #[serde(rename = "ledger")]
+    pub costs: CostReport,
     /// What can be left out, and what that saves and changes; empty if it was not measured.
     pub omissions: Vec<Omission>,
     /// What the user should know.

@@ -29,7 +29,7 @@ use crate::plan::{self, Prepared};
 use crate::report::Machine;
 use crate::scene::{FormulationChoice, LoadedScene};
 use crate::system::needs_system;
-use crate::{CostLedger, Error, Progress};
+use crate::{CostReport, Error, Progress};
 
 use bench::Bench;
 pub use choose::Demand;
@@ -110,7 +110,7 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         candidates,
         picked,
         scene_file: None,
-        ledger: CostLedger { time: "no setting was picked".into(), ..CostLedger::default() },
+        costs: CostReport { time: "no setting was picked".into(), ..CostReport::default() },
         omissions: Vec::new(),
         stages: Vec::new(),
     };
@@ -119,9 +119,9 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         tuning.warnings.extend(needed);
     }
     if let Some(picked) = &tuning.picked {
-        let times = clock.stage("parts of a frame", 0, |_| bench.ledger(picked.setting))?;
+        let times = clock.stage("parts of a frame", 0, |_| bench.profile(picked.setting))?;
         let how = "one frame of the picked setting, part by part";
-        tuning.ledger = bench.bytes(picked.setting)?.with_times(&times, 1.0, how);
+        tuning.costs = bench.bytes(picked.setting)?.with_times(&times, 1.0, how);
         let mut scene = loaded.scene.clone();
         scene.solver = picked.setting.applied_to(&scene.solver);
         clock.stage("write the scene", 0, |_| copy.write(&scene, &tuning.promise(picked)))?;

@@ -1,4 +1,4 @@
-//! The cost ledger: bytes and time of the solver, part by part.
+//! The cost report: bytes and time of the solver, part by part.
 
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ const LONG_ENOUGH_S: f64 = 0.1;
 
 /// What the solver costs, part by part.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
-pub struct CostLedger {
+pub struct CostReport {
     /// The parts that store something, then those that only take time. What the scene leaves out has no part.
     pub parts: Vec<CostPart>,
     /// How the times were measured, or why they were not.
@@ -37,17 +37,17 @@ pub struct CostPart {
     pub ms_per_frame: Option<f64>,
 }
 
-impl CostLedger {
+impl CostReport {
     /// Bytes without times. `why` there are none.
     pub(crate) fn of_memory(host: &[MemoryPart], device: &[MemoryPart], why: &str) -> Self {
-        let mut ledger = Self { parts: Vec::new(), time: why.into() };
+        let mut report = Self { parts: Vec::new(), time: why.into() };
         for MemoryPart { part, bytes } in host {
-            ledger.part(part).host_bytes += bytes;
+            report.part(part).host_bytes += bytes;
         }
         for MemoryPart { part, bytes } in device {
-            ledger.part(part).device_bytes += bytes;
+            report.part(part).device_bytes += bytes;
         }
-        ledger
+        report
     }
 
     /// The same with the times of `frames` frames. `how` they were measured.
@@ -87,14 +87,14 @@ pub(crate) fn of_substeps(
     backend: &Chosen,
     system: System<f32>,
     settings: Settings,
-    bytes: CostLedger,
-) -> Result<CostLedger, Error> {
+    bytes: CostReport,
+) -> Result<CostReport, Error> {
     let iterations = settings.iterations.min(MOST_ITERATIONS);
     let substep = Settings { dt_s: settings.substep_s(), substeps: 1, iterations, ..settings };
     let mut solver = backend.start(system, substep)?.solver;
     let (mut times, mut done) = (StepProfile::default(), 0.0);
     if let Err(error) = solver.step(1) {
-        return Ok(CostLedger { time: format!("not measured: {error}"), ..bytes });
+        return Ok(CostReport { time: format!("not measured: {error}"), ..bytes });
     }
     let start = Instant::now();
     while done == 0.0 || start.elapsed().as_secs_f64() < LONG_ENOUGH_S {
@@ -119,7 +119,7 @@ pub(crate) fn of_substeps(
 ///
 /// # Errors
 /// As the frame gives them.
-pub(crate) fn of_first_frame(motion: &mut dyn Motion, bytes: CostLedger) -> Result<CostLedger, Error> {
+pub(crate) fn of_first_frame(motion: &mut dyn Motion, bytes: CostReport) -> Result<CostReport, Error> {
     let mut times = StepProfile::default();
     motion.step_timed(&mut times)?;
     Ok(bytes.with_times(&times, 1.0, "the first frame, on this machine as busy as it is now"))
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn bytes_and_times_meet_by_name() {
         let (host, device) = ([bytes("vertices", 40), bytes("stc", 12)], [bytes("vertices", 48)]);
-        let without = CostLedger::of_memory(&host, &device, "no device");
+        let without = CostReport::of_memory(&host, &device, "no device");
         assert_eq!((without.ms_per_frame(), without.time.as_str()), (None, "no device"));
         let mut times = StepProfile::default();
         times.add("stc", 0.5);
