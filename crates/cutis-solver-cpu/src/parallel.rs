@@ -29,7 +29,7 @@ impl<T: Scalar> Execute<T> for Parallel {
         fan_out(self.threads.min(color.chunks()), &|| while color.project_next_chunk() {});
     }
 
-    fn turn(&self, color: ColoredVertices<'_, T>) {
+    fn color_pass(&self, color: ColoredVertices<'_, T>) {
         fan_out(self.threads.min(color.chunks()), &|| while color.move_next_chunk() {});
     }
 

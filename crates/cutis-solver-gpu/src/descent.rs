@@ -9,7 +9,7 @@ use std::ops::Range;
 use cutis_coloring::Incidence;
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
-use cutis_solver::{ConstraintSet, Descent, DescentStep, Kind, Simulation, Turn};
+use cutis_solver::{ColorPass, ConstraintSet, Descent, DescentStep, Kind, Simulation};
 
 use crate::body::Body;
 
@@ -18,7 +18,7 @@ pub(crate) type PullRow = [f32; 12];
 /// A vertex of a chunk and its range of the slab's places.
 pub(crate) type Share = [u32; 3];
 
-/// All that the turns of an iteration need.
+/// All that the color passes of an iteration need.
 pub(crate) struct DescentOnDevice {
     descend: Kernel,
     /// One per kind.
@@ -114,19 +114,19 @@ impl DescentOnDevice {
     }
 
     /// Moves the vertices of a color.
-    pub(crate) fn turn(&self, pass: &mut Pass<'_>, turn: &Turn) {
-        for chunk in &self.colors[turn.color] {
+    pub(crate) fn color_pass(&self, recording: &mut Pass<'_>, pass: &ColorPass) {
+        for chunk in &self.colors[pass.color] {
             for (n, group, len) in &chunk.kinds {
                 let (kernel, shared) = &self.pulls[*n];
-                pass.dispatch(kernel, &[shared, group], *len);
+                recording.dispatch(kernel, &[shared, group], *len);
             }
-            pass.dispatch(&self.descend, &[&self.moved, &chunk.vertices], chunk.len);
+            recording.dispatch(&self.descend, &[&self.moved, &chunk.vertices], chunk.len);
         }
     }
 
     /// Dispatches of an iteration, and their threads.
-    pub(crate) fn load<'a>(&self, turns: impl Iterator<Item = &'a Turn>) -> [usize; 2] {
-        let chunks: Vec<&Chunk> = turns.flat_map(|turn| &self.colors[turn.color]).collect();
+    pub(crate) fn load<'a>(&self, color_passes: impl Iterator<Item = &'a ColorPass>) -> [usize; 2] {
+        let chunks: Vec<&Chunk> = color_passes.flat_map(|pass| &self.colors[pass.color]).collect();
         let threads = |chunk: &&Chunk| chunk.len + chunk.kinds.iter().map(|(_, _, len)| len).sum::<usize>();
         [chunks.iter().map(|chunk| 1 + chunk.kinds.len()).sum(), chunks.iter().map(threads).sum()]
     }

@@ -70,7 +70,7 @@ impl Constraints {
                 threads: simulation.system().kinds().iter().map(|kind| kind.len()).sum(),
             },
             Self::Pulling(descent) => {
-                let [dispatches, threads] = descent.load(simulation.schedule().turns_of(0));
+                let [dispatches, threads] = descent.load(simulation.schedule().color_passes_of(0));
                 Load { dispatches, threads }
             }
         }
@@ -92,8 +92,8 @@ impl Constraints {
                 }
             }
             Self::Pulling(descent) => {
-                for turn in schedule.turns_of(iteration) {
-                    descent.turn(recorder.part(StepProfile::DESCENT)?, turn);
+                for pass in schedule.color_passes_of(iteration) {
+                    descent.color_pass(recorder.part(StepProfile::DESCENT)?, pass);
                 }
             }
         }

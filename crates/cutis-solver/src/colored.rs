@@ -21,7 +21,7 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::batch::{Load, Store};
-use crate::{ConstraintSet, Descent, Kind, Pull, Step, System, Turn, Vertex};
+use crate::{ColorPass, ConstraintSet, Descent, Kind, Pull, Step, System, Vertex};
 
 /// Constraints that a thread takes at a time. Fixed; results do not depend on it.
 const CHUNK: usize = 1024;
@@ -138,12 +138,12 @@ unsafe impl<T: Scalar> Sync for ColoredVertices<'_, T> {}
 
 impl<'a, T: Scalar> ColoredVertices<'a, T> {
     /// Prepares a color of `descent`, which must be that of `system`.
-    pub(crate) fn new(system: &'a mut System<T>, descent: &'a Descent<T>, turn: Turn) -> Self {
+    pub(crate) fn new(system: &'a mut System<T>, descent: &'a Descent<T>, pass: ColorPass) -> Self {
         let System { vertices, previous, velocities, kinds, .. } = system;
         Self {
             kinds,
             descent,
-            range: turn.start..turn.end,
+            range: pass.start..pass.end,
             next: AtomicUsize::new(0),
             previous,
             velocities,

@@ -70,7 +70,7 @@ pub use kernel::{Pbd, Projection, Rule, Xpbd, project};
 pub use measures::{Energy, MemoryPart, Momentum, Residual};
 pub use passes::{Integrator, Motion, VertexBlock};
 pub use reference::{Serial, SolverReference};
-pub use schedule::{Schedule, Sweep, Turn};
+pub use schedule::{ColorPass, Schedule, Sweep};
 pub use set::{ConstraintSet, Kind, Step};
 pub use settings::{Formulation, Settings};
 pub use simulation::{Execute, Method, Simulation};

@@ -30,7 +30,7 @@ impl<T: Scalar> Execute<T> for Serial {
         set.project(range, vertices, step, multipliers);
     }
 
-    fn turn(&self, color: ColoredVertices<'_, T>) {
+    fn color_pass(&self, color: ColoredVertices<'_, T>) {
         color.move_one_by_one();
     }
 

@@ -20,7 +20,7 @@ pub struct Sweep {
 
 /// One color of the vertices that move: they may be moved in any order, or at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
+pub struct ColorPass {
     /// Color.
     pub color: usize,
     /// First vertex, in the order of the groups.
@@ -29,7 +29,7 @@ pub struct Turn {
     pub end: usize,
 }
 
-/// A frame: `substeps` times { predict and carry handles; `iterations` times { the sweeps in order, or the turns of the iteration };
+/// A frame: `substeps` times { predict and carry handles; `iterations` times { the sweeps in order, or the color passes of the iteration };
 /// update velocities }.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {
@@ -39,8 +39,8 @@ pub struct Schedule {
     pub iterations: u32,
     /// What one iteration projects, in order. Empty colors are left out. None in vertex block descent.
     pub sweeps: Vec<Sweep>,
-    /// All colors of the vertices that move, in order, in vertex block descent; none elsewhere. See [`turns_of`](Self::turns_of).
-    pub turns: Vec<Turn>,
+    /// All colors of the vertices that move, in order, in vertex block descent; none elsewhere. See [`color_passes_of`](Self::color_passes_of).
+    pub color_passes: Vec<ColorPass>,
 }
 
 impl Schedule {
@@ -54,38 +54,43 @@ impl Schedule {
                 }
             }
         }
-        Self { substeps: settings.substeps, iterations: settings.iterations, sweeps, turns: Vec::new() }
+        Self {
+            substeps: settings.substeps,
+            iterations: settings.iterations,
+            sweeps,
+            color_passes: Vec::new(),
+        }
     }
 
     pub(crate) fn of_vertices(groups: &Groups, settings: &Settings) -> Self {
-        let turn = |(color, range): (usize, &[u32])| Turn {
+        let pass = |(color, range): (usize, &[u32])| ColorPass {
             color,
             start: range[0] as usize,
             end: range[1] as usize,
         };
-        let there = groups.offsets.windows(2).enumerate().map(turn).filter(|turn| turn.start < turn.end);
+        let there = groups.offsets.windows(2).enumerate().map(pass).filter(|pass| pass.start < pass.end);
         let Settings { substeps, iterations, .. } = *settings;
-        Self { substeps, iterations, sweeps: Vec::new(), turns: there.collect() }
+        Self { substeps, iterations, sweeps: Vec::new(), color_passes: there.collect() }
     }
 
-    /// The turns of an iteration of vertex block descent, counted from 0, in order: all colors twice. Of all passes over the
+    /// The color passes of an iteration of vertex block descent, counted from 0, in order: all colors twice. Of all passes over the
     /// colors in a substep the first half goes there and the second half back, so that a substep is symmetric: see the top
     /// of `descent.rs`.
-    pub fn turns_of(&self, iteration: u32) -> impl Iterator<Item = &Turn> {
-        let pass = |number: u64| {
+    pub fn color_passes_of(&self, iteration: u32) -> impl Iterator<Item = &ColorPass> {
+        let sweep = |number: u64| {
             let back = number >= u64::from(self.iterations);
-            let count = self.turns.len();
-            (0..count).map(move |n| &self.turns[if back { count - 1 - n } else { n }])
+            let count = self.color_passes.len();
+            (0..count).map(move |n| &self.color_passes[if back { count - 1 - n } else { n }])
         };
         let first = 2 * u64::from(iteration);
-        pass(first).chain(pass(first + 1))
+        sweep(first).chain(sweep(first + 1))
     }
 
     /// Projections of one frame; in vertex block descent, steps of a vertex.
     pub fn projections_per_frame(&self) -> u64 {
         let sweeps: u64 = self.sweeps.iter().map(|sweep| (sweep.end - sweep.start) as u64).sum();
-        let turns: u64 = self.turns.iter().map(|turn| (turn.end - turn.start) as u64).sum();
-        (sweeps + 2 * turns) * u64::from(self.substeps) * u64::from(self.iterations)
+        let color_passes: u64 = self.color_passes.iter().map(|pass| (pass.end - pass.start) as u64).sum();
+        (sweeps + 2 * color_passes) * u64::from(self.substeps) * u64::from(self.iterations)
     }
 }
 
@@ -98,7 +103,8 @@ mod tests {
         let groups = Groups { order: vec![4, 2, 7], offsets: vec![0, 1, 3] };
         let settings = Settings { iterations: 3, ..Settings::default() };
         let schedule = Schedule::of_vertices(&groups, &settings);
-        let turns = |iteration| schedule.turns_of(iteration).map(|turn| turn.color).collect::<Vec<_>>();
-        assert_eq!([turns(0), turns(1), turns(2)], [[0, 1, 0, 1], [0, 1, 1, 0], [1, 0, 1, 0]]);
+        let colors =
+            |iteration| schedule.color_passes_of(iteration).map(|pass| pass.color).collect::<Vec<_>>();
+        assert_eq!([colors(0), colors(1), colors(2)], [[0, 1, 0, 1], [0, 1, 1, 0], [1, 0, 1, 0]]);
     }
 }

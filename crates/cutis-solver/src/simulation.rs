@@ -26,7 +26,7 @@ pub trait Execute<T: Scalar> {
     );
 
     /// Moves the vertices of one color.
-    fn turn(&self, color: ColoredVertices<'_, T>);
+    fn color_pass(&self, color: ColoredVertices<'_, T>);
 
     /// Runs what one thread does between the passes; `part` is its name in a [`StepProfile`](crate::StepProfile).
     fn alone(&self, _part: &'static str, work: &mut dyn FnMut()) {
@@ -247,8 +247,8 @@ impl<T: Scalar> Simulation<T> {
                     }
                 }
                 Method::Descend(descent) => {
-                    for &turn in self.schedule.turns_of(iteration) {
-                        execute.turn(ColoredVertices::new(&mut self.system, descent, turn));
+                    for &pass in self.schedule.color_passes_of(iteration) {
+                        execute.color_pass(ColoredVertices::new(&mut self.system, descent, pass));
                     }
                 }
             }

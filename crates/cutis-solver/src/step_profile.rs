@@ -98,8 +98,8 @@ impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
         self.profile.borrow_mut().time(set.name(), work);
     }
 
-    fn turn(&self, color: ColoredVertices<'_, T>) {
-        self.profile.borrow_mut().time(StepProfile::DESCENT, || self.inner.turn(color));
+    fn color_pass(&self, color: ColoredVertices<'_, T>) {
+        self.profile.borrow_mut().time(StepProfile::DESCENT, || self.inner.color_pass(color));
     }
 
     fn alone(&self, part: &'static str, work: &mut dyn FnMut()) {

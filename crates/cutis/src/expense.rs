@@ -129,7 +129,7 @@ mod tests {
             assert_eq!(plan.projections, 3 * schedule.projections_per_frame());
             let expense = Expense::of(&system, solver.settings()).unwrap();
             let work = expense.work(&system, solver.settings(), 1);
-            assert_eq!(work.sweeps as usize, schedule.sweeps.len() + 2 * schedule.turns.len());
+            assert_eq!(work.sweeps as usize, schedule.sweeps.len() + 2 * schedule.color_passes.len());
             let passes = u64::from(schedule.iterations) * u64::from(schedule.substeps);
             assert_eq!(work.elements * passes, schedule.projections_per_frame());
             let host = plan.costs.parts.iter().filter(|part| part.host_bytes > 0);
