@@ -4,7 +4,7 @@
 //! source declares beside it, and a constraint therefore may not: `N`, `Eval`, `hidden_zero`, `inverse_reach_squared` (which it may
 //! set), `exact` and `exact3` (both of which it may call), `Settings`, `is_finite`,
 //! `quotient_or_zero`, `multiplier_change`, `multiplier_of`, `keep_multiplier`, `stiffness_of`, `vertices`, `settings`,
-//! `Pull`, `Share`, `pulls`, `shape`, `places`, `shares`, `tuples`, `params`, `stiffness`, `multipliers`, `points`, `found`, `inverse_rest_size`, `partial`, `sums` and the
+//! `VertexForce`, `Share`, `forces`, `shape`, `places`, `shares`, `tuples`, `params`, `stiffness`, `multipliers`, `points`, `found`, `inverse_rest_size`, `partial`, `sums` and the
 //! entry points.
 
 use crate::link;
@@ -45,16 +45,16 @@ pub enum Multiplier {
 
 /// The name of the entry point of [`project`].
 pub const PROJECT: &str = "project";
-/// The name of the entry point of [`pull`].
-pub const PULL: &str = "pull";
+/// The name of the entry point of [`vertex_force`].
+pub const VERTEX_FORCE: &str = "vertex_force";
 /// The name of the entry point of [`descend`].
 pub const DESCEND: &str = "descend";
 /// The name of the entry point of [`residual`].
 pub const RESIDUAL: &str = "residual";
 /// The name of the entry point of [`evaluate`].
 pub const EVALUATE: &str = "evaluate";
-/// The name of the entry point of [`carry`].
-pub const CARRY: &str = "carry";
+/// The name of the entry point of [`kinematic`].
+pub const KINEMATIC: &str = "kinematic";
 /// The name of the entry point of [`gather`].
 pub const GATHER: &str = "gather";
 
@@ -89,8 +89,8 @@ pub fn project(
 }
 
 /// What the constraints of a kind do to the vertices of a chunk.
-pub fn pull(arity: usize, constraint: &str) -> String {
-    link(&[&head(arity), constraint, include_str!("../wgsl/solver/pull.wgsl")])
+pub fn vertex_force(arity: usize, constraint: &str) -> String {
+    link(&[&head(arity), constraint, include_str!("../wgsl/solver/vertex_force.wgsl")])
 }
 
 /// The steps of the vertices of a chunk of one color.
@@ -114,8 +114,8 @@ pub fn vertices() -> String {
 }
 
 /// Kinematic vertices along their paths.
-pub fn carry() -> String {
-    include_str!("../wgsl/solver/carry.wgsl").to_owned()
+pub fn kinematic() -> String {
+    include_str!("../wgsl/solver/kinematic.wgsl").to_owned()
 }
 
 /// Positions of chosen vertices, side by side.

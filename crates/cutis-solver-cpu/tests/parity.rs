@@ -20,7 +20,7 @@ fn body<T: Scalar>(formulation: Formulation) -> System<T> {
     let lattice = Kuhn::new([40, 24, 20], 0.1);
     let count = lattice.positions.len();
     let masses: Vec<f64> = (0..count).map(|n| (n % 40).min(1) as f64 * (0.5 + (n % 7) as f64)).collect();
-    let carried = (0..count as u32).filter(|n| n % 40 == 39 && (n / 40) % 24 == 0).collect();
+    let held = (0..count as u32).filter(|n| n % 40 == 39 && (n / 40) % 24 == 0).collect();
     let skin: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(5).collect();
     let each = |count: usize, unit: f64| {
         let value = |n: usize| (1 + n % 3) as f64;
@@ -57,7 +57,7 @@ fn body<T: Scalar>(formulation: Formulation) -> System<T> {
             &greedy(&lattice.tets, count).unwrap(),
         )
         .unwrap()
-        .handle(Handle { vertices: carried, move_m: [0.1, 0.2, 0.0], over_s: 0.03 })
+        .handle(Handle { vertices: held, move_m: [0.1, 0.2, 0.0], over_s: 0.03 })
         .unwrap()
         .build()
 }

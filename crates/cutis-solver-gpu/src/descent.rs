@@ -13,8 +13,8 @@ use cutis_solver::{ColorPass, ConstraintSet, Descent, DescentStep, Kind, Simulat
 
 use crate::body::Body;
 
-/// Numbers of a vertex's pull: force, diagonal and mixed entries, four each.
-pub(crate) type PullRow = [f32; 12];
+/// Numbers of a vertex's vertex_force: force, diagonal and mixed entries, four each.
+pub(crate) type VertexForceRow = [f32; 12];
 /// A vertex of a chunk and its range of the slab's places.
 pub(crate) type Share = [u32; 3];
 
@@ -22,7 +22,7 @@ pub(crate) type Share = [u32; 3];
 pub(crate) struct DescentOnDevice {
     descend: Kernel,
     /// One per kind.
-    pulls: Vec<(Kernel, BindGroup)>,
+    forces: Vec<(Kernel, BindGroup)>,
     moved: BindGroup,
     /// Chunks of each color.
     colors: Vec<Vec<Chunk>>,
@@ -55,10 +55,10 @@ impl DescentOnDevice {
         let kinds = simulation.system().kinds();
         let source = solver::descend();
         let descend = gpu.kernel("vertices: descend", &source, solver::DESCEND)?;
-        let most = gpu.chunk_len(size_of::<PullRow>());
+        let most = gpu.chunk_len(size_of::<VertexForceRow>());
         let groups = descent.groups();
         let largest = groups.iter().map(<[u32]>::len).max().unwrap_or(0).min(most);
-        let scratch = gpu.zeroed::<PullRow>("pulls", largest)?;
+        let scratch = gpu.zeroed::<VertexForceRow>("vertex forces", largest)?;
         let settings = gpu.uniform("settings of a descent", &settings_of(descent.step()))?;
         let bindings = [
             (0, body.vertices.whole()),
@@ -68,14 +68,15 @@ impl DescentOnDevice {
             (4, settings.whole()),
         ];
         let moved = gpu.bind(&descend, 0, &bindings)?;
-        let mut pulls = Vec::with_capacity(kinds.len());
+        let mut forces = Vec::with_capacity(kinds.len());
         for set in kinds {
-            let source = solver::pull(set.arity(), set.wgsl());
-            let kernel = gpu.kernel(&format!("{}: pull", set.name()), &source, solver::PULL)?;
+            let source = solver::vertex_force(set.arity(), set.wgsl());
+            let kernel =
+                gpu.kernel(&format!("{}: vertex force", set.name()), &source, solver::VERTEX_FORCE)?;
             let shared = gpu.bind(&kernel, 0, &[(0, body.vertices.whole()), (1, scratch.whole())])?;
-            pulls.push((kernel, shared));
+            forces.push((kernel, shared));
         }
-        let mut made = Self { descend, pulls, moved, colors: groups.iter().map(|_| Vec::new()).collect() };
+        let mut made = Self { descend, forces, moved, colors: groups.iter().map(|_| Vec::new()).collect() };
         for slab in slabs(gpu, kinds, descent) {
             made.add_slab(gpu, kinds, descent, slab, most)?;
         }
@@ -102,7 +103,7 @@ impl DescentOnDevice {
                 let vertices = gpu.bind(&self.descend, 1, &[(0, order.whole())])?;
                 let mut chunk = Chunk { vertices, len: chosen.len(), kinds: Vec::new() };
                 for (n, (set, incidence)) in kinds.iter().zip(descent.incidences()).enumerate() {
-                    let (kernel, _) = &self.pulls[n];
+                    let (kernel, _) = &self.forces[n];
                     if let Some((group, len)) = tables[n].bind(gpu, kernel, &**set, incidence, chosen)? {
                         chunk.kinds.push((n, group, len));
                     }
@@ -117,7 +118,7 @@ impl DescentOnDevice {
     pub(crate) fn color_pass(&self, recording: &mut Pass<'_>, pass: &ColorPass) {
         for chunk in &self.colors[pass.color] {
             for (n, group, len) in &chunk.kinds {
-                let (kernel, shared) = &self.pulls[*n];
+                let (kernel, shared) = &self.forces[*n];
                 recording.dispatch(kernel, &[shared, group], *len);
             }
             recording.dispatch(&self.descend, &[&self.moved, &chunk.vertices], chunk.len);

@@ -2,7 +2,7 @@
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
-use cutis_solver::{Carried, Clock, Settings, System};
+use cutis_solver::{Clock, KinematicHandle, Settings, System};
 
 use crate::body::Body;
 
@@ -28,28 +28,28 @@ impl Handles {
         if handles.iter().all(|handle| handle.vertices().is_empty()) {
             return Ok(None);
         }
-        let kernel = gpu.kernel("handles", &solver::carry(), solver::CARRY)?;
+        let kernel = gpu.kernel("handles", &solver::kinematic(), solver::KINEMATIC)?;
         let frame = gpu.uniform("handles: frame", &[0; 2])?;
         let paths = handles.len().saturating_mul(settings.substeps as usize);
         let paths = gpu.zeroed::<[f32; 4]>("handles: paths", paths)?;
         let bindings = [body.vertices.whole(), body.status.whole(), frame.whole(), paths.whole()];
         let bindings: Vec<_> = (0..).zip(bindings).collect();
         let shared = gpu.bind(&kernel, 0, &bindings)?;
-        let mut carried: Vec<[u32; 4]> = Vec::new();
+        let mut held: Vec<[u32; 4]> = Vec::new();
         let mut owners: Vec<u32> = Vec::new();
         for (owner, handle) in (0..).zip(handles) {
             for (&vertex, rest) in handle.vertices().iter().zip(handle.rest()) {
-                carried.push([rest.x.to_bits(), rest.y.to_bits(), rest.z.to_bits(), vertex]);
+                held.push([rest.x.to_bits(), rest.y.to_bits(), rest.z.to_bits(), vertex]);
                 owners.push(owner);
             }
         }
         let most = gpu.chunk_len(size_of::<[u32; 4]>());
         let mut chunks = Vec::new();
-        for (carried, owners) in carried.chunks(most).zip(owners.chunks(most)) {
-            let places = gpu.buffer("handles: vertices", carried)?;
+        for (held, owners) in held.chunks(most).zip(owners.chunks(most)) {
+            let places = gpu.buffer("handles: vertices", held)?;
             let owners = gpu.buffer("handles: owners", owners)?;
             let group = gpu.bind(&kernel, 1, &[(0, places.whole()), (1, owners.whole())])?;
-            chunks.push((group, carried.len()));
+            chunks.push((group, held.len()));
         }
         Ok(Some(Self { kernel, shared, chunks, frame, paths }))
     }
@@ -59,7 +59,7 @@ impl Handles {
     pub(crate) fn write_paths(
         &self,
         gpu: &Gpu,
-        handles: &[Carried<f32>],
+        handles: &[KinematicHandle<f32>],
         mut clock: Clock,
         settings: &Settings,
         done: u32,
@@ -79,7 +79,7 @@ impl Handles {
     }
 
     /// Puts the vertices where they are at the end of the substep in work.
-    pub(crate) fn carry(&self, pass: &mut Pass<'_>) {
+    pub(crate) fn advance(&self, pass: &mut Pass<'_>) {
         for (chunk, threads) in &self.chunks {
             pass.dispatch(&self.kernel, &[&self.shared, chunk], *threads);
         }

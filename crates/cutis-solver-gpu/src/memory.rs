@@ -1,8 +1,10 @@
 //! What a body needs on a device.
 
-use cutis_solver::{Carried, ConstraintSet, Descent, Formulation, MemoryPart, Settings, System, Values};
+use cutis_solver::{
+    ConstraintSet, Descent, Formulation, KinematicHandle, MemoryPart, Settings, System, Values,
+};
 
-use crate::descent::{PullRow, Share};
+use crate::descent::{Share, VertexForceRow};
 
 /// Bytes on the device, part by part; no device is needed to know them. Measures that are asked for later (residuals, the
 /// positions of some vertices) come on top.
@@ -28,16 +30,17 @@ pub fn device_bytes(system: &System<f32>, settings: &Settings) -> Vec<MemoryPart
         parts.push(MemoryPart { name: "multipliers", bytes: count * size_of::<f32>() });
     }
     if descends {
-        // The vertices of all colors, and the pulls of the largest one.
+        // The vertices of all colors, and the forces of the largest one.
         let bytes = Descent::new(system, settings).map_or(0, |descent| {
             let largest = descent.groups().iter().map(<[u32]>::len).max().unwrap_or(0);
-            size_of_val(descent.groups().order.as_slice()) + largest * size_of::<PullRow>()
+            size_of_val(descent.groups().order.as_slice()) + largest * size_of::<VertexForceRow>()
         });
-        parts.push(MemoryPart { name: "pulls", bytes });
+        parts.push(MemoryPart { name: "vertex forces", bytes });
     }
-    let carried: usize = system.handles().iter().map(|handle: &Carried<f32>| handle.vertices().len()).sum();
-    if carried > 0 {
-        parts.push(MemoryPart { name: "handles", bytes: carried * size_of::<[u32; 5]>() });
+    let held: usize =
+        system.handles().iter().map(|handle: &KinematicHandle<f32>| handle.vertices().len()).sum();
+    if held > 0 {
+        parts.push(MemoryPart { name: "handles", bytes: held * size_of::<[u32; 5]>() });
     }
     parts
 }

@@ -48,7 +48,7 @@ enum Constraints {
     /// Color by color of each kind.
     Projected(Vec<Kind>),
     /// By the vertices that they act on.
-    Pulling(DescentOnDevice),
+    Descent(DescentOnDevice),
 }
 
 impl Constraints {
@@ -58,7 +58,7 @@ impl Constraints {
             Method::Project(_) => {
                 Self::Projected(simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?)
             }
-            Method::Descend(descent) => Self::Pulling(DescentOnDevice::new(gpu, body, simulation, descent)?),
+            Method::Descend(descent) => Self::Descent(DescentOnDevice::new(gpu, body, simulation, descent)?),
         })
     }
 
@@ -69,7 +69,7 @@ impl Constraints {
                 dispatches: kinds.iter().flat_map(|kind| &kind.colors).map(Vec::len).sum(),
                 threads: simulation.system().kinds().iter().map(|kind| kind.len()).sum(),
             },
-            Self::Pulling(descent) => {
+            Self::Descent(descent) => {
                 let [dispatches, threads] = descent.load(simulation.schedule().color_passes_of(0));
                 Load { dispatches, threads }
             }
@@ -91,7 +91,7 @@ impl Constraints {
                     kinds[sweep.kind].project(recorder.part(name)?, sweep, iteration);
                 }
             }
-            Self::Pulling(descent) => {
+            Self::Descent(descent) => {
                 for pass in schedule.color_passes_of(iteration) {
                     descent.color_pass(recorder.part(StepProfile::DESCENT)?, pass);
                 }
@@ -208,7 +208,7 @@ impl SolverGpu {
                 self.body.begin_substep(recorder.part(StepProfile::VERTICES)?, begun);
                 begun = true;
                 if let Some(handles) = &self.handles {
-                    handles.carry(recorder.part(StepProfile::HANDLES)?);
+                    handles.advance(recorder.part(StepProfile::HANDLES)?);
                 }
                 for iteration in 0..self.simulation.schedule().iterations {
                     self.constraints.encode(&mut recorder, &self.simulation, iteration)?;

@@ -9,12 +9,12 @@ use nalgebra::{Point3, Vector3};
 
 use crate::batch::Batch;
 use crate::system::check_finite;
-use crate::{Carried, Handle, SolverError, Stiffness, System, Vertex};
+use crate::{Handle, KinematicHandle, SolverError, Stiffness, System, Vertex};
 
 /// Collects vertices, kinds of constraints and handles into a [`System`].
 pub struct SystemBuilder<T: Scalar> {
     system: System<T>,
-    carried: HashSet<u32>,
+    held: HashSet<u32>,
 }
 
 impl<T: Scalar> SystemBuilder<T> {
@@ -91,7 +91,7 @@ impl<T: Scalar> SystemBuilder<T> {
             handles: Vec::new(),
             vertex_groups: None,
         };
-        Ok(Self { system, carried: HashSet::new() })
+        Ok(Self { system, held: HashSet::new() })
     }
 
     /// Velocities at the start in m/s, one per vertex. Without this call all are zero.
@@ -172,8 +172,8 @@ impl<T: Scalar> SystemBuilder<T> {
     /// time.
     pub fn handle(mut self, handle: Handle) -> Result<Self, SolverError> {
         let System { vertices, handles, .. } = &mut self.system;
-        let carried = Carried::new(handles.len(), handle, vertices, &mut self.carried)?;
-        handles.push(carried);
+        let held = KinematicHandle::new(handles.len(), handle, vertices, &mut self.held)?;
+        handles.push(held);
         Ok(self)
     }
 

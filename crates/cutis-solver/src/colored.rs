@@ -21,7 +21,7 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::batch::{Load, Store};
-use crate::{ColorPass, ConstraintSet, Descent, Kind, Pull, Step, System, Vertex};
+use crate::{ColorPass, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexForce};
 
 /// Constraints that a thread takes at a time. Fixed; results do not depend on it.
 const CHUNK: usize = 1024;
@@ -156,15 +156,15 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
     /// Takes a chunk that nobody took yet and moves its vertices; `false` when none is left.
     pub fn move_next_chunk(&self) -> bool {
         let Some(chosen) = self.next_chunk() else { return false };
-        let mut pulls = [Pull::none(); VERTEX_CHUNK];
-        let pulls = &mut pulls[..chosen.len()];
+        let mut forces = [VertexForce::none(); VERTEX_CHUNK];
+        let forces = &mut forces[..chosen.len()];
         let shared = || SharedVertices { vertices: self.vertices, borrow: PhantomData };
         for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
-            kind.pull_shared(incidence, chosen, shared(), pulls);
+            kind.pull_shared(incidence, chosen, shared(), forces);
         }
         let mut vertices = shared();
-        for (&vertex, pull) in chosen.iter().zip(pulls) {
-            vertices.store(vertex, self.moved(vertex, vertices.load(vertex), pull));
+        for (&vertex, vertex_force) in chosen.iter().zip(forces) {
+            vertices.store(vertex, self.moved(vertex, vertices.load(vertex), vertex_force));
         }
         true
     }
@@ -175,12 +175,13 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
         let vertices = unsafe { std::slice::from_raw_parts_mut(self.vertices, self.vertex_count) };
         while let Some(chosen) = self.next_chunk() {
             for vertex in chosen {
-                let mut pull = Pull::none();
-                let (chosen, pulls) = (std::slice::from_ref(vertex), std::slice::from_mut(&mut pull));
+                let mut vertex_force = VertexForce::none();
+                let (chosen, forces) =
+                    (std::slice::from_ref(vertex), std::slice::from_mut(&mut vertex_force));
                 for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
-                    kind.pull(incidence, chosen, vertices, pulls);
+                    kind.vertex_force(incidence, chosen, vertices, forces);
                 }
-                vertices[*vertex as usize] = self.moved(*vertex, vertices[*vertex as usize], &pull);
+                vertices[*vertex as usize] = self.moved(*vertex, vertices[*vertex as usize], &vertex_force);
             }
         }
     }
@@ -192,9 +193,9 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
         (start < end).then(|| &self.descent.groups().order[start..end])
     }
 
-    fn moved(&self, index: u32, vertex: Vertex<T>, pull: &Pull<T>) -> Vertex<T> {
+    fn moved(&self, index: u32, vertex: Vertex<T>, vertex_force: &VertexForce<T>) -> Vertex<T> {
         let i = index as usize;
-        self.descent.step().moved(vertex, &self.previous[i], &self.velocities[i], pull)
+        self.descent.step().moved(vertex, &self.previous[i], &self.velocities[i], vertex_force)
     }
 
     /// Number of chunks, an upper bound of the threads that can help.

@@ -28,7 +28,7 @@ use crate::{Formulation, Kind, Settings, SolverError, System, Vertex};
 
 /// Force on a vertex, in N, and the matrix of its quadratic model, in N/m, summed over constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pull<T> {
+pub struct VertexForce<T> {
     /// `−Σ C·∇C/α`.
     pub force: Vector3<T>,
     /// The entries xx, yy, zz.
@@ -37,7 +37,7 @@ pub struct Pull<T> {
     pub mixed: Vector3<T>,
 }
 
-impl<T: Real> Pull<T> {
+impl<T: Real> VertexForce<T> {
     /// Nothing acts.
     pub fn none() -> Self {
         Self { force: Vector3::zeros(), diagonal: Vector3::zeros(), mixed: Vector3::zeros() }
@@ -93,17 +93,17 @@ impl<T: Scalar> DescentStep<T> {
         vertex: Vertex<T>,
         previous: &Point3<T>,
         velocity: &Vector3<T>,
-        pull: &Pull<T>,
+        vertex_force: &VertexForce<T>,
     ) -> Vertex<T> {
         let x = vertex.position();
         let inertia = self.inverse_h_squared / vertex.inverse_mass();
         let target = previous + velocity * self.h + self.fall;
-        let f = pull.force + (target - x) * inertia;
-        let d = pull.diagonal;
+        let f = vertex_force.force + (target - x) * inertia;
+        let d = vertex_force.diagonal;
         let noise = T::constant(4.0) * T::simd_default_epsilon();
         let least = ((d.x + d.y + d.z) * noise).simd_max(inertia);
         let a = d + Vector3::repeat(least);
-        let b = pull.mixed;
+        let b = vertex_force.mixed;
         let l21 = b.x / a.x;
         let l31 = b.y / a.x;
         let d2 = (a.y - l21 * b.x).simd_max(least);

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::{SolverError, Vertex};
 
-/// A group of vertices carried along a straight path at constant speed, then held.
+/// A group of vertices that move a straight path at constant speed, then held.
 ///
 /// Its vertices take the inverse mass 0 and the position `rest + move_m·min(t/over_s, 1)`; with `over_s` 0 they are
 /// at the end of their path from the first substep on.
@@ -23,14 +23,14 @@ pub struct Handle {
 
 /// A checked handle with the rest positions of its vertices.
 #[derive(Clone, Debug)]
-pub struct Carried<T: Scalar> {
+pub struct KinematicHandle<T: Scalar> {
     vertices: Vec<u32>,
     rest: Vec<Point3<T>>,
     move_m: [f64; 3],
     over_s: f64,
 }
 
-impl<T: Scalar> Carried<T> {
+impl<T: Scalar> KinematicHandle<T> {
     /// Checks the numbers of `handle` and takes its vertices out of the dynamics. `taken` are those of other handles.
     pub(crate) fn new(
         index: usize,
@@ -79,8 +79,8 @@ impl<T: Scalar> Carried<T> {
         Vector3::from(self.move_m.map(|d| T::constant(d * share)))
     }
 
-    pub(crate) fn to_f64(&self) -> Carried<f64> {
-        Carried {
+    pub(crate) fn to_f64(&self) -> KinematicHandle<f64> {
+        KinematicHandle {
             vertices: self.vertices.clone(),
             rest: self.rest.iter().map(|place| place.map(T::to_f64)).collect(),
             move_m: self.move_m,
@@ -89,7 +89,7 @@ impl<T: Scalar> Carried<T> {
     }
 
     /// Puts the vertices where they are at `time_s`.
-    pub(crate) fn carry(&self, vertices: &mut [Vertex<T>], time_s: f64) {
+    pub(crate) fn advance(&self, vertices: &mut [Vertex<T>], time_s: f64) {
         let path = self.path(time_s);
         for (&vertex, rest) in self.vertices.iter().zip(&self.rest) {
             vertices[vertex as usize].set_position(rest + path);

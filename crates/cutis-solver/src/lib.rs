@@ -10,7 +10,7 @@
 //! - [`Formulation::Xpbd`] (Macklin et al. 2016): `Δλ = (−C − α̃λ)/(Σ w|∇C|² + α̃)`, `Δx_i = w_i ∇_iC Δλ`, with
 //!   `α̃ = α/h²` and `λ = 0` at the start of every substep.
 //! - [`Formulation::Vbd`] (Chen et al. 2024): the same energies `½C²/α`; the energy of the implicit step falls vertex by vertex.
-//!   See [`Pull`] for what acts on a vertex, and `descent.rs` for what differs from the source.
+//!   See [`VertexForce`] for what acts on a vertex, and `descent.rs` for what differs from the source.
 //!
 //! A note that is not legal advice: US patent 11,270,041 B2 is said to read on accumulating λ over iterations. `Pbd`
 //! and `Vbd` have no λ, and `Xpbd` with one iteration per substep neither stores nor accumulates one; all are complete.
@@ -63,9 +63,9 @@ mod vertex;
 pub use builder::SystemBuilder;
 pub use clock::Clock;
 pub use colored::{Colored, ColoredVertices};
-pub use descent::{Descent, DescentStep, Pull};
+pub use descent::{Descent, DescentStep, VertexForce};
 pub use error::SolverError;
-pub use handle::{Carried, Handle};
+pub use handle::{Handle, KinematicHandle};
 pub use kernel::{Pbd, Projection, Rule, Xpbd, project};
 pub use measures::{Energy, MemoryPart, Momentum, Residual};
 pub use passes::{Integrator, Motion, VertexBlock};

@@ -29,7 +29,7 @@ pub struct ColorPass {
     pub end: usize,
 }
 
-/// A frame: `substeps` times { predict and carry handles; `iterations` times { the sweeps in order, or the color passes of the iteration };
+/// A frame: `substeps` times { predict and move handles; `iterations` times { the sweeps in order, or the color passes of the iteration };
 /// update velocities }.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {

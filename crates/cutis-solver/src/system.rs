@@ -6,7 +6,9 @@ use cutis_coloring::Groups;
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
-use crate::{Carried, Energy, Kind, MemoryPart, Momentum, Residual, SolverError, Vertex, VertexBlock};
+use crate::{
+    Energy, Kind, KinematicHandle, MemoryPart, Momentum, Residual, SolverError, Vertex, VertexBlock,
+};
 
 /// A body ready to be solved; built and checked by [`SystemBuilder`](crate::SystemBuilder).
 ///
@@ -18,7 +20,7 @@ pub struct System<T: Scalar> {
     pub(crate) previous: Vec<Point3<T>>,
     pub(crate) velocities: Vec<Vector3<T>>,
     pub(crate) kinds: Vec<Kind<T>>,
-    pub(crate) handles: Vec<Carried<T>>,
+    pub(crate) handles: Vec<KinematicHandle<T>>,
     /// Groups of the vertices, if the caller knows better ones than greedy coloring finds.
     pub(crate) vertex_groups: Option<Arc<Groups>>,
 }
@@ -77,7 +79,7 @@ impl<T: Scalar> System<T> {
     }
 
     /// The handles, in the order they were added.
-    pub fn handles(&self) -> &[Carried<T>] {
+    pub fn handles(&self) -> &[KinematicHandle<T>] {
         &self.handles
     }
 
@@ -95,7 +97,7 @@ impl<T: Scalar> System<T> {
             previous: self.previous.iter().map(|place| place.map(T::to_f64)).collect(),
             velocities: self.velocities.iter().map(|velocity| velocity.map(T::to_f64)).collect(),
             kinds: self.kinds.iter().map(|kind| kind.to_f64()).collect(),
-            handles: self.handles.iter().map(Carried::to_f64).collect(),
+            handles: self.handles.iter().map(KinematicHandle::to_f64).collect(),
             vertex_groups: self.vertex_groups.clone(),
         }
     }
@@ -148,7 +150,7 @@ impl<T: Scalar> System<T> {
 
     pub(crate) fn carry_handles(&mut self, time_s: f64) {
         for handle in &self.handles {
-            handle.carry(&mut self.vertices, time_s);
+            handle.advance(&mut self.vertices, time_s);
         }
     }
 
@@ -232,7 +234,7 @@ impl<T: Scalar> System<T> {
         let mut parts = vec![MemoryPart { name: "vertices", bytes: vertices }];
         parts.extend(self.kinds.iter().map(|kind| MemoryPart { name: kind.name(), bytes: kind.bytes() }));
         if !self.handles.is_empty() {
-            let bytes = self.handles.iter().map(Carried::bytes).sum();
+            let bytes = self.handles.iter().map(KinematicHandle::bytes).sum();
             parts.push(MemoryPart { name: "handles", bytes });
         }
         parts

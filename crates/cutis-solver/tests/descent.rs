@@ -3,13 +3,14 @@
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Constraint, Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
 use cutis_solver::{
-    Formulation, Pull, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
+    Formulation, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
+    VertexForce,
 };
 use nalgebra::{Matrix3, Point3, Vector3};
 
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// A block of 5 × 4 × 4 points, 1 cm apart, six tetrahedra to a cell, held at x = 0, with a skin on top that pulls.
+/// A block of 5 × 4 × 4 points, 1 cm apart, six tetrahedra to a cell, held at x = 0, with a skin on top that forces.
 fn block(distance: f64) -> System<f64> {
     block_with(distance, 2.0)
 }
@@ -178,11 +179,11 @@ fn the_model_of_a_stretched_edge_is_its_true_one() {
     let (a, b) = (Point3::new(0.1, -0.2, 0.3), Point3::new(0.5, 0.9, -0.4));
     let force = |x: Point3<f64>| {
         let eval = Distance::eval(&[x, b], &[0.7]);
-        let mut pull = Pull::none();
-        pull.add(eval.c, &eval.grad[0], 0.01, 0.7);
-        pull
+        let mut vertex_force = VertexForce::none();
+        vertex_force.add(eval.c, &eval.grad[0], 0.01, 0.7);
+        vertex_force
     };
-    let Pull { diagonal: d, mixed: m, .. } = force(a);
+    let VertexForce { diagonal: d, mixed: m, .. } = force(a);
     let model = Matrix3::new(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z);
     let shift = 1e-6;
     // κ stands for the curvature across the edge; along it there is none, but the model has it there too.

@@ -25,14 +25,14 @@ fn every_variant_of_every_kind_is_valid() {
                 }
             }
         }
-        assert_baseline(name, &solver::pull(arity, source), &[solver::PULL]);
+        assert_baseline(name, &solver::vertex_force(arity, source), &[solver::VERTEX_FORCE]);
         assert_baseline(name, &solver::residual(arity, source), &[solver::RESIDUAL]);
         assert_baseline(name, &solver::evaluate(arity, source), &[solver::EVALUATE]);
     }
     assert_baseline("descend", &solver::descend(), &[solver::DESCEND]);
     let passes = ["predict", "predict_next", "finish_and_predict", "finish", "check", "restore"];
     assert_baseline("vertices", &solver::vertices(), &passes);
-    assert_baseline("carry", &solver::carry(), &[solver::CARRY]);
+    assert_baseline("kinematic", &solver::kinematic(), &[solver::KINEMATIC]);
     assert_baseline("gather", &solver::gather(), &[solver::GATHER]);
 }
 

@@ -1,5 +1,5 @@
-// Moves the vertices of a chunk of one color, and leaves their pulls at zero. The twin of `DescentStep::moved`.
-struct Pull {
+// Moves the vertices of a chunk of one color, and leaves their forces at zero. The twin of `DescentStep::moved`.
+struct VertexForce {
     force: vec4f,
     diagonal: vec4f,
     mixed: vec4f,
@@ -15,7 +15,7 @@ struct Descent {
 }
 
 @group(0) @binding(0) var<storage, read_write> vertices: array<vec4f>;
-@group(0) @binding(1) var<storage, read_write> pulls: array<Pull>;
+@group(0) @binding(1) var<storage, read_write> forces: array<VertexForce>;
 @group(0) @binding(2) var<storage, read> previous: array<vec4f>;
 @group(0) @binding(3) var<storage, read> velocities: array<vec4f>;
 @group(0) @binding(4) var<uniform> descent: Descent;
@@ -35,7 +35,7 @@ fn descend(@builtin(global_invocation_id) id: vec3u) {
     }
     let v = chosen[id.x];
     let vertex = vertices[v];
-    let found = pulls[id.x];
+    let found = forces[id.x];
     let inertia = descent.inverse_h_squared / vertex.w;
     let goal = (previous[v].xyz + velocities[v].xyz * descent.h) + descent.fall;
     let f = found.force.xyz + (goal - vertex.xyz) * inertia;
@@ -57,5 +57,5 @@ fn descend(@builtin(global_invocation_id) id: vec3u) {
     let step = vec3f(z1, z2, z3) * descent.relaxation;
     let finite = vec3f(finite_or_zero(step.x), finite_or_zero(step.y), finite_or_zero(step.z));
     vertices[v] = vec4f(vertex.xyz + finite, vertex.w);
-    pulls[id.x] = Pull(vec4f(0.0), vec4f(0.0), vec4f(0.0));
+    forces[id.x] = VertexForce(vec4f(0.0), vec4f(0.0), vec4f(0.0));
 }

@@ -270,7 +270,7 @@ pub const MUTATIONS: &[Mutation] = &[
     mutation(
         Solver,
         "handles, WGSL: the path of the first substep in all of them",
-        "shaders/wgsl/solver/carry.wgsl",
+        "shaders/wgsl/solver/kinematic.wgsl",
         "paths[substep * frame.handles + owners[k]]",
         "paths[owners[k]]",
     ),

@@ -90,8 +90,8 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
     if parts.handle {
         let move_m = [0.1 * scale, 0.2 * scale, 0.0];
         for row in 0..2 {
-            let carried = (0..count as u32).filter(|n| n % 12 == 11 && (n / 12) % 9 == 8 * row).collect();
-            builder = builder.handle(Handle { vertices: carried, move_m, over_s: 0.03 }).unwrap();
+            let held = (0..count as u32).filter(|n| n % 12 == 11 && (n / 12) % 9 == 8 * row).collect();
+            builder = builder.handle(Handle { vertices: held, move_m, over_s: 0.03 }).unwrap();
         }
     }
     builder.build()

@@ -2,8 +2,8 @@
 
 mod access;
 mod project;
-mod pull;
 mod set;
+mod vertex_force;
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use cutis_constraints::{Constraint, Scalar};
 use nalgebra::Point3;
 
 use crate::colored::SharedVertices;
-use crate::{Pull, SolverError, Step, Stiffness, Vertex};
+use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
 
 pub use access::{Load, Store};
 
@@ -33,8 +33,14 @@ pub trait Project<T: Scalar> {
         step: Step<T>,
         multipliers: &mut [T],
     );
-    /// Adds what this kind does to each of `chosen` to its place in `pulls`. `incidence` is that of this kind.
-    fn pull(&self, incidence: &Incidence, chosen: &[u32], vertices: &[Vertex<T>], pulls: &mut [Pull<T>]);
+    /// Adds what this kind does to each of `chosen` to its place in `forces`. `incidence` is that of this kind.
+    fn vertex_force(
+        &self,
+        incidence: &Incidence,
+        chosen: &[u32],
+        vertices: &[Vertex<T>],
+        forces: &mut [VertexForce<T>],
+    );
     /// The same, side by side, with vertices that other threads may be moving too: none that is in a constraint with one
     /// of `chosen`.
     fn pull_shared(
@@ -42,7 +48,7 @@ pub trait Project<T: Scalar> {
         incidence: &Incidence,
         chosen: &[u32],
         vertices: SharedVertices<'_, T>,
-        pulls: &mut [Pull<T>],
+        forces: &mut [VertexForce<T>],
     );
     /// Number of vertices that the indices were checked against.
     fn vertex_count(&self) -> usize;

@@ -9,7 +9,7 @@ use simba::simd::SimdValue;
 
 use super::{Batch, MOST_LANES, Project, Store};
 use crate::colored::SharedVertices;
-use crate::{Pbd, Pull, Rule, Step, Values, Vertex, Xpbd, project};
+use crate::{Pbd, Rule, Step, Values, Vertex, VertexForce, Xpbd, project};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     /// Projects one constraint after the other.
@@ -123,9 +123,15 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
         }
     }
 
-    fn pull(&self, incidence: &Incidence, chosen: &[u32], vertices: &[Vertex<T>], pulls: &mut [Pull<T>]) {
-        for (&vertex, pull) in chosen.iter().zip(pulls) {
-            self.pull_one_by_one(incidence.of(vertex), &vertices, pull);
+    fn vertex_force(
+        &self,
+        incidence: &Incidence,
+        chosen: &[u32],
+        vertices: &[Vertex<T>],
+        forces: &mut [VertexForce<T>],
+    ) {
+        for (&vertex, vertex_force) in chosen.iter().zip(forces) {
+            self.force_one_by_one(incidence.of(vertex), &vertices, vertex_force);
         }
     }
 
@@ -134,19 +140,19 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
         incidence: &Incidence,
         chosen: &[u32],
         vertices: SharedVertices<'_, T>,
-        pulls: &mut [Pull<T>],
+        forces: &mut [VertexForce<T>],
     ) {
         let lanes = T::Lanes::LANES;
         let mut places: [&[u32]; MOST_LANES] = [&[]; MOST_LANES];
-        for (chosen, pulls) in chosen.chunks(lanes).zip(pulls.chunks_mut(lanes)) {
+        for (chosen, forces) in chosen.chunks(lanes).zip(forces.chunks_mut(lanes)) {
             if chosen.len() == lanes {
                 for (places, &vertex) in places.iter_mut().zip(chosen) {
                     *places = incidence.of(vertex);
                 }
-                self.pull_side_by_side(&places[..lanes], &vertices, pulls);
+                self.force_side_by_side(&places[..lanes], &vertices, forces);
             } else {
-                for (&vertex, pull) in chosen.iter().zip(pulls) {
-                    self.pull_one_by_one(incidence.of(vertex), &vertices, pull);
+                for (&vertex, vertex_force) in chosen.iter().zip(forces) {
+                    self.force_one_by_one(incidence.of(vertex), &vertices, vertex_force);
                 }
             }
         }

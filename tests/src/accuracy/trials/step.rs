@@ -1,6 +1,6 @@
 //! One implicit substep, and a sweep over it by either method, one constraint or vertex after the other.
 
-use cutis_solver::{Descent, Formulation, Kind, Pull, Settings, System};
+use cutis_solver::{Descent, Formulation, Kind, Settings, System, VertexForce};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::super::Failure;
@@ -143,19 +143,19 @@ impl<'a> Step<'a> {
     }
 
     fn descend(&self, vertex: u32, x: &mut [Point3<f64>], relaxed: f64) {
-        let mut pull = Pull::none();
+        let mut vertex_force = VertexForce::none();
         for (kind, incidence) in self.kinds().iter().zip(self.descent.incidences()) {
             for &place in incidence.of(vertex) {
                 let (k, slot) = (place as usize / kind.arity(), place as usize % kind.arity());
                 let (mut places, mut gradient) = ([Point3::origin(); MOST], [Vector3::zeros(); MOST]);
                 let c = evaluate(kind, k, x, &mut places, &mut gradient);
-                pull.add(c, &gradient[slot], kind.stiffness().values().at(k), kind.rest_size(k));
+                vertex_force.add(c, &gradient[slot], kind.stiffness().values().at(k), kind.rest_size(k));
             }
         }
         let v = vertex as usize;
         let inertia = self.per_h2 / self.inverse_mass(v);
-        let force = pull.force + (self.implicit.predicted[v] - x[v]) * inertia;
-        let (d, m) = (pull.diagonal.add_scalar(inertia), pull.mixed);
+        let force = vertex_force.force + (self.implicit.predicted[v] - x[v]) * inertia;
+        let (d, m) = (vertex_force.diagonal.add_scalar(inertia), vertex_force.mixed);
         let matrix = Matrix3::new(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z);
         if let Some(factors) = matrix.cholesky() {
             x[v] += factors.solve(&force) * relaxed;

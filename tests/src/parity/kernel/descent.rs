@@ -2,7 +2,7 @@
 
 use cutis_conformance::Alteration;
 use cutis_gpu::{BindGroup, Gpu, Kernel};
-use cutis_shaders::solver::{self, DESCEND, PULL};
+use cutis_shaders::solver::{self, DESCEND, VERTEX_FORCE};
 use cutis_solver::{
     ConstraintSet, Descent, DescentStep, Formulation, Method, Settings, Simulation, Solver, SolverReference,
 };
@@ -19,8 +19,8 @@ use crate::parity::outcome::Ring;
 enum Wrong {
     Nothing,
     Constraint(Alteration),
-    /// A part of the kernel `pull`, and what stands there.
-    Pull([&'static str; 2]),
+    /// A part of the kernel `vertex_force`, and what stands there.
+    VertexForce([&'static str; 2]),
     /// The same of `descend`.
     Descend([&'static str; 2]),
     /// The colors are gone through one way only.
@@ -60,8 +60,11 @@ fn compare(bench: &mut Bench<'_, '_>, kind: Kind, each: bool, size: [usize; 3]) 
     for (what, wrong) in [
         ("value × 1.001", Wrong::Constraint(Alteration::Value)),
         ("gradients 0 and 1 swapped", Wrong::Constraint(Alteration::Swapped(0, 1))),
-        ("force × 1.001", Wrong::Pull(["exact3(kg * c)", "exact3(kg * (c * 1.001))"])),
-        ("two mixed entries swapped", Wrong::Pull(["kg.x * g.y, kg.x * g.z,", "kg.x * g.z, kg.x * g.y,"])),
+        ("force × 1.001", Wrong::VertexForce(["exact3(kg * c)", "exact3(kg * (c * 1.001))"])),
+        (
+            "two mixed entries swapped",
+            Wrong::VertexForce(["kg.x * g.y, kg.x * g.z,", "kg.x * g.z, kg.x * g.y,"]),
+        ),
         ("no inertia in the matrix", Wrong::Descend(["+ vec3f(least)", "+ vec3f(least * 0.0)"])),
         ("relaxation × 1.001", Wrong::Descend(["* descent.relaxation", "* (descent.relaxation * 1.001)"])),
         ("one way only", Wrong::OneWay),
@@ -126,24 +129,25 @@ impl Body {
             Wrong::Constraint(alteration) => alteration.wgsl(set.wgsl()),
             _ => set.wgsl().to_owned(),
         };
-        let [mut pull, mut descend] = [solver::pull(set.arity(), &constraint), solver::descend()];
+        let [mut vertex_force, mut descend] =
+            [solver::vertex_force(set.arity(), &constraint), solver::descend()];
         match wrong {
-            Wrong::Pull([from, to]) => pull = replaced(&pull, from, to)?,
+            Wrong::VertexForce([from, to]) => vertex_force = replaced(&vertex_force, from, to)?,
             Wrong::Descend([from, to]) => descend = replaced(&descend, from, to)?,
             Wrong::Nothing | Wrong::Constraint(_) | Wrong::OneWay => {}
         }
-        let pull = gpu.kernel("pull", &pull, PULL)?;
+        let vertex_force = gpu.kernel("vertex_force", &vertex_force, VERTEX_FORCE)?;
         let descend = gpu.kernel("descend", &descend, DESCEND)?;
         let vertices = gpu.buffer("vertices", &predicted)?;
         let previous = gpu.buffer("previous", &previous)?;
         let velocities = gpu.buffer("velocities", &velocities)?;
-        let pulls = gpu.zeroed::<[f32; 12]>("pulls", self.positions.len())?;
+        let forces = gpu.zeroed::<[f32; 12]>("vertex forces", self.positions.len())?;
         let step = [fall.x, fall.y, fall.z, h, inverse_h_squared, relaxation, 0.0, 0.0];
         let step = gpu.uniform("step", &step)?;
-        let acting = gpu.bind(&pull, 0, &[(0, vertices.whole()), (1, pulls.whole())])?;
+        let acting = gpu.bind(&vertex_force, 0, &[(0, vertices.whole()), (1, forces.whole())])?;
         let moving = [
             (0, vertices.whole()),
-            (1, pulls.whole()),
+            (1, forces.whole()),
             (2, previous.whole()),
             (3, velocities.whole()),
             (4, step.whole()),
@@ -153,13 +157,13 @@ impl Body {
         let colors: Vec<Color> = groups
             .iter()
             .filter(|chosen| !chosen.is_empty())
-            .map(|chosen| self.color(gpu, [&pull, &descend], chosen))
+            .map(|chosen| self.color(gpu, [&vertex_force, &descend], chosen))
             .collect::<Result<_, _>>()?;
         let back = if matches!(wrong, Wrong::OneWay) { &[][..] } else { &colors[..] };
         let mut pass = gpu.pass("descent");
         for color in colors.iter().chain(back.iter().rev()) {
             if let Some((group, len)) = &color.acting {
-                pass.dispatch(&pull, &[&acting, group], *len);
+                pass.dispatch(&vertex_force, &[&acting, group], *len);
             }
             pass.dispatch(&descend, &[&moving, &color.chosen], color.len);
         }
@@ -168,7 +172,12 @@ impl Body {
     }
 
     /// A color's vertices, and the constraints on them.
-    fn color(&self, gpu: &Gpu, [pull, descend]: [&Kernel; 2], chosen: &[u32]) -> Result<Color, Failure> {
+    fn color(
+        &self,
+        gpu: &Gpu,
+        [vertex_force, descend]: [&Kernel; 2],
+        chosen: &[u32],
+    ) -> Result<Color, Failure> {
         let (set, descent) = (self.set(), self.descent()?);
         let moved = chosen.len();
         let (mut places, mut shares) = (Vec::<u32>::new(), Vec::<[u32; 3]>::new());
@@ -200,7 +209,7 @@ impl Body {
             (3, places.whole()),
             (4, shares.whole()),
         ];
-        Ok(Color { chosen, len: moved, acting: Some((gpu.bind(pull, 1, &bindings)?, len)) })
+        Ok(Color { chosen, len: moved, acting: Some((gpu.bind(vertex_force, 1, &bindings)?, len)) })
     }
 }
 

@@ -1,4 +1,4 @@
-//! Vertices that handles carry along, and the collection of chosen vertices: by the backend, on a body without constraints.
+//! Kinematic vertices moved by handles, and the collection of chosen vertices: by the backend, on a body without constraints.
 
 use cutis_gpu::Gpu;
 use cutis_solver::{Formulation, Settings, Solver, SolverReference};
@@ -30,20 +30,20 @@ const SETTINGS: Settings = Settings {
 };
 
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
-    carry(bench)?;
+    kinematic(bench)?;
     gather(bench)
 }
 
 /// In the second frame one of two handles is on its way and one is about to arrive.
-fn carry(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
-    let name = "carry: two handles in the third of three substeps";
+fn kinematic(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
+    let name = "kinematic: two handles in the third of three substeps";
     let measure = |gpu: &Gpu, policy, settings, frames| {
         let mut cpu = SolverReference::<f32>::new(PLAN.system()?, SETTINGS)?;
         let mut on_gpu = SolverGpu::new(gpu, PLAN.system()?, settings)?;
         cpu.step(2)?;
         on_gpu.step(frames)?;
         let (found, expected) = (on_gpu.positions()?, cpu.positions()?);
-        let carried: Vec<usize> = cpu
+        let held: Vec<usize> = cpu
             .system()?
             .handles()
             .iter()
@@ -51,7 +51,7 @@ fn carry(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
             .map(|&v| v as usize)
             .collect();
         let of = |positions: &[nalgebra::Point3<f32>]| -> Vec<f32> {
-            carried.iter().flat_map(|&v| positions[v].coords.iter().copied().collect::<Vec<f32>>()).collect()
+            held.iter().flat_map(|&v| positions[v].coords.iter().copied().collect::<Vec<f32>>()).collect()
         };
         Ok(Difference::default().add(of(&found), of(&expected), PLAN.extent()).judged(policy))
     };

@@ -5,33 +5,43 @@ use nalgebra::{Point3, Vector3};
 use simba::simd::{SimdPartialOrd, SimdValue};
 
 use super::{Batch, Load, MOST_LANES};
-use crate::{Pull, Values};
+use crate::{Values, VertexForce};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
-    /// Adds to `pull` what the constraints at `places` do to one vertex, in ascending order.
+    /// Adds to `vertex_force` what the constraints at `places` do to one vertex, in ascending order.
     #[inline(always)]
-    pub(super) fn pull_one_by_one<L: Load<T>>(&self, places: &[u32], load: &L, pull: &mut Pull<T>) {
+    pub(super) fn force_one_by_one<L: Load<T>>(
+        &self,
+        places: &[u32],
+        load: &L,
+        vertex_force: &mut VertexForce<T>,
+    ) {
         let stiffness = self.stiffness.values();
         for &place in places {
             let (k, slot) = (place as usize / N, place as usize % N);
             let x = self.indices[k].map(|i| load.load(i).position());
             let eval = C::eval(&x, &self.params[k]);
-            pull.add(eval.c, &eval.grad[slot], stiffness.at(k), C::rest_size(&self.params[k]));
+            vertex_force.add(eval.c, &eval.grad[slot], stiffness.at(k), C::rest_size(&self.params[k]));
         }
     }
 
     /// The same for several vertices side by side, as long as each of them has constraints left, and the rest one by one.
     #[inline(always)]
-    pub(super) fn pull_side_by_side<L: Load<T>>(&self, places: &[&[u32]], load: &L, pulls: &mut [Pull<T>]) {
+    pub(super) fn force_side_by_side<L: Load<T>>(
+        &self,
+        places: &[&[u32]],
+        load: &L,
+        forces: &mut [VertexForce<T>],
+    ) {
         let stiffness = self.stiffness.values();
         let common = places.iter().map(|places| places.len()).min().unwrap_or(0);
-        let vector = |part: fn(&Pull<T>) -> &Vector3<T>, pulls: &[Pull<T>]| {
-            Vector3::from_fn(|axis, _| T::lanes(|lane| part(&pulls[lane])[axis]))
+        let vector = |part: fn(&VertexForce<T>) -> &Vector3<T>, forces: &[VertexForce<T>]| {
+            Vector3::from_fn(|axis, _| T::lanes(|lane| part(&forces[lane])[axis]))
         };
-        let mut sum = Pull {
-            force: vector(|pull| &pull.force, pulls),
-            diagonal: vector(|pull| &pull.diagonal, pulls),
-            mixed: vector(|pull| &pull.mixed, pulls),
+        let mut sum = VertexForce {
+            force: vector(|vertex_force| &vertex_force.force, forces),
+            diagonal: vector(|vertex_force| &vertex_force.diagonal, forces),
+            mixed: vector(|vertex_force| &vertex_force.mixed, forces),
         };
         for n in 0..common {
             // Every lane is looked up once; lanes that there are not repeat the last one.
@@ -58,13 +68,13 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             };
             sum.add(eval.c, &gradient, compliance, C::rest_size(&params));
         }
-        for (lane, (pull, places)) in pulls.iter_mut().zip(places).enumerate() {
-            *pull = Pull {
+        for (lane, (vertex_force, places)) in forces.iter_mut().zip(places).enumerate() {
+            *vertex_force = VertexForce {
                 force: sum.force.map(|component| component.extract(lane)),
                 diagonal: sum.diagonal.map(|component| component.extract(lane)),
                 mixed: sum.mixed.map(|component| component.extract(lane)),
             };
-            self.pull_one_by_one(&places[common..], load, pull);
+            self.force_one_by_one(&places[common..], load, vertex_force);
         }
     }
 }

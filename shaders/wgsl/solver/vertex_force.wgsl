@@ -1,6 +1,6 @@
 // What the constraints of one kind do to the vertices of a chunk: force, and the matrix of its quadratic model. The twin of
-// `Pull::add`.
-struct Pull {
+// `VertexForce::add`.
+struct VertexForce {
     force: vec4f,
     // Entries xx, yy, zz.
     diagonal: vec4f,
@@ -16,7 +16,7 @@ struct Share {
 }
 
 @group(0) @binding(0) var<storage, read> vertices: array<vec4f>;
-@group(0) @binding(1) var<storage, read_write> pulls: array<Pull>;
+@group(0) @binding(1) var<storage, read_write> forces: array<VertexForce>;
 @group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;
 @group(1) @binding(1) var<storage, read> params: array<Params>;
 // Inverse compliance, and the size of the rest size.
@@ -26,15 +26,15 @@ struct Share {
 @group(1) @binding(4) var<storage, read> shares: array<Share>;
 
 @compute @workgroup_size(64)
-fn pull(@builtin(global_invocation_id) id: vec3u) {
+fn vertex_force(@builtin(global_invocation_id) id: vec3u) {
     if (id.x >= arrayLength(&shares)) {
         return;
     }
     hidden_zero = select(0u, 1u, arrayLength(&tuples) == 0u);
     let share = shares[id.x];
-    var force = pulls[share.vertex].force.xyz;
-    var diagonal = pulls[share.vertex].diagonal.xyz;
-    var mixed = pulls[share.vertex].mixed.xyz;
+    var force = forces[share.vertex].force.xyz;
+    var diagonal = forces[share.vertex].diagonal.xyz;
+    var mixed = forces[share.vertex].mixed.xyz;
     for (var n = share.start; n < share.end; n++) {
         let k = places[n] / N;
         let slot = places[n] % N;
@@ -57,7 +57,7 @@ fn pull(@builtin(global_invocation_id) id: vec3u) {
         diagonal = diagonal + (exact3(kg * g) + vec3f(curvature));
         mixed = mixed + exact3(vec3f(kg.x * g.y, kg.x * g.z, kg.y * g.z));
     }
-    pulls[share.vertex].force = vec4f(force, 0.0);
-    pulls[share.vertex].diagonal = vec4f(diagonal, 0.0);
-    pulls[share.vertex].mixed = vec4f(mixed, 0.0);
+    forces[share.vertex].force = vec4f(force, 0.0);
+    forces[share.vertex].diagonal = vec4f(diagonal, 0.0);
+    forces[share.vertex].mixed = vec4f(mixed, 0.0);
 }
