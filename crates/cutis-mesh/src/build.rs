@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::cells::CellMasks;
 use crate::select::HalfSpace;
-use crate::{Frame, Frozen, Lattice, MeshError, WholeBody, edges};
+use crate::{Frame, Frozen, Lattice, MeshError, TissueMask, edges};
 
 /// Stands for "no vertex" in [`TetMesh::vertex_of_point`].
 pub const NO_VERTEX: u32 = u32::MAX;
@@ -46,7 +46,7 @@ pub struct TetMesh {
     pub components: usize,
     /// Tissue tets that were dropped with the smaller components.
     pub dropped_tets: usize,
-    /// What a region left out of the mesh, if it was built within one ([`WholeBody::mesh_within`]).
+    /// What a region left out of the mesh, if it was built within one ([`TissueMask::mesh_within`]).
     pub frozen: Option<Frozen>,
 }
 
@@ -68,12 +68,12 @@ impl TetMesh {
     /// [`MeshError::Length`] for arrays of another length, [`MeshError::NotFinite`] for a HU value of a mesh vertex that is NaN or
     /// infinite, [`MeshError::Plane`] for a bad half-space, [`MeshError::NoTissue`] if no tet is kept.
     pub fn build(lattice: &Lattice, hu: &[f32], tissue: &Tissue<'_>) -> Result<Self, MeshError> {
-        WholeBody::find(lattice, tissue)?.mesh(hu)
+        TissueMask::find(lattice, tissue)?.mesh(hu)
     }
 
     /// Numbers the vertices of the tets in `masks` and lists tets and edges.
     pub(crate) fn from_masks(
-        whole: &WholeBody,
+        whole: &TissueMask,
         hu_at_grid: &[f32],
         masks: &CellMasks,
     ) -> Result<Self, MeshError> {

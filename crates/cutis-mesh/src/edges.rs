@@ -94,7 +94,7 @@ impl TetMesh {
     ///
     /// Color = 2 · direction + parity of the first point along the direction's first axis: 14 colors for `kuhn6` (7 directions),
     /// 18 for `five` (9 directions). `edges` are edges of this mesh, or what a cut has left of them.
-    pub fn edge_classes(&self, edges: &[[u32; 2]]) -> Vec<u16> {
+    pub fn edge_colors(&self, edges: &[[u32; 2]]) -> Vec<u16> {
         let directions = &self.lattice.stencil().directions;
         let class = |&[a, b]: &[u32; 2]| {
             let (p, q) = (self.point(a), self.point(b));

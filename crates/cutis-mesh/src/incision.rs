@@ -44,7 +44,7 @@ pub struct Cut {
 
 /// What [`Cut::apply`] took out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Taken {
+pub struct Removed {
     /// The tets, in mesh vertices.
     pub tets: Vec<[u32; 4]>,
     /// The edges, in mesh vertices.
@@ -88,9 +88,9 @@ impl Cut {
     /// Takes the incisions out of the mesh and its skin.
     ///
     /// Vertices keep their numbers, removed ones included. `mesh` and `triangles` are those of [`Cut::plan`].
-    pub fn apply(&self, mesh: &mut TetMesh, triangles: &mut Vec<[u32; 3]>) -> Taken {
+    pub fn apply(&self, mesh: &mut TetMesh, triangles: &mut Vec<[u32; 3]>) -> Removed {
         if self.slits.is_empty() {
-            return Taken::default();
+            return Removed::default();
         }
         let kept: Vec<bool> = mesh.tets.iter().map(|tet| !self.takes(&mesh.positions, tet)).collect();
         // An edge near a slit stays if a kept tet has it; far from the slits all edges stay.
@@ -115,7 +115,7 @@ impl Cut {
         let mut stays = kept.iter();
         mesh.tets.retain(|_| stays.next() != Some(&false));
         triangles.retain(|triangle| !self.takes(&mesh.positions, triangle));
-        Taken { tets: taken, edges, triangles: faces - triangles.len() }
+        Removed { tets: taken, edges, triangles: faces - triangles.len() }
     }
 
     /// Distance from a position at rest (local meters) to the nearest slit, mm; infinite without slits.

@@ -21,22 +21,22 @@ pub mod skin;
 mod slit;
 mod stencil;
 mod surface;
+mod tissue_mask;
 pub mod vtk;
-mod whole;
 
 pub use build::{NO_VERTEX, TetMesh, Tissue};
 pub use error::MeshError;
 pub use frame::Frame;
 pub use gape::{Gape, WoundGape};
 pub use grading::{Grading, Planes};
-pub use incision::{Cut, Incision, Taken};
+pub use incision::{Cut, Incision, Removed};
 pub use lattice::{Lattice, Split};
 pub use select::HalfSpace;
 pub use shell::Shell;
 pub use skin::{Skin, SkinMode, SkinOptions, SkinReport};
 pub use slit::Slit;
 pub use surface::Topology;
-pub use whole::{Frozen, StillSkin, WholeBody};
+pub use tissue_mask::{Frozen, InactiveSkin, TissueMask};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

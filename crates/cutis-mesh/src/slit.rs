@@ -38,7 +38,7 @@ pub(crate) struct SlitPoint {
 }
 
 impl Slit {
-    /// Places incisions on the skin of a lattice: `skin` holds triangles in flat lattice indices ([`crate::WholeBody::skin`]). No mesh is
+    /// Places incisions on the skin of a lattice: `skin` holds triangles in flat lattice indices ([`crate::TissueMask::skin`]). No mesh is
     /// needed, so that what of the body becomes one can depend on where the slits lie. On the mesh of the whole body they are the
     /// slits of [`crate::Cut::plan`].
     ///

@@ -1,8 +1,8 @@
 //! From the CT to a body that is ready to be simulated: lattice, tissue, skin, incisions, what is fixed.
 
 use cutis_mesh::{
-    Cut, HalfSpace, Incision, SkinMode, SkinOptions, SkinReport, Slit, StillSkin, Taken, TetMesh, Tissue,
-    WholeBody, skin,
+    Cut, HalfSpace, InactiveSkin, Incision, Removed, SkinMode, SkinOptions, SkinReport, Slit, TetMesh,
+    Tissue, TissueMask, skin,
 };
 use cutis_volume::{TableKind, Volume};
 
@@ -15,13 +15,13 @@ pub(crate) struct Body {
     /// Skin triangles in mesh vertices, outward oriented; empty if nothing asks for the skin.
     pub(crate) skin: Vec<[u32; 3]>,
     /// The skin that a region left out.
-    pub(crate) still_skin: StillSkin,
+    pub(crate) inactive_skin: InactiveSkin,
     /// HU at its positions.
-    pub(crate) still_hu: Vec<f32>,
+    pub(crate) inactive_hu: Vec<f32>,
     pub(crate) skin_report: Option<SkinReport>,
     pub(crate) cut: Cut,
     /// What the incisions took.
-    pub(crate) taken: Taken,
+    pub(crate) removed: Removed,
     /// Lumped masses before the cut, kg.
     masses: Vec<f32>,
     /// Per lattice point: no tissue.
@@ -45,7 +45,7 @@ impl Body {
         let cut_away: Vec<HalfSpace> = scene.tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = scene.tissue.keep == Keep::Largest;
         let tissue = Tissue { air: &air, cut_away: &cut_away, largest_component };
-        let whole = WholeBody::find(&lattice, &tissue).map_err(loaded.blame("tissue"))?;
+        let whole = TissueMask::find(&lattice, &tissue).map_err(loaded.blame("tissue"))?;
         let mut warnings = Vec::new();
         let (mut skin, mut report) = (Vec::new(), None);
         if needs_skin(loaded) {
@@ -64,8 +64,8 @@ impl Body {
         let incisions: Vec<Incision> = scene.incision.iter().map(Incision::from).collect();
         let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(loaded.blame("incision"))?;
         let mut mesh = region::mesh(loaded, &whole, &hu, &slits)?;
-        let (mut triangles, still_skin) = mesh.divide_skin(&skin);
-        let still_hu = still_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
+        let (mut triangles, inactive_skin) = mesh.divide_skin(&skin);
+        let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
         drop(hu);
         if mesh.dropped_tets > 0 {
             let frozen = mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets);
@@ -79,15 +79,15 @@ impl Body {
         let masses = mesh.masses(&|hu| density.at(hu));
         region::check_handles(loaded, &mesh)?;
         let cut = Cut::of_slits(&mesh, &triangles, slits).map_err(|e| region::name(loaded, e))?;
-        let taken = cut.apply(&mut mesh, &mut triangles);
+        let removed = cut.apply(&mut mesh, &mut triangles);
         Ok(Self {
             mesh,
             skin: triangles,
-            still_skin,
-            still_hu,
+            inactive_skin,
+            inactive_hu,
             skin_report: report,
             cut,
-            taken,
+            removed,
             masses,
             air,
             warnings,
@@ -95,7 +95,7 @@ impl Body {
     }
 
     /// True if an incision took the vertex out of all constraints.
-    pub(crate) fn removed(&self, vertex: u32) -> bool {
+    pub(crate) fn is_removed(&self, vertex: u32) -> bool {
         self.cut.removed[vertex as usize]
     }
 

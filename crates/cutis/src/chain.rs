@@ -54,7 +54,7 @@ impl ChainBody {
         let blame = || loaded.blame("chainmail");
         let mut chain = Chain::new(grid.shape, grid.affine.spacing_mm(), table.materials(), materials)
             .map_err(|error| blame()(Error::Chain(error)))?;
-        let linked = linked(mesh, &body.taken.edges);
+        let linked = linked(mesh, &body.removed.edges);
         chain.cut(|_, a, b| linked[a as usize] & axis_bit(b - a, grid.shape) == 0);
         let handles = handles(loaded, body)?;
         let mut fixed = body.fixed(loaded)?;
@@ -66,7 +66,7 @@ impl ChainBody {
             elements.iter().zip(&fixed).filter(|(_, fixed)| **fixed).map(|(element, _)| *element).collect();
         chain.fix(&held).map_err(|error| blame()(Error::Chain(error)))?;
         let cuts = cuts(loaded, body);
-        let still = (0..fixed.len()).filter(|&vertex| fixed[vertex] && !body.removed(vertex as u32));
+        let still = (0..fixed.len()).filter(|&vertex| fixed[vertex] && !body.is_removed(vertex as u32));
         let relax_per_frame = section.relax_per_frame;
         Ok(Self { chain, elements, handles, cuts, fixed: still.count(), relax_per_frame })
     }
@@ -162,7 +162,7 @@ fn handles(loaded: &LoadedScene, body: &Body) -> Result<Vec<ChainHandle>, Error>
         let near =
             |&v: &u32| distance(&mesh.positions[v as usize].cast(), &center) <= handle.radius_mm / 1000.0;
         let elements: Vec<u32> = (0..mesh.positions.len() as u32)
-            .filter(|v| !body.removed(*v) && near(v))
+            .filter(|v| !body.is_removed(*v) && near(v))
             .map(|v| mesh.lattice_index[v as usize])
             .collect();
         if elements.is_empty() {
@@ -198,7 +198,7 @@ fn cuts(loaded: &LoadedScene, body: &Body) -> Vec<ChainCut> {
     let mut cuts: Vec<ChainCut> =
         slits.iter().map(|&(at_s, _)| ChainCut { at_s, links: Vec::new() }).collect();
     let mut gone_with = HashMap::new();
-    for tet in &body.taken.tets {
+    for tet in &body.removed.tets {
         let corners = tet.map(|vertex| mesh.positions[vertex as usize]);
         let Some(cut) = slits.iter().position(|(_, slit)| slit.takes(&corners)) else { continue };
         for (a, &p) in tet.iter().enumerate() {
@@ -208,7 +208,7 @@ fn cuts(loaded: &LoadedScene, body: &Body) -> Vec<ChainCut> {
             }
         }
     }
-    for edge in &body.taken.edges {
+    for edge in &body.removed.edges {
         if let (Some(link), Some(&cut)) = (along_axis(mesh, edge), gone_with.get(edge)) {
             cuts[cut].links.push(link);
         }

@@ -59,7 +59,7 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
     let mut builder = SystemBuilder::<f32>::in_place(&mesh.positions, &inverse_masses)?;
 
     if let Some(distance) = &scene.constraints.distance {
-        let groups = Groups::from_colors(&mesh.edge_classes(&mesh.edges))?;
+        let groups = Groups::from_colors(&mesh.edge_colors(&mesh.edges))?;
         builder = add_distance(builder, distance, compliant, mesh, &groups)
             .map_err(loaded.blame("constraints.distance"))?;
         colors.insert(Distance::NAME.into(), groups.len());
@@ -89,7 +89,7 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
         let radius_m = handle.radius_mm / 1000.0;
         let center = mesh.frame.to_local(Point3::from(handle.at_mm)).map(f64::from);
         let vertices: Vec<u32> = (0..mesh.positions.len() as u32)
-            .filter(|&v| !body.removed(v) && nalgebra::distance(&at(mesh, v), &center) <= radius_m)
+            .filter(|&v| !body.is_removed(v) && nalgebra::distance(&at(mesh, v), &center) <= radius_m)
             .collect();
         if vertices.is_empty() {
             return Err(Error::SceneKey {

@@ -54,7 +54,7 @@ pub(crate) fn write(
             // With the skin that a region left out, which lies where it was.
             let (now, triangles) = body.whole_skin(deformed);
             let (rest, _) = body.whole_skin(&body.mesh.positions);
-            let hu = [body.mesh.hu.as_slice(), &body.still_hu].concat();
+            let hu = [body.mesh.hu.as_slice(), &body.inactive_hu].concat();
             write_mesh(&folder.skin(), body, [&rest, &now], &hu, Cells::Triangles(&triangles))
         })?;
     }
@@ -120,7 +120,7 @@ impl<'a> BodyWarp<'a> {
             tets: [mesh.tets.as_slice(), &shell.tets].concat(),
             rest: [mesh.positions.as_slice(), &shell.positions].concat(),
             deformed: [deformed, &followed].concat(),
-            removed: [body.taken.tets.as_slice(), &shell.removed].concat(),
+            removed: [body.removed.tets.as_slice(), &shell.removed].concat(),
         })
     }
 

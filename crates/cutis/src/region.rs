@@ -1,6 +1,6 @@
 //! Leaving out by construction: the region of a scene, beyond which nothing is simulated, and its graded lattice.
 
-use cutis_mesh::{Grading, Lattice, MeshError, Planes, Slit, TetMesh, WholeBody};
+use cutis_mesh::{Grading, Lattice, MeshError, Planes, Slit, TetMesh, TissueMask};
 use cutis_volume::{Grid, Volume, sample};
 use nalgebra::{Point3, Vector3, distance};
 
@@ -64,7 +64,7 @@ fn fine_zone(scene: &Scene, zone: Zone, even: &Grid) -> [[f64; 2]; 3] {
 /// The mesh of the whole body, or of the scene's region.
 pub(crate) fn mesh(
     loaded: &LoadedScene,
-    whole: &WholeBody,
+    whole: &TissueMask,
     hu: &[f32],
     slits: &[Slit],
 ) -> Result<TetMesh, Error> {
@@ -182,7 +182,7 @@ impl Body {
 
     /// The skin of the whole body: places of the mesh's vertices, as given, and of those that a region left out; triangles.
     pub(crate) fn whole_skin(&self, positions: &[Point3<f32>]) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
-        let still = &self.still_skin;
+        let still = &self.inactive_skin;
         ([positions, &still.positions].concat(), [self.skin.as_slice(), &still.triangles].concat())
     }
 }
@@ -195,7 +195,7 @@ pub(crate) fn left_out(body: &Body, memory: &[MemoryPart], lines: &mut Vec<Strin
             "vertices" => (mesh.positions.len(), frozen.vertices),
             "distance" => (mesh.edges.len(), frozen.edges),
             "volume" => (mesh.tets.len(), frozen.tets),
-            "stc" => (body.skin.len(), body.still_skin.triangles.len()),
+            "stc" => (body.skin.len(), body.inactive_skin.triangles.len()),
             _ => (0, 0),
         };
         let saved = |part: &MemoryPart| {

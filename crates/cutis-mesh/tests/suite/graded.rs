@@ -2,7 +2,7 @@
 
 use cutis_mesh::{
     Cut, Grading, Incision, Lattice, MeshError, Planes, SkinMode, SkinOptions, Slit, Split, TetMesh, Tissue,
-    WholeBody, skin,
+    TissueMask, skin,
 };
 use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::{Point3, Vector3};
@@ -88,8 +88,8 @@ fn incisions_stay_in_the_fine_zone() {
     let cut = |zone: [[f64; 2]; 3]| {
         let lattice = graded(zone, Split::Kuhn6);
         let (mesh, air) = mesh(&lattice, inside);
-        let whole =
-            WholeBody::find(&lattice, &Tissue { air: &air, cut_away: &[], largest_component: true }).unwrap();
+        let whole = TissueMask::find(&lattice, &Tissue { air: &air, cut_away: &[], largest_component: true })
+            .unwrap();
         let found = skin::detect(&lattice, &air, SkinMode::Boundary, &SkinOptions::default()).unwrap();
         let skin = whole.skin(&found).0;
         let middle = skin_at + Vector3::x() * 3.0;

@@ -64,10 +64,10 @@ fn removes_exactly_the_slit_and_parts_its_lips() {
             assert_eq!(removed, inside, "{mm}");
         }
         let (mut opened, mut skin) = (mesh.clone(), triangles.clone());
-        let taken = cut.apply(&mut opened, &mut skin);
-        assert_eq!(opened.tets.len() + taken.tets.len(), mesh.tets.len());
-        assert_eq!(opened.edges.len() + taken.edges.len(), mesh.edges.len());
-        assert_eq!(skin.len() + taken.triangles, triangles.len());
+        let removed = cut.apply(&mut opened, &mut skin);
+        assert_eq!(opened.tets.len() + removed.tets.len(), mesh.tets.len());
+        assert_eq!(opened.edges.len() + removed.edges.len(), mesh.edges.len());
+        assert_eq!(skin.len() + removed.triangles, triangles.len());
         let gone = |v: &u32| cut.removed[*v as usize];
         assert!(!opened.tets.iter().flatten().any(gone) && !opened.edges.iter().flatten().any(gone));
         assert!(!skin.iter().flatten().any(gone));
@@ -197,7 +197,7 @@ fn several_incisions_each_have_their_gape() {
     assert!((cut.distance_mm(at(40.0, 33.0, 18.0)) - 3.0).abs() < 1e-4);
     let none = Cut::plan(&mesh, &triangles, &[]).unwrap();
     let (mut same, mut skin) = (mesh.clone(), triangles.clone());
-    assert_eq!(none.apply(&mut same, &mut skin), cutis_mesh::Taken::default());
+    assert_eq!(none.apply(&mut same, &mut skin), cutis_mesh::Removed::default());
     assert!(
         same.edges == mesh.edges && skin == triangles && none.distance_mm(at(0.0, 0.0, 0.0)).is_infinite()
     );

@@ -3,16 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use cutis_mesh::{
-    Cut, Incision, Lattice, MeshError, Shell, SkinMode, SkinOptions, Slit, Split, TetMesh, Tissue, WholeBody,
-    skin,
+    Cut, Incision, Lattice, MeshError, Shell, SkinMode, SkinOptions, Slit, Split, TetMesh, Tissue,
+    TissueMask, skin,
 };
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
 use crate::oracle::{air, lattice};
 
-fn whole(lattice: &Lattice, air: &[bool], largest_component: bool) -> Result<WholeBody, MeshError> {
-    WholeBody::find(lattice, &Tissue { air, cut_away: &[], largest_component })
+fn whole(lattice: &Lattice, air: &[bool], largest_component: bool) -> Result<TissueMask, MeshError> {
+    TissueMask::find(lattice, &Tissue { air, cut_away: &[], largest_component })
 }
 
 fn hu(lattice: &Lattice) -> Vec<f32> {
@@ -30,7 +30,7 @@ fn sorted<const N: usize>(mut simplex: [u32; N]) -> [u32; N] {
 }
 
 /// A ball of 8 steps, its skin in lattice points, and the region `z ≥ z of the middle + above_mm`.
-fn ball(above_mm: f64) -> (WholeBody, Vec<bool>, Vec<[u32; 3]>, Vec<bool>) {
+fn ball(above_mm: f64) -> (TissueMask, Vec<bool>, Vec<[u32; 3]>, Vec<bool>) {
     let lattice = lattice([21, 21, 21], [-2.0, 2.0, 2.0], Split::Kuhn6);
     let middle = lattice.mm([10, 10, 10]);
     let air = air(&lattice, |p| (Point3::from(p) - middle).norm() <= 16.0);
@@ -171,13 +171,13 @@ fn a_cut_in_a_region_is_the_cut_of_the_whole_body() {
     let cut = |mut mesh: TetMesh, slits: Vec<Slit>| {
         let mut own = mesh.divide_skin(&skin).0;
         let cut = Cut::of_slits(&mesh, &own, slits)?;
-        let taken = cut.apply(&mut mesh, &mut own);
+        let removed = cut.apply(&mut mesh, &mut own);
         let lips: Vec<u32> = cut.gapes[0].left().iter().map(|&v| mesh.lattice_index[v as usize]).collect();
         let gape = cut.gapes[0].measure(&mesh.positions);
         Ok::<_, MeshError>((
-            points(&mesh, &taken.tets),
-            points(&mesh, &taken.edges),
-            taken.triangles,
+            points(&mesh, &removed.tets),
+            points(&mesh, &removed.edges),
+            removed.triangles,
             lips,
             gape,
         ))

@@ -160,7 +160,7 @@ impl<'a> Chained<'a> {
     fn moved(&self) -> usize {
         let (chain, elements) = (&self.chain.chain, self.chain.elements.iter().enumerate());
         let stays = |element: u32| chain.displacement(element) == [0.0; 3];
-        elements.filter(|&(v, &element)| !self.body.removed(v as u32) && !stays(element)).count()
+        elements.filter(|&(v, &element)| !self.body.is_removed(v as u32) && !stays(element)).count()
     }
 
     /// Why links are beyond their limits: `worst` and what holds one of its ends.

@@ -10,7 +10,7 @@ use crate::{Lattice, MeshError, Skin, TetMesh, Tissue, component, edges};
 
 /// The body of a lattice, before anything of it is left out.
 #[derive(Clone)]
-pub struct WholeBody {
+pub struct TissueMask {
     lattice: Lattice,
     masks: CellMasks,
     vertices: Vec<bool>,
@@ -33,7 +33,7 @@ pub struct Frozen {
     pub tets: usize,
 }
 
-impl WholeBody {
+impl TissueMask {
     /// Keeps the tets whose four corners are tissue; of them the largest part, if so asked.
     ///
     /// # Errors
@@ -109,7 +109,7 @@ impl WholeBody {
     /// listed. [`TetMesh::frozen`] tells what was left out, and which vertices lie outside and must be held.
     ///
     /// # Errors
-    /// As [`WholeBody::mesh`], and [`MeshError::RegionEmpty`] if no vertex of the body is inside.
+    /// As [`TissueMask::mesh`], and [`MeshError::RegionEmpty`] if no vertex of the body is inside.
     pub fn mesh_within(&self, hu: &[f32], inside: &[bool]) -> Result<TetMesh, MeshError> {
         let (lattice, grid) = (&self.lattice, self.lattice.grid());
         if inside.len() != grid.len() {
@@ -136,7 +136,7 @@ impl WholeBody {
 
 /// The skin that a region left out, for those who want to see the whole body.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct StillSkin {
+pub struct InactiveSkin {
     /// Corners below the mesh's number of vertices are mesh vertices; the others are `positions`, counted from there.
     pub triangles: Vec<[u32; 3]>,
     /// Local meters, in lattice order.
@@ -146,13 +146,13 @@ pub struct StillSkin {
 }
 
 impl TetMesh {
-    /// Divides a skin of the whole body (lattice indices, as [`WholeBody::skin`] gives it): triangles that can move, in mesh vertices, and
+    /// Divides a skin of the whole body (lattice indices, as [`TissueMask::skin`] gives it): triangles that can move, in mesh vertices, and
     /// the others, all of whose corners are frozen or held by a region. Without a region all of them can move.
-    pub fn divide_skin(&self, skin: &[[u32; 3]]) -> (Vec<[u32; 3]>, StillSkin) {
+    pub fn divide_skin(&self, skin: &[[u32; 3]]) -> (Vec<[u32; 3]>, InactiveSkin) {
         let vertex_of = self.vertex_of_point();
         let on_mesh = |triangle: &[u32; 3]| triangle.map(|point| vertex_of[point as usize]);
         let Some(frozen) = &self.frozen else {
-            return (skin.iter().map(on_mesh).collect(), StillSkin::default());
+            return (skin.iter().map(on_mesh).collect(), InactiveSkin::default());
         };
         let free = |&vertex: &u32| !frozen.border[vertex as usize];
         let moves = |corners: [u32; 3]| !corners.contains(&NO_VERTEX) && corners.iter().any(free);
@@ -170,7 +170,7 @@ impl TetMesh {
         let place = |&point: &u32| self.frame.to_local(self.lattice.mm(grid.point(point as usize)));
         let triangles = still.iter().map(|triangle| triangle.map(corner)).collect();
         let positions = points.iter().map(place).collect();
-        let still = StillSkin { triangles, positions, lattice_index: points };
+        let still = InactiveSkin { triangles, positions, lattice_index: points };
         (moving.iter().map(on_mesh).collect(), still)
     }
 }
