@@ -3,8 +3,6 @@
 pub mod accuracy;
 pub mod cantilever;
 pub mod chainmail;
-#[path = "../../crates/cutis-solver-cpu/tests/lattice/mod.rs"]
-pub mod lattice;
 mod origin;
 pub mod parity;
 pub mod sheet;

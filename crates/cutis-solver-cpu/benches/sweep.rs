@@ -4,15 +4,12 @@
 //! time holds one sweep and the two passes over the vertices.
 #![allow(missing_docs)]
 
-#[path = "../tests/lattice/mod.rs"]
-mod lattice;
-
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use cutis_coloring::Groups;
 use cutis_constraints::{Distance, Volume};
 use cutis_solver::{Formulation, Settings, Solver, Stiffness, System, SystemBuilder};
 use cutis_solver_cpu::SolverCpu;
-use lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 fn builder(lattice: &Kuhn) -> SystemBuilder<f32> {
     let masses: Vec<f32> = lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 }).collect();

@@ -1,8 +1,6 @@
 //! Nothing is allocated inside a step, and what is left out has no storage. A binary of its own: it counts every
 //! allocation of the process.
 
-mod lattice;
-
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -10,7 +8,7 @@ use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Volume};
 use cutis_solver::{Formulation, Settings, Solver, SolverReference, Stiffness, System, SystemBuilder};
 use cutis_solver_cpu::SolverCpu;
-use lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 

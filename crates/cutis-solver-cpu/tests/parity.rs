@@ -1,7 +1,5 @@
 //! The backend against the reference: equal bit for bit, for any number of threads.
 
-mod lattice;
-
 use std::time::Instant;
 
 use cutis_coloring::greedy;
@@ -11,7 +9,7 @@ use cutis_solver::{
     SystemBuilder, Values,
 };
 use cutis_solver_cpu::{CpuError, SolverCpu};
-use lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 use nalgebra::Point3;
 
 /// A block large enough for several chunks of every color and several blocks of vertices: all kinds, one face fixed,

@@ -6,7 +6,7 @@
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, Volume};
 use cutis_solver::{Formulation, Settings, Stiffness, SystemBuilder};
-use cutis_tests::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 use nalgebra::{Matrix3, Point3, Rotation3};
 
 use super::{SCALES, Start, at_most, in_double, in_single, reference, scaled};

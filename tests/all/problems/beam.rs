@@ -7,7 +7,7 @@
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Scalar, Volume};
 use cutis_solver::{Formulation, Settings, Stiffness, SystemBuilder};
-use cutis_tests::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 use super::{Start, in_double, in_single, reference};
 

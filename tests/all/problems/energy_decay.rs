@@ -7,7 +7,7 @@ use cutis_constraints::{
     volume_compliance,
 };
 use cutis_solver::{Settings, Solver, Stiffness, System, SystemBuilder, Values};
-use cutis_tests::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 use nalgebra::Point3;
 
 use super::{Start, at_most, cpu, on_each_adapter, reference, scaled};

@@ -5,7 +5,7 @@
 use cutis_coloring::greedy;
 use cutis_constraints::{Constraint, Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
 use cutis_solver::{Formulation, Momentum, Pbd, Settings, Stiffness, SystemBuilder, project};
-use cutis_tests::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 use nalgebra::{Point3, Vector3};
 
 use super::{SCALES, Start, at_most, in_double, in_single, reference, scaled};

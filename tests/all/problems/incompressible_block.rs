@@ -6,7 +6,7 @@
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, Volume};
 use cutis_solver::{Formulation, Handle, Settings, Solver, Stiffness, System, SystemBuilder};
-use cutis_tests::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 use super::{SCALES, Start, at_most, cpu, on_each_adapter, reference, scaled};
 

@@ -8,7 +8,7 @@ use cutis_solver::{Formulation, Handle, Stiffness, System, SystemBuilder, Values
 use nalgebra::{Point3, Vector3};
 
 use super::bench::Failure;
-use crate::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 /// Length of a lattice step in m.
 pub const STEP: f64 = 0.1;

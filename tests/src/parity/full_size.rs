@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 use super::bench::{Bench, Failure};
 use super::difference::Difference;
 use super::outcome::Ring;
-use crate::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 /// Vertices along each axis.
 const SIZE: [usize; 3] = [129, 129, 289];

@@ -11,8 +11,8 @@ use cutis_solver::{Formulation, Handle, Stiffness, System, SystemBuilder};
 use nalgebra::{Point3, Vector3};
 
 use super::Failure;
-use crate::lattice::Kuhn;
 use crate::sheet::Sheet;
+use cutis_test_kit::Kuhn;
 
 /// Compliances in the body's own units.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -78,8 +78,9 @@ const LAYERS: &[Layer] = &[
     Layer { name: "cutis-cli", level: 6, may_use: AnyBelow },
 ];
 
-/// Uses what it likes, is used by none, and is not published.
-const OUTSIDE: &str = "cutis-tests";
+/// Tests, studies and their kit: they may use any crate, no product crate depends on them except for
+/// its own tests, and they are not published.
+const UNPUBLISHED: &[&str] = &["cutis-studies", "cutis-test-kit", "cutis-tests"];
 
 /// What the rule looks at of a workspace member.
 #[derive(Debug)]
@@ -119,10 +120,12 @@ pub fn packages(metadata: &Value) -> Result<Vec<Package>> {
 /// Every arrow that does not point down, every crate without a row, every row without a crate.
 pub fn check(packages: &[Package]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for package in packages.iter().filter(|package| package.name == OUTSIDE && package.publish) {
+    for package in
+        packages.iter().filter(|package| UNPUBLISHED.contains(&package.name.as_str()) && package.publish)
+    {
         findings.push(Finding::failure(&package.name, 0, "must not be published: set `publish = false`"));
     }
-    for package in packages.iter().filter(|package| package.name != OUTSIDE) {
+    for package in packages.iter().filter(|package| !UNPUBLISHED.contains(&package.name.as_str())) {
         let Some(from) = find(&package.name) else {
             findings.push(Finding::failure(&package.name, 0, "has no row in the table of layers"));
             continue;
@@ -227,9 +230,9 @@ mod tests {
 
     #[test]
     fn none_may_use_the_tests_and_they_stay_unpublished() {
-        let mut packages = with("cutis", &[OUTSIDE]);
+        let mut packages = with("cutis", &[UNPUBLISHED[0]]);
         packages.push(Package {
-            name: OUTSIDE.to_owned(),
+            name: UNPUBLISHED[0].to_owned(),
             publish: false,
             dependencies: vec!["cutis".to_owned()],
         });

@@ -1,15 +1,12 @@
 //! Blocks of tetrahedra for the tests and the benchmark.
 #![allow(dead_code)] // each of them uses its own
 
-#[path = "../../../cutis-solver-cpu/tests/lattice/mod.rs"]
-mod lattice;
-
 use cutis_coloring::greedy;
 use cutis_constraints::{
     Distance, DistanceMaterial, SkinTension, SkinTensionMaterial, Volume, VolumeMaterial,
 };
 use cutis_solver::{Stiffness, System, SystemBuilder};
-pub use lattice::Kuhn;
+pub use cutis_test_kit::Kuhn;
 use nalgebra::Point3;
 
 /// A block of `n³` vertices of 1 kg at `scale` meters from each other, whose top is held: springs of 1 N/m, volumes.

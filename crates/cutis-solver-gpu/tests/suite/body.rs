@@ -6,7 +6,7 @@ use cutis_constraints::{
 };
 use cutis_solver::{Formulation, Handle, Settings, Stiffness, System, SystemBuilder, Values};
 
-use crate::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 /// What a body is made of.
 #[derive(Clone, Copy, Debug)]

@@ -2,8 +2,6 @@
 
 mod body;
 mod device;
-#[path = "../../../cutis-solver-cpu/tests/lattice/mod.rs"]
-mod lattice;
 mod parity;
 mod readbacks;
 mod state;

@@ -6,7 +6,7 @@ use cutis_solver::{Formulation, Handle, Settings, Stiffness, System, SystemBuild
 use nalgebra::distance;
 
 use super::{Case, Failure};
-use crate::lattice::Kuhn;
+use cutis_test_kit::Kuhn;
 
 /// Length of a lattice step in m.
 const STEP: f64 = 0.01;

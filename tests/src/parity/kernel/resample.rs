@@ -8,10 +8,10 @@ use cutis_resample::{ResamplerGpu, ResamplerOptions, SlabState, Warp, twin};
 use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::{Point3, Vector3};
 
-use crate::lattice::Kuhn;
 use crate::parity::bench::{Bench, Failure};
 use crate::parity::difference::Policy;
 use crate::parity::outcome::{Figures, Measured, Ring};
+use cutis_test_kit::Kuhn;
 
 /// Slices of the slab.
 const SLAB: usize = 9;

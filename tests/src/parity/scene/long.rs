@@ -10,11 +10,11 @@ use cutis_solver_cpu::SolverCpu;
 use cutis_solver_gpu::SolverGpu;
 use nalgebra::{Point3, Vector3};
 
-use crate::lattice::Kuhn;
 use crate::parity::bench::{Bench, Effort, Failure};
 use crate::parity::bodies::{Kind, Plan, STEP};
 use crate::parity::difference::{Difference, Policy, triples};
 use crate::parity::outcome::{Measured, Ring};
+use cutis_test_kit::Kuhn;
 
 const PLAN: Plan<'static> = Plan {
     size: [9, 7, 6],
