@@ -38,27 +38,27 @@ pub(crate) enum Command {
         out: Option<PathBuf>,
         #[command(flatten)]
         change: Change,
-        /// Go on from the checkpoint in the run folder
+        /// Resume from the checkpoint in the run folder
         #[arg(long)]
         resume: bool,
         /// Print report.json on standard output
         #[arg(long)]
         json: bool,
     },
-    /// Tell what a scene would do: sizes, memory, what is left out
+    /// Show what a scene would cost: sizes, memory, time, and what it skips
     Check {
         /// Scene file (TOML)
         scene: PathBuf,
         #[command(flatten)]
         change: Change,
-        /// Lattice instead of the scene's: native, a spacing in mm, or nx,ny,nz
+        /// Replace the scene's lattice: native, a spacing in mm, or nx,ny,nz
         #[arg(long)]
         lattice: Option<LatticeSize>,
         /// Print as JSON
         #[arg(long)]
         json: bool,
     },
-    /// Measure which setting a scene needs on this machine, and write a copy of the scene with it
+    /// Find solver settings for a scene on this machine, and write a copy of the scene with them
     Tune {
         /// Scene file (TOML)
         scene: PathBuf,
@@ -70,7 +70,7 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Tell what is in a volume file
+    /// Describe a volume file
     Inspect {
         /// NIfTI file
         volume: PathBuf,
@@ -82,7 +82,7 @@ pub(crate) enum Command {
     Skin {
         /// NIfTI file
         volume: PathBuf,
-        /// native, a spacing in mm, or nx,ny,nz
+        /// Lattice: native, a spacing in mm, or nx,ny,nz
         #[arg(long, default_value = "native")]
         lattice: LatticeSize,
         /// Detection rule
@@ -103,14 +103,14 @@ pub(crate) enum Command {
         /// Voxels per axis: nx,ny,nz
         #[arg(long, visible_alias = "lattice", value_parser = size, default_value = "128,128,96")]
         size: [usize; 3],
-        /// Anatomy and noise vary with it
+        /// Seed of the anatomy and the noise
         #[arg(long, default_value_t = 0)]
         seed: u64,
         /// File to write (.nii or .nii.gz)
         #[arg(long)]
         out: PathBuf,
     },
-    /// Carry another volume through the deformation of a finished run
+    /// Deform another volume as a finished run deformed its CT
     Resample {
         /// Scene file of the run
         scene: PathBuf,
@@ -126,17 +126,17 @@ pub(crate) enum Command {
         #[command(flatten)]
         change: Change,
     },
-    /// Make a picture of a volume: its skin from a side, or a slice
+    /// Draw a volume: its skin from one side, or a slice
     Render {
         /// NIfTI file
         volume: PathBuf,
         /// File to write (.png)
         #[arg(long)]
         out: PathBuf,
-        /// Side from which the skin is seen
+        /// Side to look from
         #[arg(long, value_enum, default_value_t = Side::Anterior, conflicts_with = "slice")]
         side: Side,
-        /// Slice instead: axial@MM, coronal@MM or sagittal@MM
+        /// Draw a slice: axial@MM, coronal@MM or sagittal@MM
         #[arg(long)]
         slice: Option<String>,
         /// Window of a slice: level/width in HU
@@ -152,13 +152,13 @@ pub(crate) enum Command {
         #[arg(long, default_value_t = 800)]
         pixels: usize,
     },
-    /// List the GPUs of this machine, and tell which one `--backend auto` takes
+    /// List the GPUs of this machine, and the one that `--backend auto` takes
     Devices {
         /// Print as JSON
         #[arg(long)]
         json: bool,
     },
-    /// Print a scene to start from, or the JSON schema of scenes and reports
+    /// Print a new scene, or the schemas of scenes and reports
     Scene {
         #[command(subcommand)]
         what: SceneCommand,
@@ -177,51 +177,52 @@ pub(crate) enum SceneCommand {
     ReportSchema,
 }
 
-/// What is asked of a setting.
+/// Options of `cutis tune`.
 #[derive(Clone, Debug, Group)]
 pub(crate) struct TuneArgs {
-    /// Take the setting with the least error that needs at most so many milliseconds per frame
+    /// Pick the most accurate setting that takes at most this time per frame, ms
     #[arg(long, value_name = "MS", conflicts_with = "error")]
     pub(crate) budget_ms: Option<f64>,
-    /// Take the cheapest setting with at most this error, % of the displacement [default: 5, or the best at no more cost than now]
+    /// Pick the cheapest setting with at most this error, % of the displacement
+    /// [default: 5, or the best one that costs no more than the scene's own]
     #[arg(long, value_name = "PERCENT")]
     pub(crate) error: Option<f64>,
-    /// The tuned copy of the scene [default: the scene's name with `-tuned`, in the current folder]
+    /// Tuned copy of the scene [default: the scene's name with `-tuned`, in the current folder]
     #[arg(short, long)]
     pub(crate) out: Option<PathBuf>,
-    /// Replace the copy if it is there
+    /// Overwrite the copy if it exists
     #[arg(long)]
     pub(crate) force: bool,
-    /// Do not measure what can be left out
+    /// Skip the ablation: do not measure the scene without each of its parts
     #[arg(long)]
     pub(crate) settings_only: bool,
-    /// Time that the choice of a setting may take, minutes; what can be left out may take as long again
+    /// Time limit for picking a setting, minutes; the ablation may take as long again
     #[arg(long, default_value_t = 5.0)]
     pub(crate) minutes: f64,
 }
 
-/// Changes to a scene from the command line.
+/// Options that change a scene.
 #[derive(Clone, Debug, Default, Group)]
 pub(crate) struct Change {
-    /// Where the solver runs: auto, cpu, reference, gpu
+    /// Backend of the solver: auto, cpu, reference or gpu
     #[arg(long)]
     pub(crate) backend: Option<String>,
-    /// Which GPU, where one is used: part of its name, or its index in `cutis devices`
+    /// GPU to use: part of its name, or its index in `cutis devices`
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) adapter: Option<String>,
     /// Number of frames
     #[arg(long)]
     pub(crate) frames: Option<u32>,
-    /// Change a key of the scene, for example solver.substeps=20
+    /// Set a key of the scene, for example solver.substeps=20
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) set: Vec<Override>,
-    /// Leave a constraint kind out
+    /// Remove a constraint kind from the scene
     #[arg(long, value_enum, value_name = "KIND")]
-    pub(crate) without: Vec<Kind>,
+    pub(crate) without: Vec<ConstraintKind>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Kind {
+pub(crate) enum ConstraintKind {
     Distance,
     Volume,
     Stc,
@@ -229,9 +230,9 @@ pub(crate) enum Kind {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Mode {
-    /// The paper's rule, literally
+    /// The paper's rule, taken literally
     Paper,
-    /// All faces between tissue and the rest
+    /// All faces between tissue and everything else
     Boundary,
     /// The outer skin of the body
     Exterior,

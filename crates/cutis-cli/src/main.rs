@@ -1,4 +1,4 @@
-//! The `cutis` program: arguments in, exit code out (0 done, 1 failed while running, 2 bad input or usage).
+//! The `cutis` program. Exit codes: 0 done, 1 failed while running, 2 bad input or usage.
 
 mod args;
 mod commands;

@@ -1,4 +1,4 @@
-//! What the user sees: progress bars on a terminal, plain lines elsewhere, errors with their cause.
+//! Output for the user: progress bars on a terminal, plain lines in a pipe, errors.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
@@ -12,7 +12,7 @@ pub(crate) fn error(error: &cutis::Error) {
     say(&format!("error: {error}"));
 }
 
-/// Prints a line on standard output. A closed pipe is not an error of ours.
+/// Prints a line on standard output. A closed pipe is ignored.
 pub(crate) fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
@@ -39,7 +39,7 @@ impl Terminal {
     }
 
     fn with(&self, act: impl FnOnce(&mut Option<Stage>)) {
-        // A poisoned lock only means that another thread panicked while drawing; the bar is still usable.
+        // A poisoned lock means that another thread panicked while drawing. The bar still works.
         act(&mut self.stage.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
     }
 }

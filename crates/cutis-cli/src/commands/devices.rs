@@ -1,4 +1,4 @@
-//! `devices`: the GPUs of this machine, as a table.
+//! `devices`: a table of the GPUs of this machine.
 
 use cutis::{Device, Devices};
 

@@ -1,4 +1,4 @@
-//! `inspect`, `skin`, `phantom` and `render`: looking at volumes without simulating.
+//! `inspect`, `skin`, `phantom` and `render`: commands that simulate nothing.
 
 use std::path::Path;
 
@@ -87,7 +87,7 @@ pub(crate) fn phantom(size: [usize; 3], seed: u64, out: &Path) -> Result<(), Err
     Ok(())
 }
 
-/// What to draw.
+/// Options of `cutis render`.
 pub(crate) struct Look {
     pub(crate) side: Side,
     pub(crate) slice: Option<String>,
@@ -116,7 +116,7 @@ impl From<Split> for cutis::mesh::Split {
     }
 }
 
-/// Draws a volume into a PNG.
+/// Draws a volume and writes a PNG.
 pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error> {
     let focus = match (&look.focus, look.zoom) {
         (Some(text), Some(size_mm)) => {
@@ -152,7 +152,7 @@ pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error
     Ok(())
 }
 
-/// `axial@120` and the like.
+/// Parses a slice such as `axial@120`.
 fn plane(text: &str) -> Result<(Plane, f64), Error> {
     let parsed = text.split_once('@').and_then(|(name, at)| {
         let plane = match name {
@@ -169,7 +169,7 @@ fn plane(text: &str) -> Result<(Plane, f64), Error> {
     })
 }
 
-/// `N` numbers with `separator` between them.
+/// Parses `N` numbers with `separator` between them.
 fn numbers<const N: usize>(
     option: &str,
     text: &str,

@@ -1,4 +1,4 @@
-//! One function per subcommand: arguments in, library call, what is printed.
+//! One function per subcommand. It calls the library and prints the result.
 
 mod devices;
 mod look;
@@ -47,7 +47,7 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
     }
 }
 
-/// JSON for people and machines. Serializing plain data cannot fail.
+/// Indented JSON. Serializing plain data cannot fail.
 fn pretty(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"))
 }

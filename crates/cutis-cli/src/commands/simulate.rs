@@ -7,7 +7,7 @@ use cutis::volume::sample::LatticeSize;
 use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOptions, Scene};
 
 use super::pretty;
-use crate::args::{Change, Kind};
+use crate::args::{Change, ConstraintKind};
 use crate::terminal::{Terminal, print};
 
 pub(crate) fn demo(out: &Path, change: &Change, json: bool) -> Result<(), Error> {
@@ -52,13 +52,13 @@ fn summary(report: &Report, out: &Path) -> String {
             report.frames.ms_mean
         ),
     ];
-    lines.extend(report.chainmail.iter().map(|told| {
+    lines.extend(report.chainmail.iter().map(|chainmail| {
         format!(
             "chainmail: {} elements moved, {} links beyond their limits, {} sweeps of relaxation{}",
-            told.moved,
-            told.violated_links,
-            told.relax_sweeps,
-            if told.settled { " (settled)" } else { "" }
+            chainmail.moved,
+            chainmail.violated_links,
+            chainmail.relax_sweeps,
+            if chainmail.settled { " (settled)" } else { "" }
         )
     }));
     lines.extend(report.wounds.iter().map(|w| {
@@ -71,7 +71,7 @@ fn summary(report: &Report, out: &Path) -> String {
     lines.join("\n")
 }
 
-/// `cpu`, or `gpu: llvmpipe (…)`.
+/// The backend, and the adapter of a GPU: `cpu`, or `gpu: llvmpipe (…)`.
 fn place(backend: &Backend) -> String {
     match &backend.adapter {
         Some(adapter) => format!("{}: {adapter}", backend.name),
@@ -79,7 +79,7 @@ fn place(backend: &Backend) -> String {
     }
 }
 
-/// Backend, reason, and threads where they do the work.
+/// The backend, the reason for it, and the number of threads of a CPU backend.
 fn running_on(backend: &Backend) -> String {
     let threads = match backend.adapter {
         Some(_) => String::new(),
@@ -127,7 +127,7 @@ fn table(plan: &Plan) -> String {
     lines.join("\n")
 }
 
-/// The cost report: bytes exactly, times as measured.
+/// The cost report as a table: exact bytes and measured times.
 fn cost_lines(plan: &Plan) -> Vec<String> {
     let on_device = !plan.device_memory.is_empty();
     let row = |part: &str, colors: &str, host: &str, device: &str, time: &str| {
@@ -156,15 +156,14 @@ pub(crate) fn resample(scene: &Path, change: &Change, request: ResampleRequest) 
     let terminal = Terminal::new();
     let report = cutis::resample_run(&loaded, &request, &terminal)?;
     if report.folds > 0 {
-        terminal
-            .note(&format!("{} voxels lie in two places of the deformed body at once (folds)", report.folds));
+        terminal.note(&format!("{} voxels are covered twice by the deformed body (folds)", report.folds));
     }
     print(&format!("{}: {} voxels inside the deformed body", request.out.display(), report.covered_voxels));
     Ok(())
 }
 
 impl Change {
-    /// The changes that are overrides of keys, in the order in which they hold.
+    /// The changes that override keys. A later one wins.
     pub(super) fn overrides(&self, lattice: Option<LatticeSize>) -> Vec<Override> {
         let mut list = self.set.clone();
         let mut set = |key: &str, value: String| list.push(Override { key: key.into(), value });
@@ -188,14 +187,14 @@ impl Change {
         list
     }
 
-    /// Takes the kinds out that `--without` names.
+    /// Removes the constraint kinds that `--without` names.
     pub(super) fn applied(&self, mut loaded: LoadedScene) -> LoadedScene {
         let constraints = &mut loaded.scene.constraints;
         for kind in &self.without {
             match kind {
-                Kind::Distance => constraints.distance = None,
-                Kind::Volume => constraints.volume = None,
-                Kind::Stc => constraints.stc = None,
+                ConstraintKind::Distance => constraints.distance = None,
+                ConstraintKind::Volume => constraints.volume = None,
+                ConstraintKind::Stc => constraints.stc = None,
             }
         }
         loaded

@@ -1,4 +1,4 @@
-//! `tune`: the calibration of a scene, as tables.
+//! `tune`: tables of the settings that were measured.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub(super) fn tune(scene: &Path, change: &Change, args: &TuneArgs, json: bool) -
         (None, Some(percent)) => Demand::Error(percent / 100.0),
         (None, None) => Demand::Default,
     };
-    let out = args.out.clone().unwrap_or_else(|| beside(scene));
+    let out = args.out.clone().unwrap_or_else(|| default_copy(scene));
     let options = TuneOptions {
         demand,
         out,
@@ -30,40 +30,44 @@ pub(super) fn tune(scene: &Path, change: &Change, args: &TuneArgs, json: bool) -
 }
 
 /// The scene's name with `-tuned`, in the current folder.
-fn beside(scene: &Path) -> PathBuf {
+fn default_copy(scene: &Path) -> PathBuf {
     let mut name = scene.file_stem().unwrap_or_default().to_owned();
     name.push("-tuned.toml");
     name.into()
 }
 
 fn tables(tuning: &Tuning) -> String {
-    let told = &tuning.reference;
-    let order = told.order.map_or("no limit seen".into(), |order| format!("order {order:.1}"));
-    let levels: Vec<String> = told.substeps.iter().map(u32::to_string).collect();
+    let reference = &tuning.reference;
+    let order = reference.order.map_or("no limit seen".into(), |order| format!("order {order:.1}"));
+    let levels: Vec<String> = reference.substeps.iter().map(u32::to_string).collect();
     let mut lines = vec![
         format!(
-            "reference        {} substeps in f64 on the CPU, {:.0} s; extrapolated ({order}); off by at most about {:.2} %",
+            "reference        {} substeps in f64 on the CPU, {:.0} s; extrapolated ({order}); uncertainty about {:.2} %",
             levels.join(", "),
-            told.seconds,
-            100.0 * told.error
+            reference.seconds,
+            100.0 * reference.error
         ),
         format!(
             "                 displacement {:.3} mm RMS{}",
-            told.displacement_mm,
-            told.growths_mm.iter().map(|mm| format!("; the wound opens by {mm:.3} mm")).collect::<String>()
+            reference.displacement_mm,
+            reference
+                .growths_mm
+                .iter()
+                .map(|mm| format!("; the wound opens by {mm:.3} mm"))
+                .collect::<String>()
         ),
-        format!("asked for        {}", tuning.demand),
+        format!("target           {}", tuning.demand),
         String::new(),
         row("", "setting", "ms/frame", "error", "opening", "difference"),
     ];
     let measured = tuning.candidates.iter().filter(|candidate| candidate.error.is_some());
     lines.extend(measured.map(|candidate| candidate_row(candidate, tuning)));
     lines.push(
-        "  > picked, * on the front (nothing measured is as cheap and as near), = the scene's own".into(),
+        "  > picked, * on the Pareto front (no cheaper setting is as accurate), = the scene's own".into(),
     );
-    lines.extend(given_up(tuning));
+    lines.extend(abandoned(tuning));
     if !tuning.omissions.is_empty() {
-        lines.push("what the picked setting would save and change without".into());
+        lines.push("ablation: what the scene saves, and how its result changes, without".into());
         lines.push(omission_row("", "ms/frame", "ms once", "MB", "change", "difference of the opening"));
         lines.extend(tuning.omissions.iter().map(omission));
     }
@@ -74,8 +78,8 @@ fn tables(tuning: &Tuning) -> String {
     lines.join("\n")
 }
 
-/// What was not measured to the end, by reason.
-fn given_up(tuning: &Tuning) -> Vec<String> {
+/// The settings that were abandoned, grouped by reason.
+fn abandoned(tuning: &Tuning) -> Vec<String> {
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for candidate in &tuning.candidates {
         let Some(why) = candidate.abandoned.as_deref() else { continue };
@@ -108,7 +112,7 @@ fn candidate_row(candidate: &Candidate, tuning: &Tuning) -> String {
     )
 }
 
-/// How a wound differs; a dash where there is nothing to take a percentage of.
+/// Difference of a wound's opening. The percentage is a dash if the reference did not open.
 fn difference(wound: &WoundError) -> String {
     let percent = wound.difference_percent.map_or("-".into(), |percent| format!("{percent:+.1} %"));
     format!("{:+.3} mm ({percent})", wound.difference_mm)
