@@ -1,4 +1,4 @@
-//! The bench: a prepared body that is run again and again with other settings, timed and looked at.
+//! Runs one prepared body with different settings, and measures time and displacements.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -10,15 +10,15 @@ use cutis_solver_cpu::SolverCpu;
 use nalgebra::Point3;
 
 use super::field::{Field, Movable};
-use super::setting::{Line, Model, Setting};
+use super::setting::{CostModel, LinearCost, Setting};
 use crate::backend::Chosen;
 use crate::expense::Expense;
 use crate::{CostReport, Error, Progress};
 
-/// Time after which the measurement of a substep ends, s.
+/// Time limit for measuring a substep, s.
 const LONG_ENOUGH_S: f64 = 0.1;
 
-/// What is run.
+/// The body, its scene's settings, and the backend that all runs use.
 pub(super) struct Bench<'a> {
     pub(super) system: &'a System<f32>,
     pub(super) settings: Settings,
@@ -28,29 +28,29 @@ pub(super) struct Bench<'a> {
     pub(super) movable: Movable,
 }
 
-/// A run as far as it came.
+/// A run, complete or stopped early.
 #[derive(Default)]
 pub(super) struct Run {
     /// Mean wall time of a frame, ms.
     pub(super) ms_per_frame: f64,
-    /// At each of [`Bench::moments`] that it reached.
+    /// Displacements at each of [`Bench::moments`] that the run reached.
     pub(super) fields: Vec<Field>,
-    /// What each wound opened by, mm: mean distance of its lips, last frame less before the first.
+    /// Growth of each wound, mm: mean distance of its lips at the last frame minus that at rest.
     pub(super) growths_mm: Vec<f64>,
-    /// Local meters, one per vertex of the body, at the end; empty if it was stopped before.
+    /// Final positions in local meters, one per vertex; empty if the run was stopped early.
     pub(super) positions: Vec<Point3<f32>>,
     pub(super) residuals: Vec<Residual>,
-    /// Of the solver, on the host and on the device.
+    /// Memory of the solver on host and device, bytes.
     pub(super) bytes: usize,
 }
 
 impl Run {
-    /// Whether it came to the end.
+    /// True if the run reached its last frame.
     pub(super) fn finished(&self) -> bool {
         !self.positions.is_empty()
     }
 
-    /// Displacements at the last moment that it reached.
+    /// Displacements at the last sampled frame.
     pub(super) fn at_end(&self) -> &Field {
         static NONE: Field = Field(Vec::new());
         self.fields.last().unwrap_or(&NONE)
@@ -68,14 +68,15 @@ impl<'a> Bench<'a> {
         Self { system, settings, gapes, backend, frames, movable: Movable::of(system) }
     }
 
-    /// Frames after which the displacements are kept: a quarter, half and all of them.
+    /// Frames at which displacements are sampled: a quarter, half and all of the frames.
     pub(super) fn moments(&self) -> Vec<u32> {
         let mut moments = vec![self.frames.div_ceil(4), self.frames.div_ceil(2), self.frames];
         moments.dedup();
         moments
     }
 
-    /// Runs a setting on the scene's backend. `go_on` is asked at each moment but the last, with what was found so far.
+    /// Runs a setting on the scene's backend. `go_on` decides at each sampled frame, except the
+    /// last, whether the run continues.
     pub(super) fn run(
         &self,
         setting: Setting,
@@ -90,7 +91,7 @@ impl<'a> Bench<'a> {
         Ok(run)
     }
 
-    /// Runs a setting in double precision on the CPU, whatever the scene's backend.
+    /// Runs a setting in double precision on the CPU.
     pub(super) fn run_f64(
         &self,
         system: &System<f64>,
@@ -133,7 +134,7 @@ impl<'a> Bench<'a> {
         Ok(run)
     }
 
-    /// What each wound has opened by at `positions`, mm.
+    /// Growth of each wound at `positions`, mm.
     fn growths_mm<T: Scalar>(&self, positions: &[Point3<T>]) -> Vec<f64> {
         let now = |v: u32| positions[v as usize].map(T::to_f64);
         let rest = |v: u32| {
@@ -144,29 +145,29 @@ impl<'a> Bench<'a> {
         self.gapes.iter().map(growth).collect()
     }
 
-    /// What substeps and iterations cost on the scene's backend: substeps with one iteration and with two.
-    pub(super) fn model(&self) -> Result<Model, Error> {
-        Ok(Model { xpbd: self.line(Formulation::Xpbd)?, vbd: self.line(Formulation::Vbd)? })
+    /// Measures the cost model: substeps with one iteration and with two, on the scene's backend.
+    pub(super) fn model(&self) -> Result<CostModel, Error> {
+        Ok(CostModel { xpbd: self.line(Formulation::Xpbd)?, vbd: self.line(Formulation::Vbd)? })
     }
 
-    fn line(&self, formulation: Formulation) -> Result<Line, Error> {
+    fn line(&self, formulation: Formulation) -> Result<LinearCost, Error> {
         let mut ms = [0.0; 2];
         for (iterations, ms) in [1, 2].into_iter().zip(&mut ms) {
             let settings = self.one_substep(formulation, iterations);
             *ms = substep_ms(&mut *self.backend.start(self.system.clone(), settings)?.solver)?;
         }
         let iteration_ms = f64::max(ms[1] - ms[0], 0.1 * ms[0]);
-        Ok(Line { substep_ms: f64::max(ms[0] - iteration_ms, 0.0), iteration_ms })
+        Ok(LinearCost { substep_ms: f64::max(ms[0] - iteration_ms, 0.0), iteration_ms })
     }
 
-    /// Milliseconds of a substep in double precision.
+    /// Time of a substep in double precision, ms.
     pub(super) fn substep_f64_ms(&self, system: &System<f64>) -> Result<f64, Error> {
         let threads = self.backend.host_threads();
         let settings = self.one_substep(Formulation::Xpbd, 1);
         substep_ms(&mut SolverCpu::new(system.clone(), settings, Some(threads))?)
     }
 
-    /// Where the time of a setting goes: one frame part by part, after one to touch all memory.
+    /// Profile of one frame, after one frame that touches all memory.
     pub(super) fn profile(&self, setting: Setting) -> Result<StepProfile, Error> {
         let mut running = self.backend.start(self.system.clone(), setting.settings(&self.settings))?;
         let mut profile = StepProfile::default();
@@ -175,7 +176,7 @@ impl<'a> Bench<'a> {
         Ok(profile)
     }
 
-    /// What a setting takes of memory, part by part.
+    /// Memory of a setting by part.
     pub(super) fn bytes(&self, setting: Setting) -> Result<CostReport, Error> {
         let settings = setting.settings(&self.settings);
         let Expense { memory, .. } = Expense::of(self.system, &settings)?;
@@ -189,7 +190,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The shortest of several substeps, after one to touch all memory.
+/// Shortest time of several substeps, ms, after one substep that touches all memory.
 fn substep_ms<T: Scalar>(solver: &mut dyn Solver<T>) -> Result<f64, Error> {
     solver.step(1)?;
     let (begin, mut shortest) = (Instant::now(), f64::INFINITY);

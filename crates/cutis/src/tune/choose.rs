@@ -1,24 +1,24 @@
-//! Which of the measured settings to take.
+//! Picks one of the measured settings.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Candidate, ReferenceReport};
 
-/// Error that a setting is asked for by default: RMS of the positions over the RMS displacement.
+/// Default target: RMS position error over RMS displacement.
 const DEFAULT_ERROR: f64 = 0.05;
 
-/// What is asked of a setting.
+/// Target for a setting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Demand {
-    /// The cheapest with an error of at most 5 %; if there is none, the one with the least error that costs no more than the
-    /// scene's own setting, if the reference is fine enough to tell.
+    /// The cheapest setting with an error of at most 5 %. If there is none: the most accurate
+    /// setting that costs no more than the scene's own, provided that the reference is fine enough.
     #[default]
     Default,
-    /// The one with the least error that takes at most so many milliseconds per frame.
+    /// The most accurate setting that takes at most this time per frame, ms.
     BudgetMs(f64),
-    /// The cheapest with at most this error: RMS of the positions over the RMS displacement.
+    /// The cheapest setting with at most this error: RMS position error over RMS displacement.
     Error(f64),
 }
 
@@ -26,7 +26,11 @@ impl std::fmt::Display for Demand {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Default => {
-                write!(f, "an error of at most {} %, or the least at no more cost", 100.0 * DEFAULT_ERROR)
+                write!(
+                    f,
+                    "an error of at most {} %, or the smallest error at no more cost",
+                    100.0 * DEFAULT_ERROR
+                )
             }
             Self::BudgetMs(ms) => write!(f, "at most {ms} ms per frame"),
             Self::Error(error) => write!(f, "an error of at most {} %", 100.0 * error),
@@ -35,7 +39,7 @@ impl std::fmt::Display for Demand {
 }
 
 impl Demand {
-    /// The error that is asked for, if it is one.
+    /// The target error, if the target is an error.
     pub(super) fn error(self) -> Option<f64> {
         match self {
             Self::Default => Some(DEFAULT_ERROR),
@@ -44,13 +48,14 @@ impl Demand {
         }
     }
 
-    /// The error that a reference may have: a tenth of what is asked for.
+    /// The error that a reference may have: a tenth of the target.
     pub(super) fn reference_error(self) -> f64 {
         0.1 * self.error().unwrap_or(DEFAULT_ERROR)
     }
 
-    /// The place of the setting to take. `own` is the scene's. A setting meets an error only if it does so with the reference as
-    /// wrong as it may be; and none is taken for being the nearest by default to a reference that is hardly finer than the scene.
+    /// Index of the picked setting. `own` is the index of the scene's own setting. A setting passes
+    /// only if its error plus the reference's uncertainty is below the target. The default target
+    /// picks nothing if the reference is hardly finer than the scene.
     pub(super) fn choose(
         self,
         candidates: &[Candidate],
@@ -65,19 +70,20 @@ impl Demand {
             fitting.min_by(|a, b| rank(a.1).total_cmp(&rank(b.1))).map(|(n, _)| n)
         };
         let cheapest = |most: f64| best(&|_, error| error + uncertain <= most, |(ms, _)| ms);
-        let nearest = |most: f64| best(&|ms, _| ms <= most, |(_, error)| error);
+        let most_accurate = |most: f64| best(&|ms, _| ms <= most, |(_, error)| error);
         match self {
-            Self::BudgetMs(budget) => nearest(budget),
+            Self::BudgetMs(budget) => most_accurate(budget),
             Self::Error(error) => cheapest(error),
             Self::Default => cheapest(DEFAULT_ERROR).or_else(|| {
                 let own_ms = candidates.get(own)?.ms_per_frame?;
-                nearest(own_ms).filter(|_| reference.needs_minutes.is_none())
+                most_accurate(own_ms).filter(|_| reference.needs_minutes.is_none())
             }),
         }
     }
 }
 
-/// Marks what is on the front: no other measured setting is as cheap and as near, and better in one of the two.
+/// Marks the Pareto front: no other setting is at least as cheap and as accurate, and better in
+/// one.
 pub(super) fn mark_front(candidates: &mut [Candidate]) {
     let measured: Vec<Option<(f64, f64)>> =
         candidates.iter().map(|c| Some((c.ms_per_frame?, c.error?))).collect();
@@ -104,24 +110,28 @@ mod tests {
     }
 
     #[test]
-    fn the_cheapest_that_is_near_enough_or_the_nearest_within_the_budget() {
+    fn picks_the_cheapest_accurate_setting_or_the_most_accurate_affordable_one() {
         let reference = |error| ReferenceReport { error, ..ReferenceReport::default() };
         let pick = |demand: Demand, uncertain| demand.choose(&list(), 2, &reference(uncertain));
         assert_eq!(pick(Demand::Error(0.5), 0.0), Some(1));
-        assert_eq!(pick(Demand::Error(0.5), 0.01), Some(2), "a reference that may be off");
+        assert_eq!(pick(Demand::Error(0.5), 0.01), Some(2), "the uncertainty of the reference counts");
         assert_eq!(pick(Demand::Error(0.01), 0.0), None);
         assert_eq!(pick(Demand::BudgetMs(3.0), 0.0), Some(2));
-        assert_eq!(pick(Demand::BudgetMs(0.9), 0.0), None, "what was abandoned is not taken");
+        assert_eq!(pick(Demand::BudgetMs(0.9), 0.0), None, "an abandoned setting is not picked");
         assert_eq!(pick(Demand::Default, 0.0), Some(4));
-        assert_eq!(pick(Demand::Default, 0.02), Some(2), "the scene's own cost");
+        assert_eq!(pick(Demand::Default, 0.02), Some(2), "falls back to the cost of the scene's own setting");
         let coarse = |error| ReferenceReport { needs_minutes: Some(9.0), ..reference(error) };
         let pick = |demand: Demand, uncertain| demand.choose(&list(), 2, &coarse(uncertain));
-        assert_eq!(pick(Demand::Default, 0.02), None, "nearest to what is no better than the scene");
-        assert_eq!(pick(Demand::Default, 0.0), Some(4), "what meets the demand does so");
+        assert_eq!(pick(Demand::Default, 0.02), None, "the reference is too coarse for the fallback");
+        assert_eq!(
+            pick(Demand::Default, 0.0),
+            Some(4),
+            "a setting that meets the target is picked all the same"
+        );
     }
 
     #[test]
-    fn the_front_leaves_out_what_another_beats() {
+    fn dominated_settings_are_not_on_the_front() {
         let mut list = list();
         mark_front(&mut list);
         let front: Vec<bool> = list.iter().map(|candidate| candidate.pareto).collect();

@@ -1,4 +1,4 @@
-//! A copy of a scene file with other values: comments, order and spelling of what stays are kept.
+//! Writes a copy of a scene file with changed values. Comments and the order of keys are kept.
 
 use std::path::{Path, PathBuf};
 
@@ -8,29 +8,29 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
 use crate::scene::{LoadedScene, Scene};
 use crate::{Error, files};
 
-/// Where a copy goes, checked before the work.
-pub(super) struct Copy<'a> {
+/// Destination of the copy, checked before the long work starts.
+pub(super) struct SceneCopy<'a> {
     loaded: &'a LoadedScene,
     path: &'a Path,
 }
 
-impl<'a> Copy<'a> {
-    /// Refuses a file that is there already, unless it may be replaced, the scene's own file in any case, a place that cannot be
-    /// written to, and a scene that cannot be edited.
+impl<'a> SceneCopy<'a> {
+    /// Checks the destination. It refuses an existing file (unless `overwrite`), the scene's own
+    /// file, a path that cannot be written, and a scene that cannot be edited.
     pub(super) fn to(path: &'a Path, overwrite: bool, loaded: &'a LoadedScene) -> Result<Self, Error> {
         let refuse = |why: &str| Error::Request { what: format!("{}", path.display()), why: why.into() };
         let same =
             |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
         if same(path, &loaded.file) {
-            return Err(refuse("is the scene itself, which stays as it is; name another file"));
+            return Err(refuse("is the scene itself, which is never changed; name another file"));
         }
         if path.exists() && !overwrite {
-            return Err(refuse("is there already; --force replaces it, -o names another file"));
+            return Err(refuse("exists; --force overwrites it, -o names another file"));
         }
         if path.is_dir() {
-            return Err(refuse("is a folder; -o names a file"));
+            return Err(refuse("is a folder; give a file name with -o"));
         }
-        // Gone again at once.
+        // The trial file is removed at once.
         PartialFile::create(path)
             .map(drop)
             .map_err(|error| refuse(&format!("cannot be written: {error}")))?;
@@ -39,10 +39,10 @@ impl<'a> Copy<'a> {
         Ok(copy)
     }
 
-    /// Writes the scene's file with whatever makes it `scene`, below a comment.
+    /// Writes the scene's text, edited so that it means `scene`, below a comment.
     ///
     /// # Errors
-    /// [`Error::File`] if it cannot be written.
+    /// [`Error::File`] if the file cannot be written.
     pub(super) fn write(&self, scene: &Scene, comment: &str) -> Result<(), Error> {
         files::write(self.path, format!("# {comment}\n{}", self.text(scene)?).as_bytes())
     }
@@ -72,7 +72,7 @@ fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<Stri
     }
     let found = read(&document).map_err(|e| plain(&e))?.scene;
     if without_path(&found) != without_path(wanted) || path(&found) != path(wanted) {
-        return Err("the edited scene does not mean what it should; this is a fault of the program".into());
+        return Err("the edited scene has other values than intended; this is a bug in cutis".into());
     }
     Ok(document.to_string())
 }
@@ -87,7 +87,8 @@ fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.into())
 }
 
-/// Makes a table that means `from` mean `to`. Keys that are equal in both stay untouched, whether they are written or not.
+/// Edits a table with the values `from` so that it has the values `to`. Equal keys stay untouched,
+/// written or not.
 fn change(table: &mut dyn TableLike, from: &toml::Table, to: &toml::Table) {
     for key in from.keys().filter(|key| !to.contains_key(*key)) {
         table.remove(key);
@@ -95,7 +96,7 @@ fn change(table: &mut dyn TableLike, from: &toml::Table, to: &toml::Table) {
     for (key, to) in to.iter().filter(|(key, to)| from.get(*key) != Some(to)) {
         let place = table.entry(key).or_insert(Item::None);
         match (from.get(key), to) {
-            // A section of outputs names all that is written, so that it is written as a whole where there was none.
+            // The section `output` lists every output, so it is written whole if it was missing.
             (Some(toml::Value::Table(from)), toml::Value::Table(to))
                 if key != "output" || !place.is_none() =>
             {
@@ -114,7 +115,7 @@ fn change(table: &mut dyn TableLike, from: &toml::Table, to: &toml::Table) {
     }
 }
 
-/// The same for the entries of a list.
+/// Edits the entries of a list in the same way.
 fn change_entries(place: &mut Item, from: &[toml::Value], to: &[toml::Value]) {
     let pairs = from.iter().zip(to).enumerate().filter(|(_, (from, to))| from != to);
     for (n, pair) in pairs {
@@ -134,7 +135,7 @@ fn change_entries(place: &mut Item, from: &[toml::Value], to: &[toml::Value]) {
     }
 }
 
-/// Replaces a value; the comments around it stay.
+/// Replaces a value and keeps the comments around it.
 fn put(place: &mut Item, new: &toml::Value) {
     let mut new = value(new);
     if let Item::Value(old) = place {
@@ -190,7 +191,7 @@ frames = 3
     fn a_place_or_a_scene_that_will_not_do_is_refused_before_the_work() {
         let folder = tempfile::tempdir().unwrap();
         let to = |path: &str, loaded: &LoadedScene| {
-            let copy = Copy::to(&folder.path().join(path), path.is_empty(), loaded).map(drop);
+            let copy = SceneCopy::to(&folder.path().join(path), path.is_empty(), loaded).map(drop);
             copy.map_err(|error| {
                 assert!(error.is_bad_input());
                 error.to_string()
@@ -201,7 +202,7 @@ frames = 3
         let error = to("nowhere/copy.toml", &loaded(TEXT, &[])).unwrap_err();
         assert!(error.contains("nowhere") && error.contains("cannot be written"), "{error}");
         assert!(to("", &loaded(TEXT, &[])).unwrap_err().contains("is a folder"));
-        // A text that is not that of the scene.
+        // The text does not match the scene.
         let spoilt = LoadedScene { text: "frames = ".into(), ..loaded(TEXT, &[]) };
         let error = to("copy.toml", &spoilt).unwrap_err();
         assert!(error.contains("copy.toml"), "{error}");
@@ -214,7 +215,7 @@ frames = 3
         let scene = loaded.scene.clone();
         let text = edited(&loaded, &scene, Path::new("here")).unwrap();
         assert_eq!(text, format!("{TEXT}\n[solver]\nsubsteps = 7\n"));
-        // A second time, into a section that is there, with a comment behind the number.
+        // Edit again, in an existing section with a comment after the number.
         loaded.text =
             text.replace("substeps = 7", "damping_per_s = 10.0 # as before\nsubsteps = 7 # too few");
         loaded.scene.solver.substeps = 9;

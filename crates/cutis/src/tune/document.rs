@@ -1,4 +1,4 @@
-//! What a calibration found: the document that is printed, and written as JSON.
+//! The result of tuning, printed as tables or JSON.
 
 use std::path::PathBuf;
 
@@ -9,81 +9,82 @@ use super::{Demand, Omission, ReferenceReport, Setting};
 use crate::report::{Backend, Machine, Stage};
 use crate::{CostReport, Error};
 
-/// Version of the layout of a calibration; the number grows when a key changes its meaning or goes.
+/// Version of the JSON layout. It grows when a key disappears or changes its meaning.
 pub const SCHEMA: &str = "cutis-tune/1";
-/// Why a candidate was not run, if that is why.
+/// Reason of a candidate that was skipped for lack of time.
 pub(super) const NO_TIME_LEFT: &str = "not run, no time left (--minutes)";
 
-/// A calibration.
+/// Result of tuning a scene.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Tuning {
-    /// [`SCHEMA`].
+    /// Always [`SCHEMA`].
     pub schema: String,
     /// Version of this program.
     pub cutis_version: String,
-    /// Machine that it ran on.
+    /// The machine.
     pub machine: Machine,
-    /// What the candidates ran on.
+    /// Backend of the candidates.
     pub backend: Backend,
-    /// Frames of a run.
+    /// Frames per run.
     pub frames: u32,
-    /// What was asked for.
+    /// Target for the setting.
     pub demand: Demand,
-    /// What the candidates were measured against.
+    /// The reference that the candidates were compared with.
     pub reference: ReferenceReport,
-    /// All settings that were thought of, by the cost that was expected.
+    /// All candidate settings, by expected cost.
     pub candidates: Vec<Candidate>,
-    /// The one to take; none if none meets the demand.
+    /// The picked setting; none if no setting meets the target.
     pub picked: Option<Candidate>,
-    /// The tuned copy of the scene; none if no setting meets the demand.
+    /// The tuned copy of the scene; none if no setting meets the target.
     pub scene_file: Option<PathBuf>,
     /// Bytes and time of the picked setting by part; no parts if none was picked.
     #[serde(rename = "ledger")]
     pub costs: CostReport,
-    /// What can be left out, and what that saves and changes; empty if it was not measured.
+    /// The ablation: the scene without each of its parts; empty if it was not measured.
     pub omissions: Vec<Omission>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// Time that it took, by stage.
+    /// Wall time by stage.
     pub stages: Vec<Stage>,
 }
 
-/// A setting and what was found of it.
+/// A setting and its measured cost and error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Candidate {
     /// The setting.
     pub setting: Setting,
-    /// Wall time of a frame that was expected before, ms.
+    /// Expected wall time per frame, ms.
     pub expected_ms: f64,
-    /// Mean wall time of the frames that were run, ms; none if it was not run.
+    /// Mean measured wall time per frame, ms; none if the setting was not run.
     pub ms_per_frame: Option<f64>,
-    /// RMS distance of the positions from the reference at the end over the RMS displacement of the reference, over the vertices that
-    /// can move; none if it did not get there.
+    /// RMS position error over RMS displacement, at the last frame, over the movable vertices; none
+    /// if the run did not reach it.
     pub error: Option<f64>,
-    /// Opening of each wound: what it opens by and how that differs from the reference; empty if it did not get there.
+    /// Growth of each wound and its difference from the reference; empty if the run did not reach
+    /// the last frame.
     pub wounds: Vec<WoundError>,
-    /// Whether no other measured setting is as cheap and as near.
+    /// True on the Pareto front of time and error.
     pub pareto: bool,
-    /// Whether it is the scene's own.
+    /// True for the scene's own setting.
     pub own: bool,
-    /// Why it was not run, or not to the end.
+    /// Reason if the run was skipped or stopped early.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub abandoned: Option<String>,
 }
 
-/// How a wound opened, against the reference.
+/// Growth of a wound compared with the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WoundError {
-    /// What it opened by, mm: mean distance of its lips, at the end less at the start.
+    /// Growth, mm: mean distance of the lips at the end minus that at the start.
     pub growth_mm: f64,
-    /// That, less what it opens by in the reference, mm.
+    /// Growth minus the growth in the reference, mm.
     pub difference_mm: f64,
-    /// The same in percent of what it opens by in the reference; none where that is nothing but rounding.
+    /// The difference in percent of the growth in the reference; none if that is only rounding.
     pub difference_percent: Option<f64>,
 }
 
 impl Candidate {
-    /// A candidate that was not run yet.
+    /// A candidate before its run.
     pub(super) fn planned(setting: Setting, expected_ms: f64) -> Self {
         Self {
             setting,
@@ -99,7 +100,7 @@ impl Candidate {
 }
 
 impl WoundError {
-    /// Against what is expected; `rounding_mm` of it is nothing.
+    /// Compares a growth with the expected one. Growths up to `rounding_mm` count as zero.
     pub(super) fn of(growth_mm: f64, expected_mm: f64, rounding_mm: f64) -> Self {
         let difference_mm = growth_mm - expected_mm;
         let opens = expected_mm.abs() > rounding_mm;
@@ -109,7 +110,7 @@ impl WoundError {
 }
 
 impl Tuning {
-    /// What is promised of a setting, in a line.
+    /// One line that states the error and time of the picked setting.
     pub(super) fn promise(&self, picked: &Candidate) -> String {
         let percent = |share: Option<f64>| 100.0 * share.unwrap_or(f64::NAN);
         let processor = match &self.backend.adapter {
@@ -117,7 +118,7 @@ impl Tuning {
             None => format!("{}, {} threads", self.machine.cpu, self.backend.threads),
         };
         format!(
-            "Tuned by cutis {}: error {:.2} % (reference within {:.2} %), {:.1} ms per frame on {} ({processor}).",
+            "Tuned by cutis {}: error {:.2} % (uncertainty of the reference {:.2} %), {:.1} ms per frame on {} ({processor}).",
             self.cutis_version,
             percent(picked.error),
             100.0 * self.reference.error,
@@ -126,7 +127,7 @@ impl Tuning {
         )
     }
 
-    /// The error of a calibration in which no setting meets the demand.
+    /// The error to return if no setting meets the target.
     pub fn unmet(&self) -> Option<Error> {
         let measured = |candidate: &&Candidate| candidate.error.is_some();
         let best = self
@@ -134,9 +135,9 @@ impl Tuning {
             .iter()
             .filter(measured)
             .min_by(|a, b| a.error.unwrap_or(f64::INFINITY).total_cmp(&b.error.unwrap_or(f64::INFINITY)));
-        let nearest = best.map_or("none was measured to the end".into(), |best| {
+        let nearest = best.map_or("no setting was measured to the end".into(), |best| {
             format!(
-                "the nearest of those measured, {}, has an error of {:.2} % and takes {:.1} ms per frame",
+                "the most accurate setting, {}, has an error of {:.2} % and takes {:.1} ms per frame",
                 best.setting,
                 100.0 * best.error.unwrap_or(f64::NAN),
                 best.ms_per_frame.unwrap_or(f64::NAN)
@@ -151,17 +152,17 @@ impl Tuning {
             .then(|| Error::NoSetting { demand: self.demand.to_string(), nearest: nearest.join("; ") })
     }
 
-    /// Where the demand is an error and what was picked does not have it: what would.
+    /// What would meet the target error, if the picked setting does not.
     pub(super) fn needed(&self) -> Option<String> {
         let demanded = self.demand.error()?;
         let error = self.picked.as_ref().and_then(|picked| picked.error);
         let short = error.is_none_or(|error| error + self.reference.error > demanded);
-        let left_out = |candidate: &&Candidate| candidate.abandoned.as_deref() == Some(NO_TIME_LEFT);
-        let late = self.candidates.iter().filter(left_out).count();
-        let late = (late > 0).then(|| format!("{late} settings were not run for want of time (--minutes)"));
+        let no_time = |candidate: &&Candidate| candidate.abandoned.as_deref() == Some(NO_TIME_LEFT);
+        let late = self.candidates.iter().filter(no_time).count();
+        let late = (late > 0).then(|| format!("{late} settings were not run for lack of time (--minutes)"));
         let substeps = self.reference.substeps_for(demanded).map(|substeps| {
             format!(
-                "by the reference, xpbd with one iteration needs about {substeps} substeps a frame for an error of {} %",
+                "according to the reference, xpbd with one iteration needs about {substeps} substeps a frame for an error of {} %",
                 100.0 * demanded
             )
         });
@@ -169,7 +170,7 @@ impl Tuning {
         (short && !lines.is_empty()).then(|| lines.join("; "))
     }
 
-    /// JSON schema of a calibration.
+    /// JSON schema of the result.
     pub fn json_schema() -> serde_json::Value {
         schemars::schema_for!(Tuning).to_value()
     }

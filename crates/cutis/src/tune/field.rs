@@ -1,19 +1,19 @@
-//! Displacements of the vertices that can move, and how far two of them are apart.
+//! Displacement fields of the movable vertices, and the distance between two fields.
 
 use cutis_constraints::Scalar;
 use cutis_solver::System;
 use nalgebra::{Point3, Vector3};
 
-/// Rounding, as a share of the body's extent.
+/// Rounding error of a position over the body's extent.
 const ROUNDING: f64 = 1e-6;
 
-/// The vertices that can move, and where they are at rest, in local meters.
+/// The movable vertices and their rest positions in local meters.
 pub(super) struct Movable {
     vertices: Vec<u32>,
     rest: Vec<Point3<f64>>,
 }
 
-/// One displacement per vertex that can move, meters.
+/// One displacement per movable vertex, meters.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field(pub(super) Vec<Vector3<f32>>);
 
@@ -28,12 +28,12 @@ impl Movable {
         Self { vertices, rest }
     }
 
-    /// Their numbers, ascending.
+    /// Indices of the movable vertices, ascending.
     pub(super) fn vertices(&self) -> &[u32] {
         &self.vertices
     }
 
-    /// The longest side of their bounding box at rest, meters.
+    /// Longest side of the bounding box at rest, meters.
     fn extent(&self) -> f64 {
         let side = |axis: usize| {
             let values = self.rest.iter().map(|position| position[axis]);
@@ -43,12 +43,12 @@ impl Movable {
         (0..3).map(side).fold(0.0, f64::max)
     }
 
-    /// Displacements of this length, meters, are made by the rounding of the rest shape to `f32`.
+    /// Displacements up to this length, meters, are rounding errors of the `f32` rest shape.
     pub(super) fn rounding(&self) -> f64 {
         ROUNDING * self.extent()
     }
 
-    /// Their displacements at `positions`, one per vertex of the body.
+    /// The displacement field of `positions`, which has one entry per vertex of the body.
     pub(super) fn field<T: Scalar>(&self, positions: &[Point3<T>]) -> Field {
         let moved = |(&v, rest): (&u32, &Point3<f64>)| {
             let now = positions[v as usize].map(T::to_f64);
@@ -59,12 +59,12 @@ impl Movable {
 }
 
 impl Field {
-    /// Root of the mean square, meters.
+    /// Root mean square of the displacements, meters.
     pub(super) fn rms(&self) -> f64 {
         self.mean(self.0.iter().map(|d| d.map(f64::from).norm_squared()))
     }
 
-    /// Root of the mean squared distance to another field of the same vertices, meters.
+    /// Root mean square of the differences to another field of the same vertices, meters.
     pub(super) fn rms_to(&self, other: &Self) -> f64 {
         let apart =
             |(a, b): (&Vector3<f32>, &Vector3<f32>)| (a.map(f64::from) - b.map(f64::from)).norm_squared();

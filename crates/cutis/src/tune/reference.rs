@@ -1,11 +1,13 @@
-//! The reference of a calibration: the scene in double precision with more and more substeps, extrapolated, and how far it can
-//! be trusted.
+//! The reference for tuning: the scene in double precision with more and more substeps,
+//! extrapolated, with an estimate of its uncertainty.
 //!
-//! Displacements with `S`, `2S` and `4S` substeps tend to a limit as `x + c/Sᵖ`. Two differences give the order `p`, and with it
-//! the limit (Richardson). How far the limit lies from the finest run is what the reference is said to be off by at most: that is
-//! to trust the direction of the extrapolation, and not its length. Where the differences do not shrink, or faster than any method
-//! converges, there is no limit to be seen: then the finest run is the reference, and it is said to be off by as much as it
-//! differs from the run before, or by half the difference before that, if that is more.
+//! Displacements with `S`, `2S` and `4S` substeps converge as `x + c/Sᵖ`. Two differences give the
+//! order `p` and the limit `x` (Richardson extrapolation). The uncertainty is the distance between
+//! the limit and the finest run. This trusts the direction of the extrapolation, not its length.
+//!
+//! If the differences do not shrink, or shrink faster than any method converges, no limit is
+//! visible. The finest run is then the reference. Its uncertainty is its difference from the run
+//! before, or half of the difference before that, whichever is larger.
 
 use std::collections::VecDeque;
 
@@ -20,57 +22,58 @@ use super::setting::Setting;
 use crate::Error;
 use crate::clock::Clock;
 
-/// Differences have to shrink by this factor from level to level for a limit to be seen.
+/// Differences must shrink by this factor per level for a visible limit.
 const CONVERGES: f64 = 1.5;
-/// The order of a method is 2 at the most.
+/// Highest order of convergence of the methods.
 const HIGHEST_ORDER: f64 = 2.0;
-/// Differences that shrink by more than this are chance: something cancels in them.
+/// Differences that shrink by more than this factor do so by chance: errors cancel.
 const CHANCE: f64 = 6.0;
-/// The fewest substeps of the first level: below, nothing is seen of a limit.
+/// Minimum number of substeps of the first level.
 const FEWEST: u32 = 4;
-/// Levels beyond this many substeps are not tried: the time step nears the resolution of the clock of the scene.
+/// Maximum number of substeps of a level. Beyond it the substep nears the resolution of the scene's
+/// time.
 const MOST: u32 = 1 << 20;
 
-/// The last level has to have so many times the scene's own substeps for the scene's own setting to be judged by it.
+/// The last level must have this many times the substeps of the scene's own setting to judge it.
 const FINER_THAN_OWN: f64 = 2.0;
-/// What is said to be needed is more than was extrapolated from the levels that were run: a machine is not always equally busy.
+/// Safety factor on the estimated time, because the load of a machine varies.
 const SPARE: f64 = 1.2;
 
-/// What candidates are measured against.
+/// The solution that candidates are compared with.
 pub(super) struct Reference {
-    /// One per moment of the bench.
+    /// One displacement field per sampled frame.
     pub(super) fields: Vec<Field>,
-    pub(super) told: ReferenceReport,
+    pub(super) report: ReferenceReport,
 }
 
-/// What is told of the reference.
+/// Quality and cost of the reference.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ReferenceReport {
-    /// Substeps of its runs, each of one iteration, in double precision on the CPU.
+    /// Substeps of its runs: XPBD with one iteration, in double precision on the CPU.
     pub substeps: Vec<u32>,
-    /// Relative difference between each run and the one before: RMS of the positions over the RMS displacement.
+    /// Difference between each run and the one before: RMS of the positions over RMS displacement.
     pub differences: Vec<f64>,
-    /// Order of convergence that the last three show; none where they show none.
+    /// Order of convergence of the last three runs; none if no limit is visible.
     pub order: Option<f64>,
-    /// How far the reference may be off: RMS of the positions over the RMS displacement.
+    /// Uncertainty of the reference: RMS of the positions over RMS displacement.
     pub error: f64,
-    /// RMS displacement of the vertices that can move, mm.
+    /// RMS displacement of the movable vertices, mm.
     pub displacement_mm: f64,
-    /// What each wound opens by, mm: mean distance of its lips, at the end less at the start.
+    /// Growth of each wound, mm: mean distance of its lips at the end minus that at the start.
     pub growths_mm: Vec<f64>,
-    /// Wall time of its runs, s.
+    /// Wall time of all its runs, s.
     pub seconds: f64,
-    /// Where its last run has fewer than twice the scene's own substeps, for want of time: the minutes that a calibration needs for
-    /// one that has them, about.
+    /// Estimated minutes for a reference with twice the scene's own substeps, if the time was too
+    /// short for it.
     pub needs_minutes: Option<f64>,
 }
 
 impl ReferenceReport {
-    /// Says so if its last run is hardly finer than the scene itself.
+    /// A warning if the last run is hardly finer than the scene itself.
     pub(super) fn coarse(&self, own: Setting) -> Option<String> {
         self.needs_minutes.map(|minutes| {
             format!(
-                "the reference could afford {} substeps a frame, the scene has {}; needs about {} minutes (--minutes)",
+                "the reference reached only {} substeps a frame and the scene has {}; it needs about {} minutes (--minutes)",
                 self.substeps.last().copied().unwrap_or(0),
                 own.substeps,
                 minutes.ceil()
@@ -78,16 +81,16 @@ impl ReferenceReport {
         })
     }
 
-    /// Substeps with which XPBD, with one iteration each, may be expected to have this error: the limit's distance from the last run,
-    /// grown or shrunk by the order that was found. None if there was none.
+    /// Expected number of substeps for which XPBD with one iteration has this error, from the order
+    /// of convergence. None if no limit is visible.
     pub(super) fn substeps_for(&self, error: f64) -> Option<u32> {
         let finest = f64::from(*self.substeps.last()?);
         Some((finest * (self.error / error).powf(1.0 / self.order?)).ceil() as u32)
     }
 }
 
-/// Runs levels of twice the substeps each, until the error is below `enough` or the next level would take the whole beyond
-/// `limit_s`; three levels at least.
+/// Runs levels, each with twice the substeps of the one before, until the uncertainty is below
+/// `enough` or the next level would exceed `limit_s` seconds. There are at least three levels.
 pub(super) fn run(
     bench: &Bench<'_>,
     own: Setting,
@@ -97,7 +100,7 @@ pub(super) fn run(
 ) -> Result<Reference, Error> {
     let system: System<f64> = bench.system.to_f64();
     let frame_s = 1e-3 * bench.substep_f64_ms(&system)? * f64::from(bench.frames);
-    // Three levels take seven times as long as the first.
+    // Three levels take seven times as long as the first one.
     let affordable = (limit_s / 7.0 / frame_s.max(f64::MIN_POSITIVE)) as u32;
     let mut substeps = own.sweeps().min(affordable).max(FEWEST);
     let mut levels = Levels::default();
@@ -107,17 +110,17 @@ pub(super) fn run(
         let run =
             clock.stage(&name, bench.frames.into(), |progress| bench.run_f64(&system, setting, progress))?;
         if run.at_end().rms() <= bench.movable.rounding() {
-            let why = "nothing moves in this scene beyond rounding, so that there is no error to be measured";
+            let why = "nothing in this scene moves by more than rounding, so no error can be measured";
             return Err(Error::Request { what: "tuning".into(), why: why.into() });
         }
         levels.push(substeps, run, bench.frames);
         if let Some(reference) = levels.limit() {
             let next_s =
                 levels.seconds / f64::from(levels.substeps.iter().sum::<u32>()) * f64::from(2 * substeps);
-            if reference.told.error <= enough || levels.seconds + next_s > limit_s || substeps > MOST {
+            if reference.report.error <= enough || levels.seconds + next_s > limit_s || substeps > MOST {
                 let needs_minutes = levels.needs_minutes(own.substeps);
                 return Ok(Reference {
-                    told: ReferenceReport { needs_minutes, ..reference.told },
+                    report: ReferenceReport { needs_minutes, ..reference.report },
                     ..reference
                 });
             }
@@ -126,7 +129,7 @@ pub(super) fn run(
     }
 }
 
-/// The runs so far, and the displacements of the last three.
+/// The runs so far, and the displacement fields of the last three.
 #[derive(Default)]
 struct Levels {
     substeps: Vec<u32>,
@@ -149,7 +152,7 @@ impl Levels {
         }
     }
 
-    /// What the last three runs say; none if there are fewer.
+    /// The reference from the last three runs; none if there are fewer.
     fn limit(&self) -> Option<Reference> {
         let [first, second, third] = [self.last.front()?, self.last.get(1)?, self.last.get(2)?];
         let [before, last] = [second.at_end().rms_to(first.at_end()), third.at_end().rms_to(second.at_end())];
@@ -160,7 +163,7 @@ impl Levels {
         let fields: Vec<Field> = pairs.map(|(now, before)| now.beyond(before, factor)).collect();
         let limit = fields.last()?;
         let off = if order.is_some() { limit.rms_to(third.at_end()) } else { f64::max(last, 0.5 * before) };
-        let told = ReferenceReport {
+        let report = ReferenceReport {
             substeps: self.substeps.clone(),
             differences: self.differences.clone(),
             order,
@@ -175,15 +178,15 @@ impl Levels {
             seconds: self.seconds,
             needs_minutes: None,
         };
-        Some(Reference { fields, told })
+        Some(Reference { fields, report })
     }
 
-    /// Minutes of a calibration whose last level has twice as many substeps as the scene, at least; none if this one's has.
+    /// Estimated minutes until the last level has twice the scene's substeps; none if it has them.
     fn needs_minutes(&self, own_substeps: u32) -> Option<f64> {
         let enough = f64::from(own_substeps) * FINER_THAN_OWN;
         let last = f64::from(self.substeps.last().copied()?);
         let substep_s = self.seconds / self.substeps.iter().map(|&n| f64::from(n)).sum::<f64>();
-        // Three levels take 7/4 of the time of the last.
+        // Three levels take 7/4 of the time of the last one.
         let needed_s = SPARE * 1.75 * enough * substep_s / REFERENCE_SHARE;
         (last < enough).then(|| (needed_s / 60.0).max(f64::MIN_POSITIVE))
     }
@@ -214,18 +217,19 @@ mod tests {
             let found = limit(|s| [3.0 + s.powf(-order), 2.0 - 5.0 * s.powf(-order), 1.0]);
             let [x, y, _] = [found.fields[0].0[0].x, found.fields[0].0[1].x, 0.0];
             assert!((x - 3.0).abs() < 1e-5 && (y - 2.0).abs() < 1e-5, "{x} {y}");
-            assert!((found.told.order.unwrap() - order).abs() < 1e-2);
-            assert!(found.told.error < 1.1 * 5.0 / 64_f64.powf(order));
-            assert!((found.told.growths_mm[0] - 3.0).abs() < 1e-4);
-            let (error, factor) = (found.told.error, 2_f64.powf(order));
+            assert!((found.report.order.unwrap() - order).abs() < 1e-2);
+            assert!(found.report.error < 1.1 * 5.0 / 64_f64.powf(order));
+            assert!((found.report.growths_mm[0] - 3.0).abs() < 1e-4);
+            let (error, factor) = (found.report.error, 2_f64.powf(order));
             for (error, substeps) in [(error, 64.0), (factor * error, 32.0), (error / factor, 128.0)] {
-                assert!((f64::from(found.told.substeps_for(error).unwrap()) - substeps).abs() <= 1.0);
+                assert!((f64::from(found.report.substeps_for(error).unwrap()) - substeps).abs() <= 1.0);
             }
-            assert_eq!((found.told.differences.len(), found.told.substeps.len()), (3, 4));
+            assert_eq!((found.report.differences.len(), found.report.substeps.len()), (3, 4));
         }
     }
 
-    /// A higher power beside the first, so that the order is wrong: the error that is told is not below the error that there is.
+    /// With a second power the estimated order is wrong. The reported uncertainty must still cover
+    /// the true error.
     #[test]
     fn what_is_told_of_the_error_holds() {
         for c in [-20.0, -3.0, 3.0, 20.0] {
@@ -236,7 +240,7 @@ mod tests {
                 Vector3::new(1.0, 0.0, 1.0),
             ]);
             let error = found.fields[0].rms_to(&exact) / exact.rms();
-            assert!(error <= found.told.error + 1e-7, "{c}: {error} {}", found.told.error);
+            assert!(error <= found.report.error + 1e-7, "{c}: {error} {}", found.report.error);
         }
     }
 
@@ -244,7 +248,7 @@ mod tests {
     fn a_reference_that_is_not_finer_than_the_scene_says_what_it_needs() {
         let mut levels = Levels::default();
         for substeps in [8, 16, 32] {
-            // Ten frames, 1 s for each substep of all of them.
+            // Ten frames; each substep takes 1 s in all of them together.
             levels.push(substeps, Run { ms_per_frame: 100.0 * f64::from(substeps), ..Run::default() }, 10);
         }
         assert_eq!((levels.needs_minutes(8), levels.needs_minutes(16)), (None, None));
@@ -256,8 +260,8 @@ mod tests {
     #[test]
     fn a_sequence_that_does_not_converge_is_not_extrapolated() {
         let found = limit(|s| [3.0 + 0.1 * s.log2(), 2.0, 1.0]);
-        assert_eq!((found.told.order, found.told.substeps_for(0.1)), (None, None));
+        assert_eq!((found.report.order, found.report.substeps_for(0.1)), (None, None));
         assert!((f64::from(found.fields[0].0[0].x) - 3.6).abs() < 1e-6);
-        assert!((found.told.error - found.told.differences[2]).abs() < 1e-6 && found.told.error > 0.01);
+        assert!((found.report.error - found.report.differences[2]).abs() < 1e-6 && found.report.error > 0.01);
     }
 }

@@ -1,27 +1,29 @@
-//! Displacements of one mesh at the vertices of another: by the tetrahedron that a point lies in at rest.
+//! Samples the displacements of one mesh at the vertices of another, through the tetrahedron that
+//! contains a point at rest.
 
 use std::ops::Range;
 
 use cutis_mesh::TetMesh;
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// A point that lies outside of all tetrahedra by no more than this share of the nearest one's height, and of its cell, takes its
-/// displacement from there: the surfaces of two lattices lie within a step of each other, not upon each other.
+/// Tolerance for points outside all tetrahedra, over the height of the nearest one and over its
+/// cell. Within it a point takes the displacement of that tetrahedron, because the surfaces of two
+/// lattices lie within one step of each other but do not coincide.
 const OUTSIDE: f64 = 0.5;
 
-/// Finds the tetrahedra at a point, by the lattice that they are made of: each fills a part of one of its cells.
+/// Finds the tetrahedra at a point by the cell of the lattice that they fill.
 pub(super) struct Sampler<'a> {
     mesh: &'a TetMesh,
     deformed: &'a [Point3<f32>],
-    /// Where the planes of the lattice lie along each axis, in the steps of its affine map.
+    /// Positions of the lattice planes along each axis, in steps of its affine map.
     planes: [Vec<f64>; 3],
-    /// Where the tetrahedra of each cell begin in `tets`.
+    /// Offset of each cell's tetrahedra in `tets`.
     starts: Vec<u32>,
     tets: Vec<u32>,
 }
 
 impl<'a> Sampler<'a> {
-    /// For `deformed`, one position per vertex of `mesh`.
+    /// Samples `deformed`, which has one position per vertex of `mesh`.
     pub(super) fn new(mesh: &'a TetMesh, deformed: &'a [Point3<f32>]) -> Self {
         let lattice = &mesh.lattice;
         let planes = match lattice.planes() {
@@ -52,7 +54,7 @@ impl<'a> Sampler<'a> {
         (self.starts, self.tets) = (starts, tets);
     }
 
-    /// The cell that a tetrahedron lies in.
+    /// The cell of a tetrahedron.
     fn cell_of(&self, tet: &[u32; 4]) -> usize {
         let corners = tet.map(|vertex| self.mesh.point(vertex));
         self.number(std::array::from_fn(|axis| {
@@ -65,7 +67,8 @@ impl<'a> Sampler<'a> {
         i + nx * (j + ny * k)
     }
 
-    /// The cells along each axis that a point lies in or beside, by no more than [`OUTSIDE`] of their length; none far from all of them.
+    /// Range of cells along each axis that contain a point or lie within [`OUTSIDE`] of their
+    /// length from it; none if the point is far from all cells.
     fn around(&self, mm: Point3<f64>) -> [Range<usize>; 3] {
         let index = self.mesh.lattice.grid().affine.to_index(mm);
         std::array::from_fn(|axis| {
@@ -75,7 +78,8 @@ impl<'a> Sampler<'a> {
                 let reach = OUTSIDE * (high - low);
                 low - reach < at && at < high + reach
             };
-            // A step is at most Grading::MOST_GROWTH = 2 times as long as the next one, so that no other cells can be near.
+            // A step is at most Grading::MOST_GROWTH = 2 times as long as the next, so no other
+            // cells are near.
             let above = planes.partition_point(|&plane| plane <= at);
             let cells = above.saturating_sub(2)..(above + 1).min(planes.len() - 1);
             let first = cells.clone().find(near).unwrap_or(cells.end);
@@ -83,13 +87,13 @@ impl<'a> Sampler<'a> {
         })
     }
 
-    /// The displacement of a point in mm, in meters: zero where there is no tetrahedron near.
+    /// Displacement in meters of a point given in mm; zero if no tetrahedron is near.
     pub(super) fn displacement(&self, mm: Point3<f64>) -> Vector3<f32> {
         let point: Point3<f64> = self.mesh.frame.to_local(mm).cast();
         let [x, y, z] = self.around(mm);
         let mut best = (-OUTSIDE, Vector3::zeros());
         for (k, j) in z.flat_map(|k| y.clone().map(move |j| (k, j))) {
-            // Cells in a row have their tetrahedra in a row.
+            // The tetrahedra of consecutive cells are consecutive.
             let row = [x.start, x.end].map(|i| self.starts[self.number([i, j, k])] as usize);
             for &n in &self.tets[row[0]..row[1]] {
                 let tet = self.mesh.tets[n as usize];
@@ -106,7 +110,7 @@ impl<'a> Sampler<'a> {
         best.1.cast()
     }
 
-    /// Barycentric coordinates at rest; none for a tetrahedron without volume.
+    /// Barycentric coordinates at rest; none for a tetrahedron of zero volume.
     fn weights(&self, tet: &[u32; 4], point: Point3<f64>) -> Option<[f64; 4]> {
         let [a, b, c, d] = tet.map(|v| self.mesh.positions[v as usize].cast::<f64>());
         let inverse = Matrix3::from_columns(&[b - a, c - a, d - a]).try_inverse()?;
@@ -132,7 +136,7 @@ mod tests {
         Body::build(&loaded, &source::load(&loaded).unwrap().volume).unwrap()
     }
 
-    /// A displacement that is linear in the place, in mm, comes out as it is on any other lattice; what is far away does not move.
+    /// A linear displacement field is reproduced on any other lattice. Points far away do not move.
     #[test]
     fn a_linear_displacement_is_found_on_another_lattice() {
         let zone =
@@ -159,8 +163,8 @@ mod tests {
                 }
             }
             let all = to.mesh.positions.len();
-            assert_eq!(near + missed, all, "a displacement that is neither right nor none");
-            // Where cells are long, the surface of what they hold lies further inside.
+            assert_eq!(near + missed, all, "a displacement is neither correct nor zero");
+            // Where cells are long, the surface of their tissue lies further inside.
             let most = if std::ptr::eq(from, to) { 0 } else { all / 15 };
             assert!(missed <= most, "{missed} of {all}");
         }
@@ -172,7 +176,7 @@ mod tests {
         }
     }
 
-    /// Beyond a surface where the lattice is coarse a point moves with it, up to half a cell away.
+    /// Outside the surface of a coarse lattice, a point up to half a cell away moves with it.
     #[test]
     fn what_lies_within_half_of_a_coarse_cell_is_found() {
         let zone =
@@ -182,7 +186,7 @@ mod tests {
         let by = Vector3::new(0.0, 0.0, 0.25);
         let deformed: Vec<_> = mesh.positions.iter().map(|x| x + by).collect();
         let sampler = Sampler::new(mesh, &deformed);
-        // The body ends where the lattice does, along z; its last step is long.
+        // Along z the body ends with the lattice, whose last step is long.
         let [.., z] = &sampler.planes;
         let last = z[z.len() - 1] - z[z.len() - 2];
         assert!(last > 3.0, "{z:?}");

@@ -1,4 +1,4 @@
-//! A folder for outputs that nobody keeps.
+//! A temporary folder for outputs that are only timed.
 
 use std::fs;
 use std::io;
@@ -8,17 +8,17 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::Error;
 use crate::files::RunFolder;
 
-/// Tells apart the folders of one process.
+/// Numbers the folders of one process.
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
-/// A folder of its own, removed with all that is in it when this is dropped.
+/// A temporary folder. Dropping it removes the folder and its contents.
 pub(super) struct Scratch(pub(super) RunFolder);
 
 impl Scratch {
-    /// Makes a new folder in `parent`; one that is there already is somebody else's.
+    /// Creates a new folder in `parent`. It never reuses an existing one.
     ///
     /// # Errors
-    /// [`Error::File`] if none can be made.
+    /// [`Error::File`] if the folder cannot be created.
     pub(super) fn new(parent: &Path) -> Result<Self, Error> {
         loop {
             let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -37,7 +37,7 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // A folder that cannot be removed is the system's to clean up: it lies among its temporary files.
+        // If removal fails, the folder stays among the system's temporary files.
         let _ = fs::remove_dir_all(&self.0.0);
     }
 }
@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_that_is_there_is_neither_used_nor_removed() {
+    fn an_existing_folder_is_neither_used_nor_removed() {
         let parent = tempfile::tempdir().unwrap();
         let next = NUMBER.load(Ordering::Relaxed);
         let taken = |n: u32| parent.path().join(format!("cutis-tune-{}-{n}", std::process::id()));

@@ -1,4 +1,4 @@
-//! A way to step a scene in time, and the candidates among which a scene's setting is chosen.
+//! Solver settings, their expected cost, and the list of candidates.
 
 use cutis_solver::{Formulation, Settings};
 use schemars::JsonSchema;
@@ -6,17 +6,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::scene::{FormulationChoice, SolverSection};
 
-/// Over-relaxation of candidates in vertex block descent with several iterations; with one there is none.
+/// Over-relaxation of vertex block descent with several iterations. A single iteration has none.
 const RELAXATION: f64 = 1.3;
 
-/// What is tuned: how the constraints are solved, and how a frame is divided.
+/// The values that are tuned: formulation, substeps and iterations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setting {
     /// `xpbd` or `vbd`.
     pub formulation: FormulationChoice,
-    /// Substeps of a frame.
+    /// Substeps per frame.
     pub substeps: u32,
-    /// Iterations of a substep.
+    /// Iterations per substep.
     pub iterations: u32,
     /// Over-relaxation of `vbd`; 1 with `xpbd`.
     pub relaxation: f64,
@@ -35,13 +35,13 @@ impl std::fmt::Display for Setting {
 }
 
 impl Setting {
-    /// The scene's own.
+    /// The setting of a scene.
     pub(super) fn of(solver: &SolverSection) -> Self {
         let SolverSection { formulation, substeps, iterations, relaxation, .. } = *solver;
         Self { formulation, substeps, iterations, relaxation }
     }
 
-    /// XPBD with one iteration.
+    /// XPBD with one iteration per substep.
     pub(super) fn xpbd(substeps: u32) -> Self {
         Self { formulation: FormulationChoice::Xpbd, substeps, iterations: 1, relaxation: 1.0 }
     }
@@ -51,13 +51,13 @@ impl Setting {
         Self { formulation: FormulationChoice::Vbd, substeps, iterations, relaxation }
     }
 
-    /// A section with this setting and everything else as it was.
+    /// A copy of `solver` with this setting.
     pub(super) fn applied_to(self, solver: &SolverSection) -> SolverSection {
         let Self { formulation, substeps, iterations, relaxation } = self;
         SolverSection { formulation, substeps, iterations, relaxation, ..solver.clone() }
     }
 
-    /// The same for the solver.
+    /// A copy of the solver's settings with this setting.
     pub(super) fn settings(self, others: &Settings) -> Settings {
         let formulation = match self.formulation {
             FormulationChoice::Pbd => Formulation::Pbd,
@@ -68,30 +68,30 @@ impl Setting {
         Settings { formulation, substeps, iterations, relaxation, ..*others }
     }
 
-    /// Sweeps of a frame over all constraints; the largest number where it is more.
+    /// Sweeps over all constraints per frame; saturates.
     pub(super) fn sweeps(self) -> u32 {
         self.substeps.saturating_mul(self.iterations)
     }
 }
 
-/// What settings cost, from measured substeps: a straight line for each formulation.
+/// Expected cost of settings, linear in substeps and iterations, from measured substeps.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Model {
-    pub(super) xpbd: Line,
-    pub(super) vbd: Line,
+pub(super) struct CostModel {
+    pub(super) xpbd: LinearCost,
+    pub(super) vbd: LinearCost,
 }
 
-/// What a formulation costs.
+/// Cost of a formulation.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
-    /// Of each substep, ms.
+pub(super) struct LinearCost {
+    /// Cost of a substep, ms.
     pub(super) substep_ms: f64,
-    /// Of each iteration, ms.
+    /// Cost of an iteration, ms.
     pub(super) iteration_ms: f64,
 }
 
-impl Model {
-    /// Milliseconds that a frame may be expected to take.
+impl CostModel {
+    /// Expected time of a frame, ms.
     pub(super) fn frame_ms(&self, setting: Setting) -> f64 {
         let line = match setting.formulation {
             FormulationChoice::Vbd => self.vbd,
@@ -101,10 +101,12 @@ impl Model {
     }
 }
 
-/// Settings that are expected to take at most `most_ms`, and the scene's own, cheapest first: XPBD with one iteration and substeps
-/// in steps of a factor of √2, up to `most_substeps`, and of 4 with 2 and 4 iterations; vertex block descent with 1 to 16
-/// iterations and substeps in steps of a factor of 2 with one iteration and of 4 with more.
-pub(super) fn candidates(own: Setting, most_substeps: u32, most_ms: f64, model: &Model) -> Vec<Setting> {
+/// The scene's own setting and the settings expected to take at most `most_ms`, cheapest first.
+///
+/// XPBD: one iteration, with substeps growing by √2 up to `most_substeps`; 2 and 4 iterations, with
+/// substeps growing by 4. Vertex block descent: one iteration, with substeps growing by 2; 2 to 16
+/// iterations, with substeps growing by 4.
+pub(super) fn candidates(own: Setting, most_substeps: u32, most_ms: f64, model: &CostModel) -> Vec<Setting> {
     let powers = |root: f64| {
         let power = move |n: i32| root.powi(n).round() as u32;
         let mut list: Vec<u32> = (0..64).map(power).take_while(|&n| n <= most_substeps).collect();
@@ -132,9 +134,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn candidates_are_sorted_by_cost_and_hold_the_scene_s_own_once() {
-        let line = Line { substep_ms: 1.0, iteration_ms: 3.0 };
-        let model = Model { xpbd: line, vbd: Line { iteration_ms: 10.0, ..line } };
+    fn candidates_are_sorted_by_cost_and_contain_the_scenes_own_setting_once() {
+        let line = LinearCost { substep_ms: 1.0, iteration_ms: 3.0 };
+        let model = CostModel { xpbd: line, vbd: LinearCost { iteration_ms: 10.0, ..line } };
         for own in [Setting::xpbd(8), Setting { iterations: 3, ..Setting::xpbd(130) }] {
             let list = candidates(own, 32, 100.0, &model);
             assert_eq!(list.iter().filter(|&&setting| setting == own).count(), 1);
@@ -156,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_setting_says_what_it_is() {
+    fn a_setting_prints_its_values() {
         assert_eq!(Setting::xpbd(20).to_string(), "xpbd 20 x 1");
         assert_eq!(Setting::vbd(2, 8).to_string(), "vbd 2 x 8, 1.3");
     }

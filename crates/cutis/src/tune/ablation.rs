@@ -1,5 +1,7 @@
-//! What a scene could leave out, measured at the picked setting: each kind of constraint, each output, a finer lattice than
-//! needed, and what lies far from the action. Each is run without it and compared with the run that has it.
+//! Ablation: runs the scene without each of its parts and compares the result with the full scene.
+//!
+//! The parts are the constraint kinds, the outputs, the resolution of the lattice, and the tissue
+//! far from incisions and handles. All runs use the picked setting.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -25,37 +27,38 @@ use crate::scene::{LatticeSection, LoadedScene, RegionSection, Scene};
 use crate::source::Source;
 use crate::{Error, Progress, region};
 
-/// How much coarser a lattice is tried.
+/// Factors by which coarser lattices are tried.
 const COARSER: [f64; 3] = [1.25, 1.5, 2.0];
-/// How far a region reaches around the action, in lengths of the longest incision.
+/// Sizes of the region of interest around the action, over the length of the longest incision.
 const AROUND: [f64; 2] = [1.0, 0.5];
 
-/// What leaving one thing out saves, and what it changes.
+/// Savings and changes when one part of the scene is removed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Omission {
-    /// What is left out.
+    /// The removed part.
     pub what: String,
-    /// Options of `cutis run` that leave it out.
+    /// Options of `cutis run` that remove it.
     pub how: String,
-    /// Milliseconds that a frame takes less; none for an output.
+    /// Time saved per frame, ms; none for an output.
     pub saved_ms_per_frame: Option<f64>,
-    /// Milliseconds that a run takes less beside its frames; none where only the frames do.
+    /// Time saved per run outside the frames, ms; none for parts that only cost frame time.
     pub saved_ms: Option<f64>,
-    /// Bytes of the solver's memory that it takes less, on the host and the device; for an output, bytes of its files.
+    /// Memory of the solver saved on host and device, bytes; for an output, size of its files.
     pub saved_bytes: i64,
-    /// RMS distance between the displacements without it and with it, over the RMS displacement with it; none for an output.
+    /// RMS change of the displacements over the RMS displacement of the full scene; none for an
+    /// output.
     pub change: Option<f64>,
-    /// Opening of each wound without it, against the opening with it.
+    /// Growth of each wound without the part, compared with the full scene.
     pub wounds: Vec<WoundError>,
-    /// Constraint errors without it, at the end.
+    /// Constraint errors at the end, without the part.
     pub residuals: Vec<KindResidual>,
-    /// Why it was not measured.
+    /// Reason if it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skipped: Option<String>,
 }
 
-/// What omissions are measured against.
-pub(super) struct Whole<'a> {
+/// The full scene, its body and its run: the baseline of the ablation.
+pub(super) struct Baseline<'a> {
     pub(super) loaded: &'a LoadedScene,
     pub(super) source: &'a Source,
     pub(super) body: &'a Body,
@@ -64,8 +67,8 @@ pub(super) struct Whole<'a> {
     pub(super) run: Run,
 }
 
-impl Whole<'_> {
-    /// Measures all of them, the kinds first, within about `limit_s` seconds.
+impl Baseline<'_> {
+    /// Measures all parts, constraint kinds first, within about `limit_s` seconds.
     pub(super) fn omissions(&self, limit_s: f64, clock: &mut Clock<'_>) -> Vec<Omission> {
         let mut list = Vec::new();
         let mut left_s = limit_s;
@@ -74,7 +77,7 @@ impl Whole<'_> {
             let named =
                 Omission { what: variant.what.clone(), how: variant.how.clone(), ..Omission::default() };
             if whole_s * variant.body.share() > left_s {
-                list.push(Omission { skipped: Some("no time left; --minutes allows it".into()), ..named });
+                list.push(Omission { skipped: Some("no time left; increase --minutes".into()), ..named });
                 continue;
             }
             let name = format!("without {}", variant.what);
@@ -84,11 +87,11 @@ impl Whole<'_> {
             left_s -= begun.elapsed().as_secs_f64();
             list.push(match measured {
                 Ok(found) => Omission { what: named.what, how: named.how, ..found },
-                // What a scene cannot do without is a finding.
+                // A scene that cannot run without a part is a result, not a failure.
                 Err(error) => Omission { skipped: Some(error.to_string()), ..named },
             });
         }
-        // What was measured so far is not lost to a temporary folder that is full or read-only.
+        // A full or read-only temporary folder must not discard the earlier results.
         list.extend(self.outputs(clock).unwrap_or_else(|error| {
             vec![Omission { what: "outputs".into(), skipped: Some(error.to_string()), ..Omission::default() }]
         }));
@@ -118,14 +121,14 @@ impl Whole<'_> {
         }
         for factor in COARSER {
             let (lattice, how) = coarser(&scene.lattice, &self.body.mesh.lattice, factor);
-            let what = format!("a lattice that fine ({factor} x coarser)");
+            let what = format!("lattice resolution ({factor} x coarser)");
             add(what, how, Reuse::Another { share: factor.powi(-3) }, &|s| s.lattice = lattice.clone());
         }
         if let (None, Some(length)) = (&scene.lattice.region, self.reach_mm()) {
             for share in AROUND {
                 let around = (share * length).ceil();
                 let region = RegionSection { around_mm: Some(around), min_mm: None, max_mm: None };
-                let what = format!("what is {around} mm and more from the action");
+                let what = format!("tissue more than {around} mm from the action");
                 let how = format!("--set lattice.region.around_mm={around}");
                 let body = Reuse::Another { share: region::share_around(scene, self.body, around) };
                 add(what, how, body, &|s| s.lattice.region = Some(region.clone()));
@@ -158,7 +161,7 @@ impl Whole<'_> {
         let run = bench.run(self.setting, progress, |_| std::ops::ControlFlow::Continue(()))?;
         let field = match &other {
             None => run.at_end().clone(),
-            Some(other) => self.carried_over(other, &run.positions),
+            Some(other) => self.resampled(other, &run.positions),
         };
         let whole = self.run.at_end();
         let rounding_mm = 1e3 * self.bench.movable.rounding();
@@ -177,15 +180,15 @@ impl Whole<'_> {
         &self.source.volume
     }
 
-    /// Displacements of another body at the vertices of this one that can move.
-    fn carried_over(&self, other: &Body, deformed: &[Point3<f32>]) -> Field {
+    /// Displacements of another body at the movable vertices of this one.
+    fn resampled(&self, other: &Body, deformed: &[Point3<f32>]) -> Field {
         let sampler = Sampler::new(&other.mesh, deformed);
         let here = &self.body.mesh;
         let at = |&v: &u32| sampler.displacement(here.frame.to_mm(here.positions[v as usize]));
         Field(self.bench.movable.vertices().iter().map(at).collect())
     }
 
-    /// What each output takes, from writing all of them once.
+    /// Cost of each output, from writing all of them once.
     fn outputs(&self, clock: &mut Clock<'_>) -> Result<Vec<Omission>, Error> {
         let output = &self.loaded.scene.output;
         if !(output.volume || output.surface || output.tissue || output.pictures) {
@@ -237,7 +240,7 @@ impl Whole<'_> {
     }
 }
 
-/// A scene without something.
+/// A scene without one of its parts.
 struct Variant {
     what: String,
     how: String,
@@ -245,11 +248,11 @@ struct Variant {
     scene: Scene,
 }
 
-/// Whether a variant is of the body that there is.
+/// Whether a variant uses the baseline's body.
 #[derive(Clone, Copy)]
 enum Reuse {
     Same,
-    /// Of one that has to be built, and takes this share of the time, as far as it can be guessed.
+    /// A new body has to be built. Its run is expected to take this share of the baseline's time.
     Another {
         share: f64,
     },
@@ -264,7 +267,8 @@ impl Reuse {
     }
 }
 
-/// A lattice with steps longer by `factor`, and the option for it. `built` is what the section made of itself.
+/// A lattice with steps longer by `factor`, and the command-line option for it. `built` is the
+/// lattice of `section`.
 fn coarser(section: &LatticeSection, built: &Lattice, factor: f64) -> (LatticeSection, String) {
     match section.spacing_mm {
         Some(spacing) => {
@@ -275,7 +279,7 @@ fn coarser(section: &LatticeSection, built: &Lattice, factor: f64) -> (LatticeSe
         None => {
             let steps = |n: usize| ((n - 1) as f64 / factor).round().max(1.0) as usize;
             let vertices @ [nx, ny, nz] = region::even_shape(built).map(|n| steps(n) + 1);
-            // For any shell: no blanks, and brackets quoted.
+            // No blanks and quoted brackets, so that it works in any shell.
             let how = format!("--set \"lattice.vertices=[{nx},{ny},{nz}]\"");
             (LatticeSection { vertices: Some(vertices), ..section.clone() }, how)
         }
@@ -283,7 +287,7 @@ fn coarser(section: &LatticeSection, built: &Lattice, factor: f64) -> (LatticeSe
 }
 
 impl Chosen {
-    /// Bytes that a body takes on a device.
+    /// Memory of a body on the device, bytes.
     pub(super) fn device_bytes(
         &self,
         system: &cutis_solver::System<f32>,
@@ -301,9 +305,10 @@ mod tests {
     use crate::scene::Override;
     use crate::source;
 
-    /// A graded lattice is coarser where it is fine too, by as much as is said, and the option says the same to the program.
+    /// Coarsening also applies to the fine zone of a graded lattice, by the stated factor. The
+    /// printed option has the same effect.
     #[test]
-    fn a_coarser_lattice_is_coarser_by_as_much_with_grading_too() {
+    fn a_graded_lattice_coarsens_by_the_stated_factor() {
         let text = "volume = { phantom = { size = [48, 48, 40], seed = 1 } }\n[lattice]\nvertices = [41, 41, 33]\n\
                     grading = { min_mm = [20, 80, -20], max_mm = [50, 110, 20], growth = 1.5, coarsest = 4.0 }";
         let built = |set: &[Override]| {
