@@ -1,4 +1,4 @@
-//! The extension point: one trait, `N` vertices, a value and its gradient.
+//! The trait of all constraints: a value and its gradient over `N` vertices.
 
 use std::fmt::Debug;
 
@@ -9,20 +9,20 @@ use crate::Real;
 /// Value and gradient of a constraint over `N` vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eval<T, const N: usize> {
-    /// `C(x)`, in the constraint's own unit (m for a length, m² for an area, m³ for a volume).
+    /// `C(x)` in the constraint's own unit: m for a length, m² for an area, m³ for a volume.
     pub c: T,
-    /// `∂C/∂x_i` for each vertex; all zero where the gradient is undefined.
+    /// `∂C/∂x_i` for each vertex. All zero where the gradient is undefined.
     pub grad: [Vector3<T>; N],
 }
 
-/// The numbers of one constraint: a flat array of `K` scalars, so that storage, upload and SIMD lanes need no
-/// derive, no padding rule and no `unsafe`.
+/// The parameters of one constraint: a flat array of `K` scalars. Storage, upload to a GPU and SIMD
+/// lanes therefore need no derive, no padding rule and no `unsafe`.
 pub trait Params<T>: Copy + Debug + Send + Sync + PartialEq + AsRef<[T]> {
     /// Number of scalars.
     const LEN: usize;
-    /// Builds the array from its `k`-th scalars.
+    /// Builds the array. `f(k)` gives scalar number `k`.
     fn from_fn(f: impl FnMut(usize) -> T) -> Self;
-    /// The scalars of many constraints, one after the other: what a GPU is given.
+    /// The scalars of many constraints, one constraint after the other: the layout of a GPU buffer.
     fn flat(many: &[Self]) -> &[T];
 }
 
@@ -39,17 +39,17 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 /// A scalar constraint over the positions of `N` vertices.
 ///
 /// # Theory
-/// A constraint measures how far `N` points are from where they should be, as one number `C(x)`: 0 at rest, **positive
-/// when stretched, negative when compressed**. With a compliance `α` (inverse stiffness, supplied by the solver) it
-/// stands for the energy and the forces
+/// A constraint measures how far `N` points are from their rest shape. Its value `C(x)` is 0 at
+/// rest, **positive when stretched and negative when compressed**. With a compliance `α` (inverse
+/// stiffness, supplied by the solver) it stands for this energy and these forces:
 ///
 /// ```text
 /// U(x) = C(x)² / (2α)            [J]
 /// f_i  = −∂U/∂x_i = −(C/α) ∇_iC  [N]
 /// ```
 ///
-/// If `C` has the unit `u`, then `∇C` has `u/m` and `α` has `u²/J`. With inverse masses `w`, a projection moves the
-/// points along `w_i ∇_iC`:
+/// If `C` has the unit `u`, then `∇C` has the unit `u/m` and `α` has `u²/J`. With inverse masses
+/// `w`, a projection moves the points along `w_i ∇_iC`:
 ///
 /// ```text
 /// PBD    Δx_i = −s · w_i ∇_iC · C / Σ_j w_j |∇_jC|²              s in 0 to 1
@@ -57,37 +57,48 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 ///        Δx_i = w_i ∇_iC Δλ                                       h: substep, λ = 0 at its start
 /// ```
 ///
-/// Sources: Müller et al., *Position Based Dynamics*, J. Vis. Commun. Image R. 18 (2007), eq. 5–9; Macklin et al.,
-/// *XPBD*, MIG 2016, eq. 17–18.
+/// Sources: Müller et al., *Position Based Dynamics*, J. Vis. Commun. Image R. 18 (2007), eq. 5–9;
+/// Macklin et al., *XPBD*, MIG 2016, eq. 17–18.
 ///
 /// # Rules for an implementation
-/// - `∇C` is the exact gradient of `C`. Check it against finite differences: a wrong length of `∇C` goes unnoticed in a
-///   picture but makes the stiffness depend on the unit of length.
-/// - If `C` depends on the shape alone, not on where it lies or how it is turned, the gradients sum to zero and make
-///   no torque: `Σ ∇_iC = 0` and `Σ x_i × ∇_iC = 0`. Then a projection conserves momentum.
-/// - Where the gradient is undefined (coincident points, a flat triangle) it is zero, and `C` is finite.
-/// - No branch on a value: compute both sides and `select`, so that SIMD lanes can differ (see [`Real`]).
-/// - No absolute epsilon and no absolute length: compare with the element's own size.
+/// - `∇C` is the exact gradient of `C`. Check it against finite differences. A wrong length of `∇C`
+///   is not visible in a picture, but it makes the stiffness depend on the unit of length.
+/// - If `C` depends only on the shape, and not on its place or orientation, the gradients sum to
+///   zero and have no torque: `Σ ∇_iC = 0` and `Σ x_i × ∇_iC = 0`. A projection then conserves
+///   momentum.
+/// - Where the gradient is undefined (coincident points, a flat triangle) it is zero, and `C` is
+///   finite.
+/// - Do not branch on a value. Compute both sides and `select`, so that SIMD lanes can differ (see
+///   [`Real`]).
+/// - Use no absolute epsilon and no absolute length. Compare with the size of the element.
 ///
 /// # Parameters are flat arrays
-/// [`Params`](Constraint::Params) is `[T; K]`, not a struct: the same formula then reads them as `f32`, as `f64` or as
-/// lanes gathered from several constraints, and a solver can store, upload and transpose them knowing only `K`.
-/// Destructure them by name at the head of `eval`.
+/// [`Params`](Constraint::Params) is `[T; K]`, not a struct. The same formula then reads the
+/// parameters as `f32`, as `f64` or as lanes gathered from several constraints. A solver only needs
+/// `K` to store, upload and transpose them. Destructure them by name at the head of `eval`.
 ///
-/// # The same in WGSL
-/// [`WGSL`](Constraint::WGSL) is the twin of `eval` for the GPU: `struct Params` with the scalars of the parameters in their
-/// order (`f32`, nothing else), and `fn eval(x: array<vec3f, N>, p: Params) -> Eval`, where `N` and `Eval` (`c: f32`,
-/// `grad: array<vec3f, N>`) stand above it already. With the operations `+ − * /`, `sqrt`, `dot`, `cross`, `length`, `abs`,
-/// `floor`, `clamp`, `min`, `max` and `select`, in the same order as in Rust, a software device gives the bits of the CPU.
-/// `normalize`, `mix`, `fma`, `pow` and the transcendental functions differ. A denominator that may be zero is replaced by
-/// `select` before the division. Drivers turn `a·b + a·c` into `a·(b + c)`: where a sum of products shares a factor, take it out
-/// in both languages, or put the terms through `exact` (a scalar) or `exact3` (a vector), which return what they are given and
-/// which no optimizer sees through. The battery of the crate `cutis-conformance` holds one against the other.
+/// # The shader
+/// [`WGSL`](Constraint::WGSL) is the twin of `eval` for the GPU. It has two parts:
+/// - `struct Params` with the scalars of the parameters in the same order, all of them `f32`;
+/// - `fn eval(x: array<vec3f, N>, p: Params) -> Eval`. The solver defines `N` and `Eval` (`c: f32`,
+///   `grad: array<vec3f, N>`) above it.
 ///
-/// A constraint with an [`inverse_reach_squared`](Constraint::inverse_reach_squared) sets the private variable of that name in `eval`.
+/// A software device gives the bits of the CPU if the shader does the same operations in the same
+/// order as the Rust code, under these rules:
+/// - Use only `+ − * /`, `sqrt`, `dot`, `cross`, `length`, `abs`, `floor`, `clamp`, `min`, `max`
+///   and `select`. `normalize`, `mix`, `fma`, `pow` and the transcendental functions round
+///   differently.
+/// - Replace a denominator that may be zero by `select` before the division.
+/// - Drivers turn `a·b + a·c` into `a·(b + c)`. Where the products of a sum share a factor, factor
+///   it out in both languages, or pass the terms through `exact` (a scalar) or `exact3` (a vector).
+///   These functions return their argument and no optimizer can see through them.
+/// - If the type implements [`inverse_reach_squared`](Constraint::inverse_reach_squared), `eval`
+///   sets the private variable of that name.
+///
+/// The test battery in the crate `cutis-conformance` compares the two languages.
 ///
 /// # Example
-/// A constraint of one's own: a point that should stay on the plane `z = height`.
+/// A point that should stay on the plane `z = height`:
 /// ```
 /// use cutis_constraints::{Constraint, Eval, Real};
 /// use nalgebra::{Point3, Vector3};
@@ -120,27 +131,32 @@ impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T
 pub trait Constraint<const N: usize>: Send + Sync + 'static {
     /// Name in reports, benchmarks and tests.
     const NAME: &'static str;
-    /// `struct Params` and `fn eval`, the twin of [`eval`](Self::eval) in WGSL.
+    /// `struct Params` and `fn eval` in WGSL: the twin of [`eval`](Self::eval).
     const WGSL: &'static str;
-    /// Per-constraint scalars, `[T; K]`.
+    /// The scalars of one constraint, `[T; K]`.
     type Params<T: Real>: Params<T>;
-    /// What the caller chooses when a constraint is built from its rest shape (for example a rest-area scale).
+    /// The choices of the caller when a constraint is built from its rest shape, such as a
+    /// rest-area scale.
     type Material;
-    /// Parameters of a constraint whose rest shape is `x` (positions in meters).
+    /// Parameters of a constraint with the rest shape `x` (positions in meters).
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;
     /// `C` and `∇C` at `x` (positions in meters).
     fn eval<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Eval<T, N>;
-    /// `1/r²` in 1/m², where `r` is the longest way on which a projection follows the gradient at `x`; none for no limit.
+    /// `1/r²` in 1/m², where `r` is the longest distance that a projection may move along the
+    /// gradient at `x`. `None` means no limit, and is the default.
     ///
-    /// A projection goes where the tangent of `C` meets zero. If the gradient of a collapsed element is tiny, that is far
-    /// outside of the element, where the tangent says nothing. `r` is some times the larger of the element's present and rest
-    /// size: it never acts on an element that has not lost its shape, and where it acts, steps get as small as the gradient.
-    /// A constraint that is linear along its gradient, such as a length, needs none.
+    /// A projection moves to the point where the tangent of `C` meets zero. If the gradient of a
+    /// collapsed element is tiny, that point is far outside the element, where the tangent says
+    /// nothing about `C`. `r` is a multiple of the larger of the present size and the rest size. It
+    /// therefore never limits an element that has kept its shape. In a collapsed element it makes
+    /// the steps as small as the gradient. A constraint that is linear along its gradient, such as
+    /// a length, needs no limit.
     fn inverse_reach_squared<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Option<T> {
         let _ = (x, params);
         None
     }
-    /// The size that `C` is compared with in residuals: rest length (m), rest area (m²), rest volume (m³). Zero stands for a
-    /// rest shape without size, from which `SystemBuilder` takes no parameters.
+    /// The reference size of residuals: rest length (m), rest area (m²) or rest volume (m³). Zero
+    /// means that the rest shape has no size; `SystemBuilder` refuses to take parameters from such
+    /// a shape.
     fn rest_size<T: Real>(params: &Self::Params<T>) -> T;
 }

@@ -1,41 +1,33 @@
-//! Distance constraint: an edge keeps its length.
+//! The distance constraint: an edge keeps its length.
 
 use nalgebra::Point3;
 
-use crate::material::{MaterialError, check_positive};
 use crate::{Constraint, Eval, Real};
 
-/// An edge keeps its length.
+/// A constraint that keeps the length of an edge.
 ///
 /// ```text
 /// C   = |x1 − x2| − L                      [m]
 /// ∇1C = (x1 − x2)/|x1 − x2|,  ∇2C = −∇1C   [1]
 /// ```
 ///
-/// Parameters `[L]`: the rest length in m. The gradient is zero where the points coincide.
-/// Compliance: [`distance_compliance`](crate::distance_compliance), m/N. Source: Müller et al. 2007, §3.3.
+/// The parameters are `[L]`, the rest length in m. The gradient is zero where the points coincide.
+/// The compliance is [`distance_compliance`](crate::distance_compliance), in m/N. Source: Müller et
+/// al. 2007, §3.3.
 #[derive(Clone, Copy, Debug)]
 pub struct Distance;
 
-/// How a [`Distance`] is built from its rest shape.
+/// The rest length of a [`Distance`] relative to its initial length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceMaterial {
-    /// Rest length over initial length: below 1 the edge pulls from the start. Above 0.
+    /// Rest length divided by initial length, above 0. Below 1 the edge pulls from the start.
     pub rest_scale: f64,
 }
 
 impl Default for DistanceMaterial {
-    /// At rest as built.
+    /// The initial length is the rest length.
     fn default() -> Self {
         Self { rest_scale: 1.0 }
-    }
-}
-
-impl DistanceMaterial {
-    /// # Errors
-    /// [`MaterialError::NotPositive`] unless the scale is finite and above 0.
-    pub fn check(&self) -> Result<(), MaterialError> {
-        check_positive("rest_scale of a distance", "1", self.rest_scale)
     }
 }
 

@@ -1,19 +1,20 @@
-//! Position-based constraints: what they measure, and nothing else.
+//! Position-based constraints: their values and gradients.
 //!
-//! A [`Constraint`] supplies a value `C(x)` and its gradient `∇C(x)`. Mass, compliance, multiplier and time step
-//! belong to the solver and never appear here.
+//! A [`Constraint`] supplies a value `C(x)` and its gradient `∇C(x)`. Mass, compliance, multiplier
+//! and time step belong to the solver and never appear here.
 //!
 //! | constraint | vertices | `C` | compliance |
 //! |---|---|---|---|
 //! | [`Distance`] | 2 | length − rest length, m | [`distance_compliance`], m/N |
 //! | [`Volume`] | 4 | signed volume − rest volume, m³ | [`volume_compliance`], m³/Pa |
 //! | [`SkinTension`] | 3 | (area − rest area) · `q`, m² | [`skin_compliance`], m³/N |
-//! | [`SkinTensionPaper`] | 3 | (area − rest area) · `F`, m²; PBD only | none: a stiffness in 0 to 1 |
+//! | [`SkinTensionPaper`] | 3 | (area − rest area) · `F`, m²; PBD only | none, but a stiffness from 0 to 1 |
 //!
-//! One source of each formula serves `f32`, `f64` and SIMD lanes of both ([`Real`]), with the same bits in every lane
-//! as in a scalar. There is no absolute length and no absolute epsilon: scaling a body by 1e-3 or 1e3 scales the
-//! results. Only the exponent range of the number type sets a limit: in `f32`, elements between about 1e-7 m and
-//! 1e7 m neither underflow nor overflow.
+//! Each formula is written once and runs as `f32`, as `f64` and in SIMD lanes of both ([`Real`]).
+//! Every lane has the bits of a scalar evaluation. No formula contains an absolute length or an
+//! absolute epsilon, so scaling a body by 1e-3 or 1e3 scales the results. The only limit is the
+//! exponent range of the number type: in `f32`, elements between about 1e-7 m and 1e7 m neither
+//! underflow nor overflow.
 //!
 //! ```
 //! use cutis_constraints::{Constraint, Distance, DistanceMaterial};

@@ -1,41 +1,46 @@
 //! Compliances from material parameters that do not depend on the mesh.
 //!
-//! A compliance `α` turns a constraint `C` into the energy `C²/(2α)` in joules. Each formula here divides out the size
-//! of the element, so that refining a mesh changes the compliances but not the material. Inputs and results are `f64`
-//! in SI units. A modulus of infinity is a rigid material: `α = 0`.
+//! A compliance `α` turns a constraint `C` into the energy `C²/(2α)` in joules. Each formula here
+//! divides out the size of the element. Refining a mesh therefore changes the compliances but not
+//! the material. Arguments and results are `f64` in SI units. An infinite modulus means a rigid
+//! material: `α = 0`.
 
-/// Why a material parameter or a rest size cannot be used.
+/// An invalid material parameter or rest size.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaterialError {
     /// A value that must be above 0 is not, or is not a number.
     #[error("{quantity} is {value} {unit}; it must be a finite number above 0")]
     NotPositive {
-        /// What the value is.
+        /// Name of the quantity.
         quantity: &'static str,
         /// The value.
         value: f64,
-        /// Its unit, "1" if it has none.
+        /// Unit of the value; "1" if it has none.
         unit: &'static str,
     },
-    /// A value that must be 0 or more is not, or is not finite.
+    /// A value that must be 0 or more is negative or not finite.
     #[error("{quantity} is {value} {unit}; it must be a finite number, 0 or more")]
     Negative {
-        /// What the value is.
+        /// Name of the quantity.
         quantity: &'static str,
         /// The value.
         value: f64,
-        /// Its unit, "1" if it has none.
+        /// Unit of the value; "1" if it has none.
         unit: &'static str,
     },
-    /// The stiffness of PBD is a share of the error that one iteration removes.
+    /// A PBD stiffness is not above 0 and at most 1. It is the fraction of the error that one
+    /// iteration removes.
     #[error("stiffness is {value}; it must be above 0 and at most 1")]
     StiffnessOutOfRange {
         /// The value.
         value: f64,
     },
-    /// The inputs are valid, but so small or large that the compliance is no finite number.
-    #[error("the compliance of a {constraint} constraint of rest size {rest_size} comes out as {value}")]
+    /// The arguments are valid, but so small or large that the compliance is not a finite number.
+    #[error(
+        "the compliance of a {constraint} constraint with rest size {rest_size} is {value}; \
+         it must be a finite number"
+    )]
     ComplianceOutOfRange {
         /// Name of the constraint.
         constraint: &'static str,
@@ -48,14 +53,15 @@ pub enum MaterialError {
 
 /// Compliance of a [`Distance`](crate::Distance) in m/N: `α = L²/(E·V_e)`.
 ///
-/// The edge is a rod of length `rest_length` `L` (m), cross-section `V_e/L` and Young's modulus `youngs_modulus_pa` `E`
-/// (Pa), where `edge_volume` `V_e` (m³) is the edge's share of the volume of the tetrahedra around it.
+/// The edge is a rod with the length `rest_length` `L` (m), the cross-section `V_e/L` and Young's
+/// modulus `youngs_modulus_pa` `E` (Pa). `edge_volume` `V_e` (m³) is the edge's share of the volume
+/// of the tetrahedra around it.
 ///
 /// # Errors
 /// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
 ///
 /// ```
-/// // 1 cm of a rod of 1 cm² and 20 kPa: k = E·area/L = 200 N/m.
+/// // 1 cm of a rod with a cross-section of 1 cm² and 20 kPa: k = E·area/L = 200 N/m.
 /// let alpha = cutis_constraints::distance_compliance(0.01, 2e4, 1e-6)?;
 /// assert!((alpha - 1.0 / 200.0).abs() < 1e-15);
 /// # Ok::<(), cutis_constraints::MaterialError>(())
@@ -68,14 +74,15 @@ pub fn distance_compliance(
     check_positive("rest length", "m", rest_length)?;
     check_modulus("Young's modulus", "Pa", youngs_modulus_pa)?;
     check_positive("edge volume", "m³", edge_volume)?;
-    // Quotients first: their exponents stay near the result's.
+    // The quotients come first, because their exponents stay near that of the result.
     let compliance = rest_length / youngs_modulus_pa * (rest_length / edge_volume);
     finite("distance", rest_length, compliance)
 }
 
 /// Compliance of a [`Volume`](crate::Volume) in m³/Pa: `α = V0/K`.
 ///
-/// `rest_volume` `V0` in m³, `bulk_modulus_pa` `K` in Pa: then `C²/(2α)` is `½ K (ΔV/V0)² V0`.
+/// `V0` is `rest_volume` in m³ and `K` is `bulk_modulus_pa` in Pa. The energy `C²/(2α)` is then `½
+/// K (ΔV/V0)² V0`.
 ///
 /// # Errors
 /// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
@@ -87,8 +94,8 @@ pub fn volume_compliance(rest_volume: f64, bulk_modulus_pa: f64) -> Result<f64, 
 
 /// Compliance of a [`SkinTension`](crate::SkinTension) in m³/N: `α = A0/T`.
 ///
-/// `rest_area` `A0` in m², `area_modulus_n_per_m` `T` in N/m: the tension per relative growth of the area. `k = T/A0`
-/// is the stiffness of the energy form.
+/// `A0` is `rest_area` in m². `T` is `area_modulus_n_per_m` in N/m, the tension per relative growth
+/// of the area. `k = T/A0` is the stiffness of the energy form.
 ///
 /// # Errors
 /// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
@@ -120,7 +127,7 @@ pub(crate) fn check_not_negative(
     }
 }
 
-/// Fails unless `value` is above 0; infinity is a rigid material.
+/// Fails unless `value` is above 0. Infinity is allowed: a rigid material.
 fn check_modulus(quantity: &'static str, unit: &'static str, value: f64) -> Result<(), MaterialError> {
     if value > 0.0 { Ok(()) } else { not_positive(quantity, unit, value) }
 }

@@ -1,69 +1,62 @@
-//! Skin tension constraint (STC), energy form: a triangle of skin keeps its area, the more firmly the more it is
-//! stretched.
+//! The energy form of the skin tension constraint (STC).
 
 use nalgebra::Point3;
 
-use crate::material::{MaterialError, check_not_negative, check_positive};
 use crate::{Constraint, Eval, Real, triangle};
 
-/// A triangle of skin keeps its area, the more firmly the more it is stretched; unconditionally stable.
+/// A constraint that keeps the area of a triangle of skin. Its stiffness grows with the stretch. It
+/// is unconditionally stable.
 ///
-/// With the area `A`, the rest area `A0` and the area stretched over `C = A − A0`, skin tension pulls with the force
+/// Let `A` be the area, `A0` the rest area and `C = A − A0`. Skin tension pulls with the force
 /// `k·F·C·∇A`, amplified by `F = 1 + β·max(0, C)/A0`. This force is the gradient of
 ///
 /// ```text
 /// U = k (½ C² + β max(0, C)³ / (3 A0))   [J]
 /// ```
 ///
-/// which equals `½ k Ĉ²` for the constraint that this type evaluates,
+/// which equals `½ k Ĉ²` for the constraint that this type evaluates:
 ///
 /// ```text
 /// Ĉ  = C q,  q = √(1 + 2β max(0, C) / (3 A0))      [m²]
 /// ∇Ĉ = (q + Cβ / (3 A0 q)) ∇A = ½(3q − 1/q) ∇A     [m]    (q = 1 where C ≤ 0)
 /// ```
 ///
-/// and `∇A` as of a triangle: `∇1A = ½ (x2 − x3) × n̂` and so on around, with the unit normal `n̂`.
+/// `∇A` is the gradient of a triangle's area: `∇1A = ½ (x2 − x3) × n̂`, and the same for the other
+/// vertices in cyclic order, with the unit normal `n̂`.
 ///
-/// `Ĉ` is increasing in `A` and convex where it pulls (`A ≥ A0`). A projection follows the tangent of `Ĉ`, which meets
-/// zero before `Ĉ` does: it stops short of the rest area instead of shooting past it, whatever `β`. The same force as
-/// published, without a clamp.
+/// `Ĉ` increases with `A`, and is convex where it pulls (`A ≥ A0`). A projection follows the
+/// tangent of `Ĉ`, which meets zero before `Ĉ` does. For any `β` it stops short of the rest area
+/// instead of overshooting it. The force is the published one, without a clamp.
 ///
-/// Parameters `[A0, β]`: the rest area in m² and the amplification without unit. A rest area of zero has no
-/// stretch, hence no amplification: `q = 1`. The gradient is zero where the points lie on a line.
-/// Compliance: [`skin_compliance`](crate::skin_compliance), m³/N.
+/// The parameters are `[A0, β]`: the rest area in m² and the amplification without unit. With a
+/// rest area of zero there is no stretch and no amplification: `q = 1`. The gradient is zero where
+/// the points lie on a line. The compliance is [`skin_compliance`](crate::skin_compliance), in
+/// m³/N.
 ///
-/// Sources: the force law is that of the skin tension constraint, DOI 10.15701/kcgs.2025.31.4.21, Algorithm 1, with the
-/// gradient put right; the energy and `Ĉ` are derived from it here. See the errata page of the book.
+/// Sources: the force law comes from the skin tension constraint, DOI 10.15701/kcgs.2025.31.4.21,
+/// Algorithm 1, with a corrected gradient. The energy and `Ĉ` are derived from it here. See the
+/// errata page of the book.
 #[derive(Clone, Copy, Debug)]
 pub struct SkinTension;
 
-/// How a [`SkinTension`] is built from its rest shape.
+/// The rest area and the amplification of a [`SkinTension`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkinTensionMaterial {
-    /// Rest area over initial area: below 1 the skin is under tension from the start, which opens a wound. Above 0.
+    /// Rest area divided by initial area, above 0. Below 1 the skin is under tension from the
+    /// start, which opens a wound.
     pub rest_area_scale: f64,
-    /// `β`: how much firmer the skin gets per relative stretch of its area, without unit. 0 or more.
+    /// `β`: the growth of the stiffness per relative stretch of the area, without unit; 0 or more.
     pub amplification: f64,
 }
 
 impl Default for SkinTensionMaterial {
-    /// At rest as built, not amplified.
+    /// The initial area is the rest area, and the stiffness is constant.
     fn default() -> Self {
         Self { rest_area_scale: 1.0, amplification: 0.0 }
     }
 }
 
-impl SkinTensionMaterial {
-    /// # Errors
-    /// [`MaterialError::NotPositive`] unless the scale is finite and above 0; [`MaterialError::Negative`] unless the
-    /// amplification is finite and 0 or more.
-    pub fn check(&self) -> Result<(), MaterialError> {
-        check_positive("rest_area_scale of skin tension", "1", self.rest_area_scale)?;
-        check_not_negative("amplification of skin tension", "1", self.amplification)
-    }
-}
-
-/// `max(0, C)/A0`: relative stretch of the area; 0 if the rest area is 0.
+/// `max(0, C)/A0`, the relative stretch of the area; 0 if the rest area is 0.
 #[inline(always)]
 pub(crate) fn stretch<T: Real>(c: T, rest_area: T) -> T {
     let zero = T::zero();

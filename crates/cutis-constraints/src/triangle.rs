@@ -1,11 +1,11 @@
-//! Area of a triangle in space and its gradient, shared by the two forms of skin tension.
+//! The area of a triangle in space and its gradient, shared by the two forms of skin tension.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::Real;
 
-/// Sine of the angle at the first vertex, in units of the machine epsilon, below which the normal of a triangle is
-/// rounding noise.
+/// Sine of the angle at the first vertex, in units of the machine epsilon, below which the normal
+/// of a triangle is rounding noise.
 const NOISE: f64 = 8.0;
 
 /// Area (m²) of the triangle `x`.
@@ -14,11 +14,13 @@ pub(crate) fn area<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> T {
     n.dot(&n).simd_sqrt() * T::constant(0.5)
 }
 
-/// Area (m²) of the triangle `x` and its gradient (m), with `n = (x2 − x1) × (x3 − x1)`, `n̂ = n/|n|`:
+/// Area (m²) of the triangle `x` and its gradient (m). With `n = (x2 − x1) × (x3 − x1)` and `n̂ =
+/// n/|n|`:
 ///
 /// `A = |n|/2`, `∇1A = ½ (x2 − x3) × n̂`, `∇2A = ½ (x3 − x1) × n̂`, `∇3A = ½ (x1 − x2) × n̂`.
 ///
-/// The gradient is zero where the three points lie on a line to within rounding: there `n̂` points anywhere.
+/// The gradient is zero where the three points lie on a line to within rounding, because the
+/// direction of `n̂` is then arbitrary.
 #[inline(always)]
 pub(crate) fn area_and_gradient<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> (T, [Vector3<T>; 3]) {
     let (e2, e3) = (x2 - x1, x3 - x1);
@@ -34,7 +36,8 @@ pub(crate) fn area_and_gradient<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> (T, [
     (n_length * half, [-(grad2 + grad3), grad2, grad3])
 }
 
-/// `1/r²` with `r² = 16 max(e², A0)` and `e` the longer edge at the first vertex: four times the present or the rest size.
+/// `1/r²` with `r² = 16 max(e², A0)`, where `e` is the longer edge at the first vertex: four times
+/// the present size or the rest size, whichever is larger.
 #[inline(always)]
 pub(crate) fn inverse_reach_squared<T: Real>([x1, x2, x3]: &[Point3<T>; 3], rest_area: T) -> T {
     let (e2, e3) = (x2 - x1, x3 - x1);

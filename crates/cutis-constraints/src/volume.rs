@@ -1,11 +1,10 @@
-//! Volume constraint: a tetrahedron keeps its signed volume.
+//! The volume constraint: a tetrahedron keeps its signed volume.
 
 use nalgebra::{Point3, SimdBool, Vector3};
 
-use crate::material::{MaterialError, check_positive};
 use crate::{Constraint, Eval, Real};
 
-/// A tetrahedron keeps its signed volume.
+/// A constraint that keeps the signed volume of a tetrahedron.
 ///
 /// ```text
 /// V   = (x2 − x1)·((x3 − x1) × (x4 − x1)) / 6,  C = V − V0   [m³]
@@ -15,40 +14,35 @@ use crate::{Constraint, Eval, Real};
 /// ∇1C = −(∇2C + ∇3C + ∇4C)
 /// ```
 ///
-/// The 1/6 belongs into the gradient as well as into the volume. Without it the gradient is six times too long and a
-/// projection removes a sixth of the error instead of all of it; a test shows it.
+/// The factor 1/6 belongs in the gradient as well as in the volume. Without it the gradient is six
+/// times too long, and a projection removes a sixth of the error instead of all of it. A test shows
+/// this.
 ///
-/// Parameters `[V0]`: the rest volume in m³, positive where the vertices 2, 3, 4 run counter-clockwise seen from the
-/// side away from vertex 1. An inverted tetrahedron has a negative volume and is pushed back through itself. The
-/// gradient is a polynomial: defined everywhere, and zero where all four points lie on a line.
-/// Compliance: [`volume_compliance`](crate::volume_compliance), m³/Pa. Source: Bender, Müller and Macklin,
+/// The parameters are `[V0]`, the rest volume in m³. It is positive if the vertices 2, 3, 4 run
+/// counter-clockwise when seen from the side away from vertex 1. An inverted tetrahedron has a
+/// negative volume and is pushed back through itself. The gradient is a polynomial, so it is
+/// defined everywhere. It is zero where all four points lie on a line. The compliance is
+/// [`volume_compliance`](crate::volume_compliance), in m³/Pa. Source: Bender, Müller and Macklin,
 /// *A Survey on Position Based Dynamics*, Eurographics Tutorials 2017.
 #[derive(Clone, Copy, Debug)]
 pub struct Volume;
 
-/// How a [`Volume`] is built from its rest shape.
+/// The rest volume of a [`Volume`] relative to its initial volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeMaterial {
-    /// Rest volume over initial volume: above 1 the tetrahedron swells from the start. Above 0.
+    /// Rest volume divided by initial volume, above 0. Above 1 the tetrahedron swells from the
+    /// start.
     pub rest_scale: f64,
 }
 
 impl Default for VolumeMaterial {
-    /// At rest as built.
+    /// The initial volume is the rest volume.
     fn default() -> Self {
         Self { rest_scale: 1.0 }
     }
 }
 
-impl VolumeMaterial {
-    /// # Errors
-    /// [`MaterialError::NotPositive`] unless the scale is finite and above 0.
-    pub fn check(&self) -> Result<(), MaterialError> {
-        check_positive("rest_scale of a volume", "1", self.rest_scale)
-    }
-}
-
-/// Volume and its four gradients.
+/// Volume (m³) and its four gradients (m²).
 #[inline(always)]
 fn volume_and_gradient<T: Real>([x1, x2, x3, x4]: &[Point3<T>; 4]) -> (T, [Vector3<T>; 4]) {
     let (a, b, c) = (x2 - x1, x3 - x1, x4 - x1);
@@ -75,8 +69,9 @@ impl Constraint<4> for Volume {
         Eval { c: volume - rest_volume, grad }
     }
 
-    /// `r² = 16 max(e², √(V0 e))` with `e` the longest edge at the first vertex: four times the present size, or the rest size
-    /// (taken nearer to the present one, which spares a third root).
+    /// `r² = 16 max(e², √(V0 e))`, where `e` is the longest edge at the first vertex. The reach is
+    /// four times the present size or the rest size, whichever is larger. The geometric mean stands
+    /// in for the rest size because it saves a third root.
     #[inline(always)]
     fn inverse_reach_squared<T: Real>(
         [x1, x2, x3, x4]: &[Point3<T>; 4],
@@ -84,7 +79,8 @@ impl Constraint<4> for Volume {
     ) -> Option<T> {
         let (a, b, c) = (x2 - x1, x3 - x1, x4 - x1);
         let edge_squared = a.dot(&a).simd_max(b.dot(&b)).simd_max(c.dot(&c));
-        // e³ > V0 is the rule and decides without a root; the factor two keeps its rounding out of the result.
+        // e³ > V0 is the usual case and needs no root. The factor two keeps its rounding out of the
+        // result.
         let grown = (edge_squared * edge_squared * edge_squared)
             .simd_gt(rest_volume * rest_volume * T::constant(2.0));
         let size_squared = if grown.all() {
@@ -105,7 +101,7 @@ impl Constraint<4> for Volume {
 mod tests {
     use super::*;
 
-    /// The reach as the shader finds it, with both roots taken.
+    /// The reach as the shader computes it, always with both roots.
     fn with_roots(edge_squared: f32, rest_volume: f32) -> f32 {
         let size_squared = edge_squared.max((rest_volume * edge_squared.sqrt()).sqrt());
         if size_squared > 0.0 { 1.0 / 16.0 / size_squared } else { 0.0 }
