@@ -1,16 +1,17 @@
-//! The checkers. Each gives a relative error; tests hold it below a bound, and a wrong input above it.
+//! Error measures. Each returns a relative error. Tests require it to be below a bound for the
+//! correct input and above it for a wrong one.
 
 use cutis_constraints::{Constraint, Eval};
 use nalgebra::{Point3, Vector3};
 
 use crate::shapes::Shape;
 
-/// Largest length of a vector of the gradient, the measure of its errors.
+/// Largest norm among the vectors of a gradient: the reference for its errors.
 pub fn gradient_size<const N: usize>(grad: &[Vector3<f64>; N]) -> f64 {
     grad.iter().map(Vector3::norm).fold(0.0, f64::max)
 }
 
-/// Error of `grad` against fourth-order central differences of `c`, over the size of the differences.
+/// Error of `grad` against fourth-order central differences of `c`, relative to the differences.
 pub fn gradient_error<const N: usize>(
     eval: impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>,
     shape: &Shape<N>,
@@ -32,19 +33,20 @@ pub fn gradient_error<const N: usize>(
     gradient_size(&difference) / gradient_size(&expected)
 }
 
-/// Length of the sum of the gradients, over their size: what a projection would add to the linear momentum.
+/// Norm of the sum of the gradients, relative to their size: the linear momentum that a projection
+/// would add.
 pub fn momentum_error<const N: usize>(grad: &[Vector3<f64>; N]) -> f64 {
     grad.iter().sum::<Vector3<f64>>().norm() / gradient_size(grad)
 }
 
-/// Length of the torque of the gradients about the shape's first point, over scale and gradient size.
+/// Norm of the torque of the gradients about the first point, relative to scale and gradient size.
 pub fn torque_error<const N: usize>(grad: &[Vector3<f64>; N], shape: &Shape<N>) -> f64 {
     let torque: Vector3<f64> = (0..N).map(|i| (shape.x[i] - shape.x[0]).cross(&grad[i])).sum();
     torque.norm() / (shape.scale * gradient_size(grad))
 }
 
-/// Error of an `f32` evaluation against `f64` on the same numbers: of `C` over gradient size times scale, of the
-/// gradient over its size; the larger one.
+/// Error of an `f32` evaluation against `f64` on the same numbers. It is the larger one of two
+/// errors: `C` relative to gradient size times scale, and the gradient relative to its size.
 pub fn single_error<const N: usize>(single: &Eval<f32, N>, double: &Eval<f64, N>, scale: f64) -> f64 {
     let size = gradient_size(&double.grad);
     let difference: [Vector3<f64>; N] =
@@ -63,7 +65,7 @@ pub fn project<const N: usize>(
     std::array::from_fn(|i| x[i] - eval.grad[i] * (inverse_mass[i] * eval.c / denominator))
 }
 
-/// `eval` of `C` with given parameters, for the checkers.
+/// The `eval` function of `C` with fixed parameters.
 pub fn with<const N: usize, C: Constraint<N>>(
     params: C::Params<f64>,
 ) -> impl Fn(&[Point3<f64>; N]) -> Eval<f64, N> {

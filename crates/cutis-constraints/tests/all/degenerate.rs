@@ -1,9 +1,10 @@
-//! Coincident points, flat shapes and rest sizes of zero: finite, and a zero gradient where it is undefined.
+//! Coincident points, flat shapes and zero rest sizes: results are finite, and an undefined
+//! gradient is zero.
 
 use cutis_constraints::{Constraint, Distance, Eval, Params, Scalar, SkinTension, SkinTensionPaper, Volume};
 use nalgebra::{Point3, Vector3};
 
-/// The documented range of lengths, in m.
+/// Both ends of the documented range of lengths, and lengths between them, in m.
 const SCALES: [f64; 5] = [1e-7, 1e-3, 1.0, 1e3, 1e7];
 
 fn eval<const N: usize, C: Constraint<N>, T: Scalar>(
@@ -22,7 +23,7 @@ fn is_zero<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> bool {
     eval.grad == [Vector3::zeros(); N]
 }
 
-/// Off the origin and with no round numbers, so that nothing is exact by luck.
+/// Points away from the origin without round numbers, so that no result is exact by chance.
 const A: [f64; 3] = [0.1, -0.7, 1.3];
 const B: [f64; 3] = [0.9, 0.3, 0.2];
 const C: [f64; 3] = [-0.4, 0.8, 0.6];
@@ -45,7 +46,7 @@ fn edges<T: Scalar>() {
 
 fn triangles<T: Scalar>() {
     let flat = [[A, A, A], [A, A, B], [A, B, A], [B, A, A]];
-    // On a line only up to rounding: the normal is noise.
+    // These points lie on a line up to rounding. The normal is noise.
     let on_a_line = [[A, lerp(1.0 / 3.0), B], [A, B, lerp(0.3)], [lerp(0.7), A, B], [A, B, lerp(1.7)]];
     for scale in SCALES {
         for rest in [0.0, 1.0] {
@@ -56,7 +57,7 @@ fn triangles<T: Scalar>() {
                     assert!(is_zero(&eval::<3, SkinTensionPaper, T>(*x, scale, &[rest, beta, 1.0])), "{x:?}");
                 }
                 assert!(!is_zero(&eval::<3, SkinTension, T>([A, B, C], scale, &[rest, beta])));
-                // A sliver of a thousandth is no degenerate shape.
+                // A sliver of relative width 1e-3 is not degenerate.
                 let mut sliver = lerp(0.5);
                 sliver[0] += 1e-3;
                 assert!(!is_zero(&eval::<3, SkinTension, T>([A, B, sliver], scale, &[rest, beta])));
@@ -71,7 +72,7 @@ fn tetrahedra<T: Scalar>() {
             let rest = rest * scale.powi(3);
             assert!(is_zero(&eval::<4, Volume, T>([A, A, A, A], scale, &[rest])));
             assert!(is_zero(&eval::<4, Volume, T>([A, B, A, B], scale, &[rest])));
-            // In a plane the volume is 0, but its gradient is not: it points out of the plane.
+            // In a plane the volume is 0, but its gradient is not. It points out of the plane.
             let flat = eval::<4, Volume, T>([A, B, C, A], scale, &[rest]);
             assert!(!is_zero(&flat));
             assert_eq!(flat.c.to_f64(), -T::constant(rest).to_f64());
@@ -80,26 +81,26 @@ fn tetrahedra<T: Scalar>() {
 }
 
 #[test]
-fn degenerate_edges() {
+fn degenerate_edges_are_finite() {
     edges::<f32>();
     edges::<f64>();
 }
 
 #[test]
-fn degenerate_triangles() {
+fn degenerate_triangles_are_finite() {
     triangles::<f32>();
     triangles::<f64>();
 }
 
 #[test]
-fn degenerate_tetrahedra() {
+fn degenerate_tetrahedra_are_finite() {
     tetrahedra::<f32>();
     tetrahedra::<f64>();
 }
 
-/// With no rest area there is no stretch to amplify: a plain area constraint remains.
+/// Without a rest area there is no stretch to amplify, and a plain area constraint remains.
 #[test]
-fn rest_area_of_zero_is_not_amplified() {
+fn a_zero_rest_area_is_not_amplified() {
     let plain = eval::<3, SkinTension, f64>([A, B, C], 1.0, &[0.0, 0.0]);
     assert_eq!(eval::<3, SkinTension, f64>([A, B, C], 1.0, &[0.0, 1e6]), plain);
     assert_eq!(eval::<3, SkinTensionPaper, f64>([A, B, C], 1.0, &[0.0, 1e6, 1e9]).c, plain.c);

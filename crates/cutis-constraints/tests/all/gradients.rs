@@ -1,4 +1,5 @@
-//! Gradients against finite differences; they conserve momentum; the energy form is what it says.
+//! Gradients agree with finite differences and conserve momentum. The energy form is the gradient
+//! of its energy.
 
 use cutis_constraints::{Constraint, Distance, Eval, SkinTension, SkinTensionPaper, Volume};
 use nalgebra::{Point3, Vector3};
@@ -7,7 +8,7 @@ use proptest::prelude::*;
 use crate::checks::{gradient_error, gradient_size, momentum_error, torque_error, with};
 use crate::shapes::{Shape, shape};
 
-/// Bound on the error against finite differences; the negative controls are off by 1e-3 or more.
+/// Bound on the error against finite differences. The negative controls are off by 1e-3 or more.
 const EXACT: f64 = 1e-6;
 /// Bound on the momentum that rounding creates.
 const ROUNDING: f64 = 1e-12;
@@ -16,7 +17,8 @@ fn area(x: &[Point3<f64>; 3]) -> f64 {
     (x[1] - x[0]).cross(&(x[2] - x[0])).norm() / 2.0
 }
 
-/// Whether `eval` has the gradient of its value and conserves momentum, and whether the checks see it if not.
+/// Checks that `eval` returns the gradient of its value and conserves momentum, and that these
+/// checks notice wrong gradients.
 fn check<const N: usize>(eval: &impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shape: &Shape<N>) {
     let grad = eval(&shape.x).grad;
     let error = gradient_error(eval, shape);
@@ -26,7 +28,8 @@ fn check<const N: usize>(eval: &impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shap
     let error = torque_error(&grad, shape);
     assert!(error < ROUNDING, "torque of {error}");
 
-    // Negative controls: a sign, a factor of 1.001, and a couple that the sum does not show.
+    // Negative controls: a wrong sign, a factor of 1.001, and a couple that is invisible in the
+    // sum.
     let altered = |alter: &dyn Fn(&mut [Vector3<f64>; N])| {
         let mut eval = eval(&shape.x);
         alter(&mut eval.grad);
@@ -49,7 +52,8 @@ fn check<const N: usize>(eval: &impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shap
     assert!(torque_error(&couple, shape) > 1e-6);
 }
 
-/// Rest size over current size, not so near 1 that a difference straddles the kink of `max(0, C)`.
+/// Rest size over current size, not so near 1 that a finite difference straddles the kink of
+/// `max(0, C)`.
 fn rest_ratio() -> impl Strategy<Value = f64> {
     prop_oneof![0.1..0.9f64, 1.1..5.0]
 }
@@ -70,13 +74,14 @@ proptest! {
         check(&with::<3, SkinTension>([ratio * area(&shape.x), beta]), &shape);
     }
 
-    /// Where nothing is amplified, the paper form is the area constraint.
+    /// Where nothing is amplified, the paper form is the plain area constraint.
     #[test]
     fn paper_form_gradient(shape in shape::<3>(), ratio in 1.1..5.0f64, beta in 0.0..100.0f64) {
         check(&with::<3, SkinTensionPaper>([ratio * area(&shape.x), beta, f64::MAX]), &shape);
     }
 
-    /// `Ĉ ∇Ĉ` is the gradient of `U = ½C² + β max(0, C)³/(3 A0)` and the published force `C F ∇A`.
+    /// `Ĉ ∇Ĉ` is the gradient of `U = ½C² + β max(0, C)³/(3 A0)` and equals the published force
+    /// `C F ∇A`.
     #[test]
     fn energy_form_is_the_gradient_of_the_energy(
         shape in shape::<3>(), ratio in rest_ratio(), beta in 0.0..100.0f64,
@@ -95,7 +100,8 @@ proptest! {
         let difference: [Vector3<f64>; 3] = std::array::from_fn(|i| published[i] - ours[i]);
         prop_assert!(gradient_size(&difference) < 1e-12 * gradient_size(&ours));
 
-        // Negative control: without the derivative of q the force is another one, wherever there is amplification.
+        // Negative control: without the derivative of q the force differs wherever `C` is
+        // amplified.
         if ratio < 1.0 && beta > 0.1 {
             let without = |x: &[Point3<f64>; 3]| {
                 let c = SkinTension::eval(x, &[rest_area, beta]).c;

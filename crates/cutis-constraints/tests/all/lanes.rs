@@ -1,15 +1,17 @@
-//! SIMD lanes give the same bits as scalars, each lane by itself.
+//! Each SIMD lane has the bits of a scalar evaluation, independent of the other lanes.
 
 use cutis_constraints::{Constraint, Distance, Params, Real, Scalar, SkinTension, SkinTensionPaper, Volume};
 use nalgebra::{Point3, SimdValue};
 use simba::simd::{AutoF32x8, WideF32x4, WideF32x8, WideF64x4};
 
-use crate::shapes::{Random, SCALES};
+use cutis_test_kit::Random;
 
-/// Evaluations of one vector each.
+use crate::shapes::SCALES;
+
+/// Number of SIMD evaluations.
 const ROUNDS: usize = 200;
 
-/// Shapes of every kind: random at three scales, and each third one degenerate.
+/// Random shapes at three scales. Every third one is degenerate, in one of three ways.
 fn shape<const N: usize>(random: &mut Random, number: usize) -> [Point3<f64>; N] {
     let scale = SCALES[number % 3];
     let mut x: [Point3<f64>; N] = std::array::from_fn(|_| random.point() * scale);
@@ -22,7 +24,7 @@ fn shape<const N: usize>(random: &mut Random, number: usize) -> [Point3<f64>; N]
     x
 }
 
-/// Bits of value and gradient, lane by lane; any NaN fails.
+/// Bits of value and gradient. A value that is not finite fails.
 fn bits<S: Scalar>(c: S, grad: impl IntoIterator<Item = S>) -> Vec<u64> {
     let numbers: Vec<f64> = std::iter::once(c).chain(grad).map(Scalar::to_f64).collect();
     assert!(numbers.iter().all(|v| v.is_finite()), "{numbers:?}");
@@ -35,13 +37,14 @@ where
     S: Scalar,
     L: Real + SimdValue<Element = S>,
 {
-    let mut random = Random(7);
-    let mut mixed_up = 0;
+    let mut random = Random::new(7);
+    let mut equal_to_next = 0;
     for round in 0..ROUNDS {
         let shapes: Vec<[Point3<S>; N]> = (0..L::LANES)
             .map(|lane| shape(&mut random, round * L::LANES + lane).map(|p| p.map(S::constant)))
             .collect();
-        // Rest sizes from 0 to beyond the shape's, so that lanes differ in the side of every selection.
+        // Rest sizes from 0 to more than the present size, so that lanes take both sides of every
+        // `select`.
         let factors: Vec<f64> = (0..L::LANES).map(|_| (random.uniform() * 4.0).floor() * 0.3).collect();
         let scalar_params: Vec<C::Params<S>> = (0..L::LANES)
             .map(|lane| {
@@ -60,7 +63,7 @@ where
                 }
             }
         }
-        let wide_params = <C::Params<L> as Params<L>>::from_fn(|k| {
+        let lane_params = <C::Params<L> as Params<L>>::from_fn(|k| {
             let mut value = L::zero();
             for (lane, params) in scalar_params.iter().enumerate() {
                 value.replace(lane, params.as_ref()[k]);
@@ -68,22 +71,23 @@ where
             value
         });
 
-        let wide = C::eval(&x, &wide_params);
+        let in_lanes = C::eval(&x, &lane_params);
         let of_lane = |lane: usize| {
             bits(
-                wide.c.extract(lane),
-                wide.grad.iter().flatten().map(|v| v.extract(lane)).collect::<Vec<_>>(),
+                in_lanes.c.extract(lane),
+                in_lanes.grad.iter().flatten().map(|v| v.extract(lane)).collect::<Vec<_>>(),
             )
         };
         for lane in 0..L::LANES {
             let scalar = C::eval(&shapes[lane], &scalar_params[lane]);
             let scalar = bits(scalar.c, scalar.grad.iter().flatten().copied().collect::<Vec<_>>());
             assert_eq!(of_lane(lane), scalar, "{} round {round} lane {lane}", C::NAME);
-            mixed_up += usize::from(of_lane((lane + 1) % L::LANES) == scalar);
+            equal_to_next += usize::from(of_lane((lane + 1) % L::LANES) == scalar);
         }
     }
-    // Negative control: the next lane holds another shape; only degenerate ones may look the same.
-    assert!(mixed_up < ROUNDS * L::LANES / 10, "{mixed_up}");
+    // Negative control: the next lane holds another shape. Only degenerate ones may give equal
+    // bits.
+    assert!(equal_to_next < ROUNDS * L::LANES / 10, "{equal_to_next}");
 }
 
 fn check_types<const N: usize, C: Constraint<N>>(params: &[f64]) {

@@ -1,8 +1,10 @@
-//! Tests of the constraints: gradients, conservation, precision, lanes, degenerate shapes, stability, materials.
-#![allow(clippy::print_stdout)] // figures for whoever runs the test with --nocapture
+//! Tests of the constraints: gradients, conservation, precision, SIMD lanes, degenerate shapes,
+//! stability, materials, and the numbers of the errata page.
+#![allow(clippy::print_stdout)] // measured values for runs with --nocapture
 
 mod checks;
 mod degenerate;
+mod errata;
 mod gradients;
 mod lanes;
 mod material;

@@ -1,4 +1,4 @@
-//! `f32` against `f64` on the same numbers.
+//! Evaluations in `f32` agree with `f64` on the same numbers.
 
 use cutis_constraints::{Constraint, Distance, Eval, SkinTension, SkinTensionPaper, Volume};
 use nalgebra::Vector3;
@@ -7,7 +7,8 @@ use proptest::prelude::*;
 use crate::checks::single_error;
 use crate::shapes::{Shape, shape};
 
-/// In units of the machine epsilon of `f32`; shapes are at worst some twenty times flatter than long.
+/// Bound in units of the machine epsilon of `f32`. The shapes are at worst about twenty times
+/// longer than they are thick.
 const BOUND: f64 = 400.0 * f32::EPSILON as f64;
 
 fn check<const N: usize, const K: usize, C>(shape: &Shape<N>, params: [f64; K])
@@ -22,7 +23,7 @@ where
     let error = single_error(&single, &double, shape.scale);
     assert!(error < BOUND, "{}: {error}", C::NAME);
 
-    // Negative controls: a value and a gradient that are off by 1e-3 of their sizes.
+    // Negative controls: a value and a gradient with an error of 1e-3 of their sizes.
     let size = double.grad.iter().map(Vector3::norm).fold(0.0, f64::max);
     let off = Eval { c: single.c + (1e-3 * size * shape.scale) as f32, grad: single.grad };
     assert!(single_error(&off, &double, shape.scale) > BOUND);

@@ -1,4 +1,5 @@
-//! One projection: removes the error to first order at every scale, never shoots past, needs the 1/6.
+//! One projection removes the error to first order at every scale and does not overshoot. The
+//! volume gradient needs the factor 1/6.
 
 use cutis_constraints::{Constraint, Distance, Eval, SkinTension, SkinTensionMaterial, SkinTensionPaper};
 use cutis_constraints::{SkinTensionPaperMaterial, Volume};
@@ -8,27 +9,28 @@ use proptest::prelude::*;
 use crate::checks::project;
 use crate::shapes::{SCALES, shape};
 
-/// Regular tetrahedron or triangle with its center at the origin.
+/// A regular tetrahedron centered at the origin.
 fn regular(scale: f64) -> [Point3<f64>; 4] {
     [[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]]
         .map(|p| Point3::from(p) * scale)
 }
 
-/// Share of the error `C` that one projection leaves.
-fn left_over<const N: usize>(eval: impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, x: &[Point3<f64>; N]) -> f64 {
+/// Fraction of the error `C` that remains after one projection.
+fn remaining<const N: usize>(eval: impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, x: &[Point3<f64>; N]) -> f64 {
     let before = eval(x);
     eval(&project(x, &[1.0; N], &before)).c / before.c
 }
 
-/// The gradient without the 1/6, as in a widely copied implementation, is six times too long: 5/6 of the error stay.
+/// Without the 1/6, as in a widely copied implementation, the gradient is six times too long and
+/// 5/6 of the error remain.
 #[test]
 fn volume_gradient_without_the_sixth_leaves_83_percent() {
     for scale in SCALES {
         let x = regular(scale);
         let volume = Volume::eval(&x, &[0.0]).c;
         let params = [volume / 1.001];
-        let right = left_over(|x| Volume::eval(x, &params), &x);
-        let wrong = left_over(
+        let right = remaining(|x| Volume::eval(x, &params), &x);
+        let wrong = remaining(
             |x| {
                 let Eval { c, grad } = Volume::eval(x, &params);
                 Eval { c, grad: grad.map(|g| g * 6.0) }
@@ -41,7 +43,7 @@ fn volume_gradient_without_the_sixth_leaves_83_percent() {
 }
 
 #[test]
-fn unit_tetrahedron_has_a_sixth_of_the_cube() {
+fn a_unit_tetrahedron_has_a_sixth_of_the_cube() {
     let x: [Point3<f64>; 4] = [
         Point3::origin(),
         Point3::new(1.0, 0.0, 0.0),
@@ -55,9 +57,9 @@ fn unit_tetrahedron_has_a_sixth_of_the_cube() {
     assert!((Volume::eval(&mirrored, &[0.0]).c + 1.0 / 6.0).abs() < 1e-16);
 }
 
-/// A distance is linear along its gradient: one projection ends at the rest length, whatever the masses.
+/// A distance is linear along its gradient. One projection ends at the rest length for any masses.
 #[test]
-fn distance_projection_is_exact() {
+fn a_distance_projection_is_exact() {
     for scale in SCALES {
         let x = [Point3::origin(), Point3::new(2.0, 1.0, -2.0) * scale];
         let params = [scale];
@@ -67,9 +69,9 @@ fn distance_projection_is_exact() {
     }
 }
 
-/// The paper form with its clamp removes at most the whole error; without the clamp it shoots past.
+/// The clamped paper form removes at most the whole error. Without the clamp it overshoots.
 #[test]
-fn paper_form_with_its_clamp_takes_at_most_a_newton_step() {
+fn the_clamped_paper_form_takes_at_most_a_newton_step() {
     let x: [Point3<f64>; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.2, 0.9, 0.0]].map(Point3::from);
     for stiffness in [0.1, 0.5, 1.0] {
         let material = SkinTensionPaperMaterial::for_stiffness(stiffness, 0.1, 1e6).unwrap();
@@ -83,7 +85,7 @@ fn paper_form_with_its_clamp_takes_at_most_a_newton_step() {
 }
 
 #[test]
-fn rest_scale_sets_the_pretension() {
+fn the_rest_scale_sets_the_pretension() {
     let x: [Point3<f64>; 3] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]].map(Point3::from);
     let material = SkinTensionMaterial { rest_area_scale: 0.9, amplification: 2.0 };
     let params = SkinTension::from_rest(&x, &material);
@@ -93,10 +95,10 @@ fn rest_scale_sets_the_pretension() {
 }
 
 proptest! {
-    /// One vertex moves along its own height, so the area changes linearly: `Ĉ` must be increasing and its
-    /// projection must stop short of the rest area.
+    /// One vertex moves along its own height, so the area changes linearly. `Ĉ` must increase with
+    /// the area, and its projection must stop short of the rest area.
     #[test]
-    fn energy_form_stops_short_of_the_rest_area(
+    fn the_energy_form_stops_short_of_the_rest_area(
         shape in shape::<3>(), stretch in 1.0..1e4f64, beta in 0.0..1e6f64,
     ) {
         let area = SkinTension::eval(&shape.x, &[0.0, 0.0]).c;
@@ -105,13 +107,13 @@ proptest! {
         let moved = project(&shape.x, &[1.0, 0.0, 0.0], &before);
         let after = SkinTension::eval(&moved, &params);
         prop_assert!(after.c <= before.c && after.c >= -1e-12 * area, "{} {}", before.c, after.c);
-        // Convex: the slope is no steeper where the area is smaller.
+        // `Ĉ` is convex: a smaller area has no larger slope.
         prop_assert!(after.grad[0].norm() <= before.grad[0].norm() * (1.0 + 1e-12));
     }
 
-    /// Negative control of the above: the amplified error along the plain gradient shoots past.
+    /// Negative control of the test above: the amplified error along the plain gradient overshoots.
     #[test]
-    fn unclamped_paper_form_shoots_past(shape in shape::<3>(), stretch in 2.0..1e4f64, beta in 1.0..1e6f64) {
+    fn the_unclamped_paper_form_overshoots(shape in shape::<3>(), stretch in 2.0..1e4f64, beta in 1.0..1e6f64) {
         let area = SkinTension::eval(&shape.x, &[0.0, 0.0]).c;
         let params = [area / stretch, beta, f64::MAX];
         let before = SkinTensionPaper::eval(&shape.x, &params);

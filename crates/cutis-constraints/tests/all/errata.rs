@@ -1,24 +1,24 @@
-//! The figures of `docs/book/errata.md`: Algorithm 1 of the skin-tension paper as printed, against what we do instead.
+//! The numbers of `docs/book/errata.md`: Algorithm 1 of the skin tension paper as printed, compared
+//! with the two forms of Cutis.
 //!
-//! `cargo test -p cutis-constraints --test errata -- --nocapture --test-threads=1` prints them.
+//! `cargo test -p cutis-constraints --test all errata -- --nocapture --test-threads=1` prints them.
 //! Source: DOI 10.15701/kcgs.2025.31.4.21, Algorithm 1.
-#![allow(clippy::print_stdout)] // figures for whoever runs the test with --nocapture
 
 use cutis_constraints::{Constraint, Eval, SkinTension, SkinTensionPaper};
 use nalgebra::{Point3, Vector3};
 
 type Triangle = [Point3<f64>; 3];
 
-/// Which of its gradients Algorithm 1 uses.
+/// The gradients to use in Algorithm 1.
 #[derive(Clone, Copy, PartialEq)]
 enum Gradients {
-    /// As printed: wrong sign at the third vertex, and `4A` times too long.
+    /// As printed: the wrong sign at the third vertex, and `4A` times too long.
     Printed,
-    /// The sign at the third vertex put right, the length left as printed.
-    SignPutRight,
+    /// With the correct sign at the third vertex, and the length as printed.
+    CorrectSign,
 }
 
-/// Corrections `ΔP_i` of Algorithm 1 with inverse masses `w`, line by line.
+/// The corrections `ΔP_i` of Algorithm 1 with inverse masses `w`, line by line.
 fn algorithm_1(
     gradients: Gradients,
     [p1, p2, p3]: &Triangle,
@@ -33,7 +33,7 @@ fn algorithm_1(
     let amplification = 1.0 + beta * ((area - rest_area) / rest_area).max(0.0);
     let third = match gradients {
         Gradients::Printed => p2 - p1,
-        Gradients::SignPutRight => p1 - p2,
+        Gradients::CorrectSign => p1 - p2,
     };
     let grad = [(p2 - p3).cross(&n), (p3 - p1).cross(&n), third.cross(&n)];
     let denominator: f64 = (0..3).map(|i| w[i] * grad[i].norm_squared()).sum();
@@ -41,14 +41,14 @@ fn algorithm_1(
     std::array::from_fn(|i| grad[i] * (s * w[i]))
 }
 
-/// Corrections of PBD with stiffness 1 for an evaluated constraint.
+/// The corrections of PBD with stiffness 1.
 fn pbd(eval: &Eval<f64, 3>, w: [f64; 3]) -> [Vector3<f64>; 3] {
     let denominator: f64 = (0..3).map(|i| w[i] * eval.grad[i].norm_squared()).sum();
     std::array::from_fn(|i| eval.grad[i] * (-w[i] * eval.c / denominator))
 }
 
-/// The right gradient and the amplification as printed: the paper form without a clamp.
-fn right_gradient(x: &Triangle, w: [f64; 3], rest_area: f64, beta: f64) -> [Vector3<f64>; 3] {
+/// The correct gradient with the printed amplification: the paper form without a clamp.
+fn correct_gradient(x: &Triangle, w: [f64; 3], rest_area: f64, beta: f64) -> [Vector3<f64>; 3] {
     pbd(&SkinTensionPaper::eval(x, &[rest_area, beta, f64::MAX]), w)
 }
 
@@ -60,7 +60,7 @@ fn area(x: &Triangle) -> f64 {
     (x[1] - x[0]).cross(&(x[2] - x[0])).norm() / 2.0
 }
 
-/// The triangle of the tables at rest: (0, 0), (1, 0), (0.2, 0.9), times `edge` in m.
+/// The rest shape of the tables: (0, 0), (1, 0), (0.2, 0.9), times `edge` in m.
 fn rest_shape(edge: f64) -> Triangle {
     [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.2, 0.9, 0.0]].map(|p| Point3::from(p) * edge)
 }
@@ -69,18 +69,19 @@ fn equilateral() -> Triangle {
     [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.75f64.sqrt(), 0.0]].map(Point3::from)
 }
 
-/// `x` with every length scaled so that its area is `stretch` times as large.
+/// `x` scaled so that its area is `stretch` times as large.
 fn stretched(x: Triangle, stretch: f64) -> Triangle {
     x.map(|p| p * stretch.sqrt())
 }
 
 const ONES: [f64; 3] = [1.0; 3];
 
-fn assert_near(figure: f64, expected: f64, tolerance: f64) {
-    assert!((figure / expected - 1.0).abs() < tolerance, "{figure} is not {expected}");
+fn assert_near(value: f64, expected: f64, tolerance: f64) {
+    assert!((value / expected - 1.0).abs() < tolerance, "{value} is not {expected}");
 }
 
-/// Fault 1: the gradient at the third vertex has the wrong sign, so that the corrections do not sum to zero.
+/// Fault 1: the gradient at the third vertex has the wrong sign, so the corrections do not sum to
+/// zero.
 #[test]
 fn fault_1_as_printed_creates_momentum() {
     let x = stretched(rest_shape(1.0), 1.21);
@@ -90,12 +91,12 @@ fn fault_1_as_printed_creates_momentum() {
         sum.norm() / by.iter().map(Vector3::norm).sum::<f64>()
     };
     let printed = momentum(algorithm_1(Gradients::Printed, &x, ONES, rest_area, 1.0, 0.0));
-    let sign = momentum(algorithm_1(Gradients::SignPutRight, &x, ONES, rest_area, 1.0, 0.0));
-    let right = momentum(right_gradient(&x, ONES, rest_area, 0.0));
+    let sign = momentum(algorithm_1(Gradients::CorrectSign, &x, ONES, rest_area, 1.0, 0.0));
+    let right = momentum(correct_gradient(&x, ONES, rest_area, 0.0));
     println!(
-        "momentum |Σ m Δx| / Σ |m Δx|: as printed {printed:.3}, sign put right {sign:.0e}, ours {right:.0e}"
+        "momentum |Σ m Δx| / Σ |m Δx|: as printed {printed:.3}, correct sign {sign:.0e}, Cutis {right:.0e}"
     );
-    // The third correction is as long as edge 12 in proportion; turned round, it counts twice.
+    // The third correction is proportional to edge 12. Reversed, it counts twice.
     let [p1, p2, p3] = rest_shape(1.0);
     let (a, b, c) = ((p2 - p3).norm(), (p3 - p1).norm(), (p1 - p2).norm());
     assert_near(printed, 2.0 * c / (a + b + c), 1e-12);
@@ -103,12 +104,12 @@ fn fault_1_as_printed_creates_momentum() {
     assert!(sign < 1e-15 && right < 1e-15);
 }
 
-/// Fault 1, against finite differences: only the third gradient points the wrong way.
+/// Fault 1, compared with finite differences: only the third gradient points the wrong way.
 #[test]
 fn fault_1_is_at_the_third_corner() {
     let x = stretched(rest_shape(1.0), 1.21);
     let cosines = |gradients| {
-        // A stretched triangle is corrected against the gradient.
+        // The correction of a stretched triangle points against the gradient.
         let by = algorithm_1(gradients, &x, ONES, area(&rest_shape(1.0)), 1.0, 0.0);
         std::array::from_fn::<f64, 3, _>(|i| {
             let step = 1e-6;
@@ -125,7 +126,7 @@ fn fault_1_is_at_the_third_corner() {
     };
     for (gradients, name, expected) in [
         (Gradients::Printed, "as printed", [1.0, 1.0, -1.0]),
-        (Gradients::SignPutRight, "sign put right", [1.0, 1.0, 1.0]),
+        (Gradients::CorrectSign, "with correct sign", [1.0, 1.0, 1.0]),
     ] {
         let cosines = cosines(gradients);
         println!("cosine between gradient {name} and true gradient, corners 1 to 3: {cosines:.6?}");
@@ -135,19 +136,19 @@ fn fault_1_is_at_the_third_corner() {
     }
 }
 
-/// Fault 2: the gradients are `4A` times too long, so that the correction is `1/(4A)` of a Newton step.
+/// Fault 2: the gradients are `4A` times too long, so the correction is `1/(4A)` of a Newton step.
 #[test]
 fn fault_2_as_printed_depends_on_the_unit_of_length() {
-    println!("area stretched by 21 %, one projection, k = 1, β = 0; area/rest area − 1 afterwards:");
-    println!("edge in m   as printed   sign put right   right gradient   energy form");
+    println!("area stretched by 21 %, one projection, k = 1, β = 0; area/rest area − 1 after it:");
+    println!("edge in m   as printed   correct sign     correct gradient energy form");
     let rows = [1e-3, 1.0, 1e3].map(|edge| {
         let x = stretched(rest_shape(edge), 1.21);
         let rest_area = area(&rest_shape(edge));
         let left = |by| area(&moved(&x, by)) / rest_area - 1.0;
         let row = [
             left(algorithm_1(Gradients::Printed, &x, ONES, rest_area, 1.0, 0.0)),
-            left(algorithm_1(Gradients::SignPutRight, &x, ONES, rest_area, 1.0, 0.0)),
-            left(right_gradient(&x, ONES, rest_area, 0.0)),
+            left(algorithm_1(Gradients::CorrectSign, &x, ONES, rest_area, 1.0, 0.0)),
+            left(correct_gradient(&x, ONES, rest_area, 0.0)),
             left(pbd(&SkinTension::eval(&x, &[rest_area, 0.0]), ONES)),
         ];
         println!("{edge:9.0e}   {:10.4e}   {:14.4e}   {:14.4}   {:11.4}", row[0], row[1], row[2], row[3]);
@@ -166,7 +167,8 @@ fn fault_2_as_printed_depends_on_the_unit_of_length() {
     }
 }
 
-/// Areas over the rest area of a triangle that starts at `stretch`, projection by projection, until it is beyond 1e6.
+/// Area over rest area after each projection of a triangle that starts at `stretch`. Stops when the
+/// area is above 1e6 or not a number.
 fn areas(x: &Triangle, stretch: f64, step: impl Fn(&Triangle, f64) -> [Vector3<f64>; 3]) -> Vec<f64> {
     let rest_area = area(x);
     let mut x = stretched(*x, stretch);
@@ -181,8 +183,9 @@ fn areas(x: &Triangle, stretch: f64, step: impl Fn(&Triangle, f64) -> [Vector3<f
     areas
 }
 
-/// A row of the table of fault 3: `β`, `A/A0` at the start, and `A/A0` after the first projections of the three forms.
-struct Row {
+/// A row of the table of fault 3: `β`, `A/A0` at the start, and `A/A0` after the first projections
+/// of the three forms.
+struct AreaSeries {
     beta: f64,
     stretch: f64,
     diverges: bool,
@@ -192,9 +195,9 @@ struct Row {
 }
 
 const PLAIN: &[f64] = &[3.025, 1.3389, 1.0214];
-const ROWS: [Row; 4] = [
-    Row { beta: 0.0, stretch: 10.0, diverges: false, printed: PLAIN, paper: PLAIN, energy: PLAIN },
-    Row {
+const SERIES: [AreaSeries; 4] = [
+    AreaSeries { beta: 0.0, stretch: 10.0, diverges: false, printed: PLAIN, paper: PLAIN, energy: PLAIN },
+    AreaSeries {
         beta: 1.0,
         stretch: 1.5,
         diverges: false,
@@ -202,7 +205,7 @@ const ROWS: [Row; 4] = [
         paper: &[1.0417, 1.0004],
         energy: &[1.0885, 1.0041],
     },
-    Row {
+    AreaSeries {
         beta: 1.0,
         stretch: 10.0,
         diverges: true,
@@ -210,7 +213,7 @@ const ROWS: [Row; 4] = [
         paper: PLAIN,
         energy: &[4.6923, 2.3637, 1.3906],
     },
-    Row {
+    AreaSeries {
         beta: 5.0,
         stretch: 1.5,
         diverges: true,
@@ -220,17 +223,15 @@ const ROWS: [Row; 4] = [
     },
 ];
 
-/// Fault 3: the amplification multiplies the step, so that it shoots past; with the right gradient as well.
+/// Fault 3: the amplification multiplies the step, which overshoots even with the correct gradient.
 #[test]
 fn fault_3_amplification_diverges() {
-    println!(
-        "equilateral triangle, k = 1, right gradient; areas over the rest area, projection by projection:"
-    );
-    for Row { beta, stretch, diverges, printed, paper, energy } in ROWS {
+    println!("equilateral triangle, k = 1, correct gradient; area over rest area after each projection:");
+    for AreaSeries { beta, stretch, diverges, printed, paper, energy } in SERIES {
         println!("β = {beta}, A/A0 = {stretch} at the start");
         let x = equilateral();
         let forms = [
-            ("as printed", printed, areas(&x, stretch, |x, rest| right_gradient(x, ONES, rest, beta))),
+            ("as printed", printed, areas(&x, stretch, |x, rest| correct_gradient(x, ONES, rest, beta))),
             (
                 "paper form",
                 paper,
