@@ -1,6 +1,6 @@
-//! What can be wrong with constraints, colors or groups.
+//! The errors of this crate.
 
-/// Why constraints could not be grouped, or why groups are not a valid coloring of them.
+/// Invalid constraints, colors or groups, or a lack of memory.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ColoringError {
@@ -11,7 +11,7 @@ pub enum ColoringError {
     VertexOutOfRange {
         /// Index of the constraint.
         constraint: usize,
-        /// The vertex that it names.
+        /// The vertex.
         vertex: u32,
         /// Number of vertices.
         vertex_count: usize,
@@ -21,35 +21,35 @@ pub enum ColoringError {
     RepeatedVertex {
         /// Index of the constraint.
         constraint: usize,
-        /// The vertex that is named twice.
+        /// The repeated vertex.
         vertex: u32,
     },
-    /// More constraints than a `u32` can number.
+    /// There are more constraints than a `u32` can number.
     #[error("{count} constraints; at most {limit} can be numbered in 32 bits")]
     TooManyConstraints {
         /// Number of constraints.
         count: usize,
-        /// The most that are allowed.
+        /// The largest allowed number.
         limit: usize,
     },
-    /// More vertices than a `u32` can number.
+    /// There are more vertices than a `u32` can number.
     #[error("{count} vertices; at most {limit} can be numbered in 32 bits")]
     TooManyVertices {
         /// Number of vertices.
         count: usize,
-        /// The most that are allowed.
+        /// The largest allowed number.
         limit: usize,
     },
-    /// The memory for the working arrays could not be had.
-    #[error("no memory for {bytes} bytes of working arrays")]
+    /// The working arrays could not be allocated.
+    #[error("cannot allocate {bytes} bytes for the working arrays")]
     OutOfMemory {
-        /// Size of the array that was refused.
+        /// Size of the array that could not be allocated.
         bytes: usize,
     },
-    /// The offsets do not cut `order` into consecutive groups.
+    /// The offsets do not divide `order` into consecutive groups.
     #[error(
-        "group offsets must start at 0, never fall, and end at {order_len}, the length of the order; \
-         offset {position} is wrong"
+        "offset {position} of the groups is wrong; offsets must start at 0, never decrease, and end at \
+         {order_len}, the length of the order"
     )]
     BrokenOffsets {
         /// Position of the first wrong offset.
@@ -59,19 +59,19 @@ pub enum ColoringError {
     },
     /// The order does not name each constraint exactly once.
     #[error(
-        "the order must name each of the {count} constraints exactly once; entry {position} names constraint {constraint}, \
-         which is out of range or named before"
+        "entry {position} of the order names constraint {constraint}, which is out of range or already \
+         named; the order must name each of the {count} constraints exactly once"
     )]
     NotAPermutation {
         /// Position in the order.
         position: usize,
-        /// The constraint named there.
+        /// The constraint at this position.
         constraint: u32,
         /// Number of constraints.
         count: usize,
     },
-    /// The order holds more or fewer entries than there are constraints.
-    #[error("the order holds {order_len} entries for {count} constraints")]
+    /// The number of entries in the order differs from the number of constraints.
+    #[error("the order has {order_len} entries; expected one for each of {count} constraints")]
     WrongLength {
         /// Length of the order.
         order_len: usize,
@@ -79,7 +79,7 @@ pub enum ColoringError {
         count: usize,
     },
     /// Two constraints of one group share a vertex.
-    #[error("constraints {first} and {second}, both of group {group}, share vertex {vertex}")]
+    #[error("constraints {first} and {second} of group {group} share vertex {vertex}")]
     Clash {
         /// The group (color).
         group: usize,
@@ -87,19 +87,20 @@ pub enum ColoringError {
         first: u32,
         /// The constraint that comes later in the group.
         second: u32,
-        /// The vertex that they share.
+        /// The shared vertex.
         vertex: u32,
     },
-    /// Groups of vertices do not name each vertex that moves exactly once, and no other.
+    /// Groups of vertices must name each moving vertex exactly once, and no fixed vertex.
     #[error(
-        "groups of vertices must name each vertex that moves once, and no other; vertex {vertex} is named wrongly or not at all"
+        "vertex {vertex} is missing, repeated or fixed; groups of vertices must name each moving vertex \
+         exactly once and no other vertex"
     )]
     WrongVertex {
         /// The vertex.
         vertex: u32,
     },
-    /// Two vertices of one group are in one constraint.
-    #[error("vertices {first} and {second}, both of group {group}, are in constraint {constraint}")]
+    /// Two vertices of one group are in the same constraint.
+    #[error("vertices {first} and {second} of group {group} are both in constraint {constraint}")]
     VertexClash {
         /// The group (color).
         group: usize,
@@ -107,7 +108,7 @@ pub enum ColoringError {
         first: u32,
         /// A later vertex of the constraint.
         second: u32,
-        /// The constraint, counted within its kind.
+        /// Index of the constraint within its kind.
         constraint: usize,
     },
 }

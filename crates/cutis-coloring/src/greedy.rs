@@ -1,34 +1,38 @@
-//! Greedy first-fit on vertex bitmasks, 64 colors to a round.
+//! Greedy first-fit on bit masks of the vertices, in rounds of 64 colors.
 
 use crate::sort::{self, INDEX_LIMIT, check_constraint_count, filled};
 use crate::{ColoringError, Groups};
 
-/// Colors of one round: the bits of a vertex mask.
+/// Colors per round: the number of bits in a vertex mask.
 const ROUND: usize = u64::BITS as usize;
 
-/// Colors constraints over `N` vertices each by greedy first-fit: in the order given, each constraint takes the
-/// lowest color that no earlier constraint with a common vertex has.
+/// Colors constraints over `N` vertices by greedy first-fit: in the given order, each constraint
+/// takes the lowest color that no earlier constraint with a common vertex has.
 ///
-/// A constraint never needs more than `1 + N·(d − 1)` colors, where `d` is the largest number of constraints at one
-/// vertex. The number of colors is not limited.
+/// A constraint needs at most `1 + N·(d − 1)` colors, where `d` is the largest number of
+/// constraints at one vertex. The number of colors is not limited.
 ///
 /// # Method
-/// Each vertex carries a mask of 64 bits with the colors of its constraints so far; a constraint takes the lowest bit
-/// that is clear in the union of its vertices' masks. A constraint that finds all 64 taken is deferred to a next round
-/// with fresh masks, which stand for the next 64 colors.
+/// Each vertex has a mask of 64 bits with the colors of its constraints so far. A constraint takes
+/// the lowest bit that is clear in the union of its vertices' masks. A constraint that finds all 64
+/// bits set is deferred to the next round. That round uses fresh masks, which stand for the next 64
+/// colors.
 ///
-/// This is first-fit without a limit. A deferred constraint has an earlier neighbor in each of the 64 colors of its
-/// round, so first-fit too gives it a later one; and as it takes none of these 64, it takes none from the
-/// constraints after it. Hence the colors of a round are those of first-fit, and first-fit among the deferred
-/// constraints, which come in their original order, gives the rest.
+/// The result equals first-fit without a limit. A deferred constraint has an earlier neighbor in
+/// each of the 64 colors of its round, so first-fit would also give it a later color. It takes none
+/// of these 64 colors away from the constraints after it. The colors of a round are therefore those
+/// of first-fit. The deferred constraints keep their order, and the next rounds apply first-fit to
+/// them.
 ///
 /// # Cost
-/// One pass over the constraints for each 64 colors; 8 bytes per vertex and 1 byte per constraint besides the result.
-/// A constraint list in which one vertex has `d` constraints costs at least `d²/128` mask look-ups.
+/// One pass over the constraints for each 64 colors; 8 bytes per vertex and 1 byte per constraint
+/// in addition to the result. If one vertex has `d` constraints, there are at least `d²/128` mask
+/// look-ups.
 ///
 /// # Errors
-/// [`ColoringError::VertexOutOfRange`], [`ColoringError::RepeatedVertex`], [`ColoringError::TooManyConstraints`],
-/// [`ColoringError::TooManyVertices`] and [`ColoringError::OutOfMemory`].
+/// [`ColoringError::VertexOutOfRange`], [`ColoringError::RepeatedVertex`],
+/// [`ColoringError::TooManyConstraints`], [`ColoringError::TooManyVertices`] and
+/// [`ColoringError::OutOfMemory`].
 pub fn greedy<const N: usize>(
     constraints: &[[u32; N]],
     vertex_count: usize,
@@ -52,7 +56,8 @@ pub fn greedy<const N: usize>(
     sort::by_key(0..constraints.len() as u32, keys, &counts, &mut groups.order);
     groups.close_round(&counts[..ROUND]);
 
-    // What a round defers lies, in ascending order, at the end of `order`: the next round sorts it in its place.
+    // The deferred constraints are at the end of `order`, in ascending order. The next round sorts
+    // them in place.
     while counts[ROUND] > 0 {
         let start = groups.order.len() - counts[ROUND] as usize;
         let deferred = groups.order[start..].to_vec();
@@ -63,7 +68,7 @@ pub fn greedy<const N: usize>(
         }
         counts.fill(0);
         for (color, &i) in colors.iter_mut().zip(&deferred) {
-            // Out of range is out of question: the first round has seen every vertex.
+            // No vertex is out of range, because the first round has checked them all.
             *color = first_fit(&mut masks, &constraints[i as usize]).unwrap_or(ROUND as u8);
             counts[usize::from(*color)] += 1;
         }
@@ -74,7 +79,8 @@ pub fn greedy<const N: usize>(
     Ok(groups)
 }
 
-/// Takes the lowest color that is free at all `vertices`, or [`ROUND`] if none is; `None` if a vertex is out of range.
+/// Takes the lowest color that is free at all `vertices`, or [`ROUND`] if none is free. `None` if a
+/// vertex is out of range.
 #[inline(always)]
 fn first_fit<const N: usize>(masks: &mut [u64], vertices: &[u32; N]) -> Option<u8> {
     let mut taken = 0;

@@ -1,25 +1,27 @@
-//! Groups of constraints: one order and the offsets that cut it.
+//! Groups of constraints: an order of the constraints and the offsets of the groups in it.
 
 use crate::ColoringError;
 use crate::sort::{self, check_constraint_count, filled};
 
-/// Constraints cut into groups (colors), such that no two of a group share a vertex.
+/// Constraints divided into groups (colors) so that no two constraints of a group share a vertex.
 ///
-/// The constraints of group `c` are `order[offsets[c]..offsets[c + 1]]`, in ascending order. No group is empty.
-/// What the fields promise holds for groups made by this crate; for others, see [`verify`](Groups::verify).
+/// The constraints of group `c` are `order[offsets[c]..offsets[c + 1]]`, in ascending order. No
+/// group is empty. Groups made by this crate have these properties. Use [`verify`](Groups::verify)
+/// for others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Groups {
     /// Constraint indices, group after group.
     pub order: Vec<u32>,
-    /// Where each group starts, and at last the number of constraints: one entry more than there are groups.
+    /// Start of each group in `order`, followed by the number of constraints: one entry more than
+    /// there are groups.
     pub offsets: Vec<u32>,
 }
 
 impl Groups {
-    /// Groups from known colors, one per constraint, for example those of a lattice in closed form.
+    /// Groups from known colors, one per constraint, such as the closed-form colors of a lattice.
     ///
-    /// Groups follow ascending color; colors that nothing has are left out. Whether the colors are valid is for
-    /// [`verify`](Groups::verify) to say.
+    /// The groups are in the order of ascending color. Unused colors are skipped. This function
+    /// does not check whether the colors are valid; [`verify`](Groups::verify) does.
     ///
     /// # Errors
     /// [`ColoringError::TooManyConstraints`] and [`ColoringError::OutOfMemory`].
@@ -54,12 +56,12 @@ impl Groups {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Whether there is no group, hence no constraint.
+    /// Whether there is no group, and so no constraint.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Constraints of group `color`, in ascending order.
+    /// The constraints of group `color`, in ascending order.
     ///
     /// # Panics
     /// If `color` is not below [`len`](Groups::len).
@@ -67,7 +69,7 @@ impl Groups {
         &self.order[self.offsets[color] as usize..self.offsets[color + 1] as usize]
     }
 
-    /// The groups, one after the other.
+    /// Iterates over the groups in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[u32]> {
         (0..self.len()).map(|color| self.group(color))
     }
@@ -78,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn known_colors_are_sorted_stably_and_empty_ones_left_out() {
+    fn known_colors_are_sorted_stably_and_unused_ones_skipped() {
         let groups = Groups::from_colors(&[5, 0, 5, 65535, 0]).unwrap();
         assert_eq!(groups.order, [1, 4, 0, 2, 3]);
         assert_eq!(groups.offsets, [0, 2, 4, 5]);

@@ -1,14 +1,14 @@
-//! Which constraints a vertex is in: the lists of a kind of constraint, turned round.
+//! The constraints of each vertex: the inverse of the vertex lists of a kind of constraint.
 
 use crate::ColoringError;
 use crate::sort::{INDEX_LIMIT, filled};
 
-/// The vertices of all constraints of one kind: `arity` of them in a row.
+/// The vertices of all constraints of one kind, `arity` vertices per constraint.
 #[derive(Clone, Copy, Debug)]
 pub struct Tuples<'a> {
-    /// Vertex indices, constraint after constraint.
+    /// Vertex indices, one constraint after the other.
     pub vertices: &'a [u32],
-    /// Vertices of one constraint, 1 or more.
+    /// Vertices per constraint, 1 or more.
     pub arity: usize,
 }
 
@@ -18,14 +18,14 @@ impl<'a> Tuples<'a> {
         Self { vertices: constraints.as_flattened(), arity: N }
     }
 
-    /// The vertices of one constraint after the other.
+    /// Iterates over the vertices of each constraint.
     pub fn iter(self) -> impl Iterator<Item = &'a [u32]> {
         self.vertices.chunks_exact(self.arity.max(1))
     }
 }
 
-/// For each vertex its places in the [`Tuples`] of a kind, ascending. A place `p` is vertex `p % arity` of constraint
-/// `p / arity`.
+/// The places of each vertex in the [`Tuples`] of a kind, ascending. Place `p` is vertex
+/// `p % arity` of constraint `p / arity`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Incidence {
     starts: Vec<u32>,
@@ -33,11 +33,13 @@ pub struct Incidence {
 }
 
 impl Incidence {
-    /// Turns the lists of a kind round: one counting sort, 4 bytes per vertex and per place.
+    /// Inverts the vertex lists of a kind by one counting sort. Needs 4 bytes per vertex and per
+    /// place.
     ///
     /// # Errors
-    /// [`ColoringError::VertexOutOfRange`], [`ColoringError::TooManyVertices`], [`ColoringError::TooManyConstraints`] if
-    /// the places cannot be numbered in 32 bits, [`ColoringError::OutOfMemory`].
+    /// [`ColoringError::VertexOutOfRange`], [`ColoringError::TooManyVertices`],
+    /// [`ColoringError::TooManyConstraints`] if the places cannot be numbered in 32 bits, and
+    /// [`ColoringError::OutOfMemory`].
     pub fn new(tuples: Tuples<'_>, vertex_count: usize) -> Result<Self, ColoringError> {
         let Tuples { vertices, arity } = tuples;
         if vertices.len() > INDEX_LIMIT {
@@ -47,7 +49,8 @@ impl Incidence {
         if vertex_count > INDEX_LIMIT - 1 {
             return Err(ColoringError::TooManyVertices { count: vertex_count, limit: INDEX_LIMIT - 1 });
         }
-        // The start of vertex v stands at v + 1 while places are counted and handed out, and at v in the end.
+        // While places are counted and assigned, entry v + 1 belongs to vertex v. At the end, entry
+        // v is the start of vertex v.
         let mut starts = filled(0u32, vertex_count + 1)?;
         for (place, &vertex) in vertices.iter().enumerate() {
             let Some(count) = starts.get_mut(vertex as usize + 1) else {
@@ -71,27 +74,28 @@ impl Incidence {
         Ok(Self { starts, places })
     }
 
-    /// Places of `vertex`, ascending.
+    /// The places of `vertex`, ascending.
     ///
     /// # Panics
-    /// If there is no such vertex.
+    /// If `vertex` is out of range.
     #[inline]
     pub fn of(&self, vertex: u32) -> &[u32] {
         let v = vertex as usize;
         &self.places[self.starts[v] as usize..self.starts[v + 1] as usize]
     }
 
-    /// Where the places of each vertex start, and at last their number: one entry more than there are vertices.
+    /// Start of each vertex's places, followed by their number: one entry more than there are
+    /// vertices.
     pub fn starts(&self) -> &[u32] {
         &self.starts
     }
 
-    /// All places, vertex after vertex.
+    /// All places, one vertex after the other.
     pub fn places(&self) -> &[u32] {
         &self.places
     }
 
-    /// Bytes stored.
+    /// Stored bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.starts.as_slice()) + size_of_val(self.places.as_slice())
     }

@@ -1,12 +1,13 @@
 //! Graph coloring of constraints: index tuples in, groups without shared vertices out.
 //!
-//! Two constraints that share a vertex cannot be projected at the same time. A coloring gives each constraint a
-//! color so that constraints of one color share no vertex; a solver then runs color after color, and the
-//! constraints inside a color in any order or in parallel, with the same result bit for bit. This crate knows
-//! nothing of what the constraints mean.
+//! Two constraints that share a vertex cannot be projected at the same time. A coloring gives each
+//! constraint a color so that constraints of one color share no vertex. A solver processes one
+//! color after the other. It may project the constraints of a color in any order or in parallel,
+//! and the result has the same bits. The coloring only sees vertex indices, never the kind of a
+//! constraint.
 //!
-//! A solver that moves vertex after vertex instead needs groups of vertices, no two of which are in one constraint:
-//! [`greedy_vertices`], from the [`Incidence`] of each kind.
+//! A solver that moves one vertex after the other needs groups of vertices instead, no two of which
+//! are in one constraint. [`greedy_vertices`] finds them from the [`Incidence`] of each kind.
 //!
 //! ```
 //! use cutis_coloring::greedy;
@@ -27,7 +28,7 @@ mod greedy;
 mod groups;
 mod incidence;
 mod sort;
-mod statistics;
+
 mod verify;
 mod vertices;
 
@@ -35,7 +36,7 @@ pub use error::ColoringError;
 pub use greedy::greedy;
 pub use groups::Groups;
 pub use incidence::{Incidence, Tuples};
-pub use statistics::Statistics;
+
 pub use vertices::greedy_vertices;
 
 #[cfg(doctest)]

@@ -1,8 +1,8 @@
-//! Stable counting sort of constraint indices by a small key, and the allocations that may fail.
+//! A stable counting sort of constraint indices by a small key, and allocations that may fail.
 
 use crate::ColoringError;
 
-/// Length of the largest list that a `u32` can index.
+/// Length of the longest list that a `u32` can index.
 pub(crate) const INDEX_LIMIT: usize = u32::MAX as usize;
 
 /// A vector of `len` copies of `value`, or [`ColoringError::OutOfMemory`].
@@ -22,9 +22,9 @@ pub(crate) fn check_constraint_count(count: usize) -> Result<(), ColoringError> 
     Ok(())
 }
 
-/// Writes `items` to `sorted` by ascending key, equal keys in the order they came.
+/// Writes `items` to `sorted` by ascending key. Items with equal keys keep their order.
 ///
-/// `counts[key]` holds how many items have that key, and `sorted` is as long as there are items.
+/// `counts[key]` is the number of items with this key. `sorted` is as long as there are items.
 pub(crate) fn by_key(
     items: impl Iterator<Item = u32>,
     keys: impl Iterator<Item = usize>,

@@ -1,17 +1,19 @@
-//! Whether groups are a valid coloring, and if not, what clashes.
+//! Checks whether groups are a valid coloring.
 
 use crate::sort::filled;
 use crate::{ColoringError, Groups};
 
 impl Groups {
-    /// Checks that each constraint is in exactly one group and that no two constraints of a group share a vertex.
+    /// Checks that each constraint is in exactly one group and that no two constraints of a group
+    /// share a vertex.
     ///
-    /// Needs 4 bytes per vertex and 1 byte per constraint, and one pass.
+    /// Needs one pass, 4 bytes per vertex and 1 byte per constraint.
     ///
     /// # Errors
-    /// [`ColoringError::Clash`] names the two constraints and the vertex; [`ColoringError::WrongLength`],
-    /// [`ColoringError::BrokenOffsets`], [`ColoringError::NotAPermutation`], [`ColoringError::VertexOutOfRange`] and
-    /// [`ColoringError::RepeatedVertex`] say what else is wrong.
+    /// [`ColoringError::Clash`] names the two constraints and the vertex. Other faults are
+    /// [`ColoringError::WrongLength`], [`ColoringError::BrokenOffsets`],
+    /// [`ColoringError::NotAPermutation`], [`ColoringError::VertexOutOfRange`] and
+    /// [`ColoringError::RepeatedVertex`].
     pub fn verify<const N: usize>(
         &self,
         constraints: &[[u32; N]],
@@ -24,7 +26,7 @@ impl Groups {
         self.check_offsets()?;
 
         let mut seen = filled(false, count)?;
-        // For each vertex, one more than the position in the order of the last constraint that has it.
+        // For each vertex, the position of its last constraint in the order, plus one.
         let mut last = filled(0u32, vertex_count)?;
         for (group, range) in self.offsets.windows(2).enumerate() {
             let (start, end) = (range[0], range[1]);

@@ -1,22 +1,26 @@
-//! Groups of vertices, no two of which are in one constraint: for solvers that move vertex after vertex.
+//! Groups of vertices, no two of which are in one constraint, for solvers that move one vertex
+//! after the other.
 
 use crate::sort::{self, filled};
 use crate::{ColoringError, Groups, Incidence, Tuples};
 
 const NONE: u32 = u32::MAX;
 
-/// Colors the vertices that move by greedy first-fit: in ascending order, each takes the lowest color that no earlier
-/// vertex has which is in a constraint with it. The result names the moving vertices only; two that do not move may well be in
-/// one constraint.
+/// Colors the moving vertices by greedy first-fit: in ascending order, each takes the lowest color
+/// that no earlier vertex in one of its constraints has.
 ///
-/// `kinds` and `incidences` belong together, kind by kind. Cost: one look at each vertex of each constraint of each vertex; 4 bytes
-/// per vertex and color besides the result. No vertex takes a color above the number of its neighbors.
+/// The result names only the moving vertices. A constraint may have several fixed ones.
+///
+/// `kinds` and `incidences` have one entry per kind, in the same order. `moves` has one entry per
+/// vertex. The cost is one look at each vertex of each constraint of each vertex, and 4 bytes per
+/// vertex and color in addition to the result. The color of a vertex is at most the number of its
+/// neighbors.
 ///
 /// # Errors
 /// [`ColoringError::OutOfMemory`].
 ///
 /// # Panics
-/// If an incidence is of fewer vertices than `moves` has, or not that of its kind.
+/// If an incidence has fewer vertices than `moves`, or belongs to another kind.
 pub fn greedy_vertices(
     kinds: &[Tuples<'_>],
     incidences: &[Incidence],
@@ -24,7 +28,7 @@ pub fn greedy_vertices(
 ) -> Result<Groups, ColoringError> {
     let mut colors = filled(NONE, moves.len())?;
     let mut counts: Vec<u32> = Vec::new();
-    // For each color, one more than the last vertex that found it taken.
+    // For each color, the last vertex with a neighbor of this color, plus one.
     let mut taken: Vec<u32> = Vec::new();
     let moving = || (0u32..).zip(moves).filter(|(_, moves)| **moves).map(|(v, _)| v);
     for v in moving() {
@@ -54,7 +58,7 @@ pub fn greedy_vertices(
 }
 
 impl Groups {
-    /// The same groups without the vertices that do not move; groups that become empty are left out.
+    /// The same groups without the fixed vertices. Groups that become empty are removed.
     pub fn restricted_to(&self, moves: &[bool]) -> Self {
         let mut restricted = Groups { order: Vec::new(), offsets: vec![0] };
         for group in self.iter() {
@@ -66,11 +70,12 @@ impl Groups {
         restricted
     }
 
-    /// Checks that each vertex that moves, and no other, is in exactly one group, and that no two of a group are in one
-    /// constraint.
+    /// Checks that each moving vertex, and no other, is in exactly one group, and that no two
+    /// vertices of a group are in one constraint.
     ///
     /// # Errors
-    /// [`ColoringError::WrongVertex`], [`ColoringError::VertexClash`], [`ColoringError::BrokenOffsets`].
+    /// [`ColoringError::WrongVertex`], [`ColoringError::VertexClash`] and
+    /// [`ColoringError::BrokenOffsets`].
     ///
     /// # Panics
     /// If a constraint names a vertex that `moves` does not have.

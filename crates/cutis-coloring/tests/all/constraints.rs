@@ -1,9 +1,11 @@
-//! First-fit against its definition, validity, and refusal of what is not a list of constraints.
+//! The greedy coloring of constraints equals first-fit by definition, and invalid lists are
+//! refused.
 
 use cutis_coloring::{ColoringError, Groups, greedy};
 use proptest::prelude::*;
 
-/// First-fit from its definition: for each constraint, the lowest color of no earlier neighbor. Quadratic.
+/// First-fit by its definition, in quadratic time: each constraint takes the lowest color that no
+/// earlier neighbor has.
 fn first_fit_by_definition<const N: usize>(constraints: &[[u32; N]]) -> Vec<usize> {
     let mut colors: Vec<usize> = Vec::new();
     for (i, a) in constraints.iter().enumerate() {
@@ -15,7 +17,7 @@ fn first_fit_by_definition<const N: usize>(constraints: &[[u32; N]]) -> Vec<usiz
     colors
 }
 
-/// The groups as one color per constraint.
+/// One color per constraint, from the groups.
 fn colors_of(groups: &Groups) -> Vec<usize> {
     let mut colors = vec![usize::MAX; groups.order.len()];
     for (color, group) in groups.iter().enumerate() {
@@ -36,7 +38,7 @@ fn check<const N: usize>(constraints: &[[u32; N]], vertex_count: usize) -> Group
     groups
 }
 
-/// Constraints of `N` distinct vertices below `vertex_count`, up to `len` of them.
+/// Up to `len` constraints of `N` distinct vertices below `vertex_count`.
 fn constraints<const N: usize>(vertex_count: u32, len: usize) -> impl Strategy<Value = Vec<[u32; N]>> {
     let distinct = |vertices: &[u32; N]| (1..N).all(|a| !vertices[..a].contains(&vertices[a]));
     let one = proptest::array::uniform::<_, N>(0..vertex_count).prop_filter("distinct vertices", distinct);
@@ -56,7 +58,7 @@ proptest! {
         check(&tets, 60);
     }
 
-    /// Few vertices and many constraints: several rounds of 64 colors.
+    /// Few vertices and many constraints need several rounds of 64 colors.
     #[test]
     fn crowded_triangles_equal_first_fit(triangles in constraints::<3>(6, 400)) {
         check(&triangles, 6);
@@ -67,17 +69,17 @@ proptest! {
         check(&constraints, 30);
     }
 
-    /// Hostile lists: a result or a typed error, never a panic.
+    /// Any list gives a result or a typed error, never a panic.
     #[test]
-    fn any_list_is_answered(edges in prop::collection::vec(any::<[u32; 2]>(), 0..20), count in 0usize..50) {
+    fn any_list_gives_a_result_or_an_error(edges in prop::collection::vec(any::<[u32; 2]>(), 0..20), count in 0usize..50) {
         if let Ok(groups) = greedy(&edges, count) {
             groups.verify(&edges, count).unwrap();
         }
     }
 
-    /// Hostile groups: a result or a typed error, never a panic; and what passes is a coloring.
+    /// Any groups give a result or a typed error, never a panic. Groups that pass are a coloring.
     #[test]
-    fn any_groups_are_answered(
+    fn any_groups_give_a_result_or_an_error(
         order in prop::collection::vec(0u32..4, 0..5),
         offsets in prop::collection::vec(0u32..5, 0..5),
     ) {
@@ -93,9 +95,10 @@ proptest! {
     }
 }
 
-/// A star's edges all share the hub: one color each, whether below, at or beyond one round's 64.
+/// The edges of a star share the hub, so each needs its own color: below, at and above the 64
+/// colors of a round.
 #[test]
-fn star_needs_a_color_per_edge() {
+fn a_star_needs_a_color_per_edge() {
     for spokes in [63, 64, 65, 128, 129, 1000] {
         let edges: Vec<[u32; 2]> = (1..=spokes).map(|v| [0, v]).collect();
         let groups = check(&edges, spokes as usize + 1);
@@ -103,9 +106,9 @@ fn star_needs_a_color_per_edge() {
     }
 }
 
-/// A deferred constraint must leave its other vertices free for those after it.
+/// A deferred constraint leaves its other vertices free for the constraints after it.
 #[test]
-fn deferred_constraint_takes_nothing_in_its_round() {
+fn a_deferred_constraint_takes_no_color_of_its_round() {
     let mut edges: Vec<[u32; 2]> = (1..=65).map(|v| [0, v]).collect();
     edges.push([65, 66]);
     let groups = check(&edges, 67);
@@ -113,7 +116,7 @@ fn deferred_constraint_takes_nothing_in_its_round() {
 }
 
 #[test]
-fn no_vertices_or_no_constraints() {
+fn empty_lists_are_colored() {
     assert!(check::<2>(&[], 0).is_empty());
     assert!(check::<4>(&[], 100).is_empty());
     assert_eq!(greedy::<0>(&[[], []], 0).unwrap().group(0), [0, 1]);
@@ -121,46 +124,46 @@ fn no_vertices_or_no_constraints() {
 }
 
 #[test]
-fn vertex_out_of_range_is_named() {
+fn a_vertex_out_of_range_is_named() {
     let error = greedy(&[[0, 1], [1, 7]], 7).unwrap_err();
     assert_eq!(error, ColoringError::VertexOutOfRange { constraint: 1, vertex: 7, vertex_count: 7 });
     assert!(error.to_string().contains("constraint 1 names vertex 7"));
 }
 
 #[test]
-fn repeated_vertex_is_named() {
+fn a_repeated_vertex_is_named() {
     let error = greedy(&[[0, 1, 2], [2, 1, 2]], 3).unwrap_err();
     assert_eq!(error, ColoringError::RepeatedVertex { constraint: 1, vertex: 2 });
 }
 
-/// A list of empty arrays has any length for no memory.
+/// A list of empty arrays needs no memory for any length.
 #[test]
-fn too_many_constraints_are_refused_before_anything_is_allocated() {
+fn too_many_constraints_are_refused_before_allocating() {
     let many = vec![[0u32; 0]; u32::MAX as usize + 1];
     assert!(matches!(greedy(&many, 0), Err(ColoringError::TooManyConstraints { .. })));
 }
 
 #[test]
-fn too_many_vertices_are_refused_before_anything_is_allocated() {
+fn too_many_vertices_are_refused_before_allocating() {
     assert!(matches!(greedy(&[[0, 1]], usize::MAX), Err(ColoringError::TooManyVertices { .. })));
 }
 
 #[test]
-fn verify_names_what_clashes() {
+fn verify_names_the_clash() {
     let edges = [[0, 1], [2, 3], [4, 5], [3, 6]];
     let groups = Groups::from_colors(&[0, 0, 0, 0]).unwrap();
     let clash = ColoringError::Clash { group: 0, first: 1, second: 3, vertex: 3 };
     assert_eq!(groups.verify(&edges, 7), Err(clash));
     let groups = Groups::from_colors(&[0, 0, 0, 1]).unwrap();
     assert_eq!(groups.verify(&edges, 7), Ok(()));
-    // The first constraint of a later group clashes with the next one, not with the group before.
+    // The first constraint of a later group clashes with the next one, not with the previous group.
     let groups = Groups::from_colors(&[0, 1, 0, 1]).unwrap();
     let clash = ColoringError::Clash { group: 1, first: 1, second: 3, vertex: 3 };
     assert_eq!(groups.verify(&edges, 7), Err(clash));
 }
 
 #[test]
-fn verify_refuses_broken_groups() {
+fn verify_refuses_invalid_groups() {
     let edges = [[0, 1], [2, 3], [1, 2]];
     let verify = |order: &[u32], offsets: &[u32]| {
         Groups { order: order.to_vec(), offsets: offsets.to_vec() }.verify(&edges, 4)
@@ -184,62 +187,4 @@ fn verify_refuses_broken_groups() {
         groups.verify(&[[0, 1], [2, 2], [1, 2]], 4),
         Err(ColoringError::RepeatedVertex { vertex: 2, .. })
     ));
-}
-
-mod vertices {
-    use cutis_coloring::{ColoringError, Groups, Incidence, Tuples, greedy_vertices};
-    use proptest::prelude::*;
-
-    fn colored(edges: &[[u32; 2]], tets: &[[u32; 4]], moves: &[bool]) -> (Groups, Result<(), ColoringError>) {
-        let kinds = [Tuples::of(edges), Tuples::of(tets)];
-        let incidences = kinds.map(|kind| Incidence::new(kind, moves.len()).unwrap());
-        let groups = greedy_vertices(&kinds, &incidences, moves).unwrap();
-        let valid = groups.verify_vertices(&kinds, moves);
-        (groups, valid)
-    }
-
-    #[test]
-    fn vertices_of_a_constraint_differ_and_fixed_ones_are_left_out() {
-        let (groups, valid) =
-            colored(&[[0, 1], [1, 2], [3, 4]], &[[1, 2, 3, 5]], &[true, true, true, true, false, true]);
-        valid.unwrap();
-        assert_eq!(groups.iter().collect::<Vec<_>>(), [[0, 2].as_slice(), &[1], &[3], &[5]]);
-    }
-
-    #[test]
-    fn more_colors_than_bits_of_a_word() {
-        let edges: Vec<[u32; 2]> = (0..70).flat_map(|b| (0..b).map(move |a| [a, b])).collect();
-        let (groups, valid) = colored(&edges, &[], &[true; 70]);
-        valid.unwrap();
-        assert_eq!(groups.len(), 70);
-    }
-
-    #[test]
-    fn groups_that_do_not_fit_are_refused() {
-        let kinds = [Tuples::of(&[[0, 1], [1, 2]])];
-        let moves = [true, true, true, false];
-        let verify = |order: &[u32], offsets: &[u32]| {
-            Groups { order: order.to_vec(), offsets: offsets.to_vec() }.verify_vertices(&kinds, &moves)
-        };
-        verify(&[0, 2, 1], &[0, 2, 3]).unwrap();
-        let clash = ColoringError::VertexClash { group: 0, first: 1, second: 2, constraint: 1 };
-        assert_eq!(verify(&[1, 2, 0], &[0, 2, 3]), Err(clash));
-        assert_eq!(verify(&[0, 2], &[0, 2]), Err(ColoringError::WrongVertex { vertex: 1 }));
-        assert_eq!(verify(&[0, 2, 1, 3], &[0, 2, 4]), Err(ColoringError::WrongVertex { vertex: 3 }));
-        assert_eq!(verify(&[0, 2, 1, 1], &[0, 2, 3, 4]), Err(ColoringError::WrongVertex { vertex: 1 }));
-        assert_eq!(verify(&[0, 2, 9], &[0, 2, 3]), Err(ColoringError::WrongVertex { vertex: 9 }));
-        assert!(matches!(verify(&[0, 2, 1], &[0, 2]), Err(ColoringError::BrokenOffsets { .. })));
-    }
-
-    proptest! {
-        #[test]
-        fn any_body_is_colored_validly(
-            tets in proptest::collection::vec(proptest::sample::subsequence((0u32..40).collect::<Vec<_>>(), 4), 0..80),
-            moves in proptest::collection::vec(any::<bool>(), 40),
-        ) {
-            let tets: Vec<[u32; 4]> = tets.iter().map(|t| [t[3], t[0], t[2], t[1]]).collect();
-            let (_, valid) = colored(&[], &tets, &moves);
-            prop_assert_eq!(valid, Ok(()));
-        }
-    }
 }

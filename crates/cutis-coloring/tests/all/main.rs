@@ -1,0 +1,4 @@
+//! Tests of the colorings of constraints and of vertices.
+
+mod constraints;
+mod vertices;
