@@ -1,26 +1,26 @@
-//! Why a check could not be made.
+//! The errors of this crate.
 
 use cutis_gpu::GpuError;
 use cutis_solver::SolverError;
 use cutis_solver_cpu::CpuError;
 use cutis_solver_gpu::GpuSolverError;
 
-/// Why a check could not be made; what a check found wrong is in its [`Report`](crate::Report).
+/// A check could not be run. Faults that a check found are in its [`Report`](crate::Report).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConformanceError {
-    /// The environment asks for a GPU and there is none.
-    #[error("{variable} is set, so that checks on a GPU may not be skipped: {source}")]
+    /// An environment variable requires a GPU, and there is none.
+    #[error("{variable} is set, so checks on a GPU may not be skipped: {source}")]
     DeviceRequired {
-        /// The variable of the environment.
+        /// The environment variable.
         variable: &'static str,
-        /// What the GPU said.
+        /// The error of the GPU crate.
         source: GpuError,
     },
-    /// The GPU failed, or refused the shader.
+    /// The GPU failed or refused the shader.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The body of the check was refused, or a step of it failed.
+    /// The test body was refused, or a step failed.
     #[error(transparent)]
     Solver(#[from] SolverError),
     /// The CPU backend did not start.

@@ -1,4 +1,5 @@
-//! Test battery for constraint types: one line holds a type of one's own, in Rust and in WGSL, to what solvers rely on.
+//! A test battery for constraint types: one line tests a type, in Rust and in WGSL, for everything
+//! that solvers rely on.
 //!
 //! ```
 //! use cutis_constraints::Distance;
@@ -6,65 +7,64 @@
 //! cutis_conformance::conformance!(Distance, 2); // a module of tests
 //! ```
 //!
-//! # What is checked
+//! # Checks
 //!
-//! | check | what holds | what it must see (control) |
+//! | check | requirement | negative control |
 //! |---|---|---|
 //! | [`gradient`](checks::gradient) | `∇C` is the gradient of `C` | a gradient off by 1e-3; two swapped |
-//! | [`momentum`](checks::momentum) | gradients sum to zero and make no torque | one off by 1e-3; a couple |
-//! | [`scale`](checks::scale) | no length and no epsilon of its own | a micrometer |
-//! | [`parameters`](checks::parameters) | each parameter matters in the samples | (it is one: an idle parameter fails) |
+//! | [`momentum`](checks::momentum) | gradients sum to zero and have no torque | one off by 1e-3; a couple |
+//! | [`scale`](checks::scale) | the formula contains no length and no epsilon | a micrometer |
+//! | [`parameters`](checks::parameters) | each parameter matters in the samples | (the check itself: an idle parameter fails) |
 //! | [`precision`](checks::precision) | `f32` is near `f64` | value or gradient off by 1e-3 |
-//! | [`lanes`](checks::lanes) | a SIMD lane has the bits of the scalar | the lane beside |
+//! | [`lanes`](checks::lanes) | a SIMD lane has the bits of the scalar | the next lane |
 //! | [`degenerate`](checks::degenerate) | collapsed shapes stay finite | a division by zero |
-//! | [`wgsl`](checks::wgsl) | the shader is valid, `Params` is laid out as on the host | an unknown name, one parameter more, `normalize` |
+//! | [`wgsl`](checks::wgsl) | the shader is valid, `Params` has the layout of the host | an unknown name, an extra parameter, `normalize` |
 //! | [`projection`](checks::projection) | threads give the bits of the reference | value or gradient off by 1e-3 |
-//! | [`device::evaluation`] | the shader computes what Rust does | the shader off by 1e-3; gradients swapped |
-//! | [`device::projection`] | the GPU backend lands where the reference does | value or gradient off by 1e-3 |
+//! | [`device::evaluation`] | the shader computes the same as the Rust code | the shader off by 1e-3; gradients swapped |
+//! | [`device::projection`] | the GPU backend agrees with the reference | value or gradient off by 1e-3 |
 //! | [`device::degenerate`] | collapsed shapes stay finite on the device | the exponent of infinity |
 //!
-//! Samples are random shapes at 1 mm, 1 m and 1 km, the same in every run. Everything is compared with `f64`, and **each check
-//! contains negative controls**: the same comparison must reject something that is wrong on purpose, or the check fails.
-//! How far a device may be off is not a constant: see [`device`].
+//! The samples are random shapes at 1 mm, 1 m and 1 km, the same in every run. All results are
+//! compared with `f64`. **Each check contains negative controls**: the same comparison must reject
+//! a deliberate error, or the check fails. The tolerance of a device is not a constant: see
+//! [`device`].
 //!
-//! The checks are functions that return a [`Report`], so that other programs can print the figures:
+//! The checks are functions that return a [`Report`], so that other programs can print the numbers:
 //! ```
-//! use cutis_conformance::{Outcome, Subject, checks};
+//! use cutis_conformance::{Subject, Verdict, checks};
 //! use cutis_constraints::Volume;
 //!
 //! let report = checks::gradient(&Subject::<Volume, 4>::default());
-//! assert_eq!(report.outcome(), Outcome::Passed);
-//! assert!(report.rows.iter().any(|row| row.is_control()));
+//! assert_eq!(report.verdict(), Verdict::Passed);
+//! assert!(report.findings.iter().any(|finding| finding.is_control()));
 //! ```
 #![forbid(unsafe_code)]
 
+mod alteration;
 pub mod checks;
 pub mod device;
-pub mod shapes;
-
-mod alter;
-mod body;
 mod error;
 mod macros;
 mod measure;
 mod random;
 mod report;
+mod shapes;
 mod subject;
+mod test_body;
 
-pub use alter::{Alteration, FACTOR};
+pub use alteration::{Alteration, FACTOR};
 pub use error::ConformanceError;
-pub use measure::{Deviation, Errors, errors};
-pub use random::Random;
-pub use report::{Limit, Outcome, Report, Row};
+
+pub use report::{Finding, Limit, Report, Verdict};
 pub use subject::{Case, SCALES, Subject};
 
 use cutis_constraints::Constraint;
 use cutis_gpu::Gpu;
 
-/// All checks that need no device.
+/// Runs all checks that need no device.
 ///
 /// # Errors
-/// As for [`checks::projection`].
+/// The errors of [`checks::projection`].
 pub fn on_host<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
 ) -> Result<Vec<Report>, ConformanceError> {
@@ -81,10 +81,10 @@ pub fn on_host<C: Constraint<N>, const N: usize>(
     ])
 }
 
-/// All checks on a device.
+/// Runs all checks on a device.
 ///
 /// # Errors
-/// As for the functions in [`device`].
+/// The errors of the functions in [`device`].
 pub fn on_device<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
     gpu: &Gpu,

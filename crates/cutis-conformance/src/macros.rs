@@ -1,6 +1,7 @@
 //! The macro that turns the battery into tests.
 
-/// Expands to a module of tests: every check of the battery for a constraint type over `N` vertices.
+/// Expands to a module of tests: every check of the battery for a constraint type over `N`
+/// vertices.
 ///
 /// ```
 /// use cutis_conformance::{Subject, conformance};
@@ -8,15 +9,16 @@
 ///
 /// // With the default material, in a module `conformance`.
 /// conformance!(Distance, 2);
-/// // With a name for the module, where there are several, and with what the battery has to know.
+/// // With a module name, for several types in one file, and with a subject.
 /// conformance!(mod stc: SkinTension, 3, Subject::new([
 ///     SkinTensionMaterial { rest_area_scale: 0.8, amplification: 3.0 },
 /// ]));
 /// ```
 ///
-/// The last argument is a [`Subject`](crate::Subject); without it stands `Subject::default()`, for which the material must have a
-/// default. The checks on a GPU are skipped, with the reason on standard error, where there is no adapter, unless one of the
-/// variables [`REQUIRE`](crate::device::REQUIRE) is set.
+/// The last argument is a [`Subject`](crate::Subject). It may be omitted if the material has a
+/// default; the subject is then `Subject::default()`. Without an adapter the checks on a GPU are
+/// skipped, and the reason is printed to standard error. If one of the variables
+/// [`REQUIRE`](crate::device::REQUIRE) is set, they fail instead.
 #[macro_export]
 macro_rules! conformance {
     ($constraint:ty, $n:literal $(, $subject:expr)? $(,)?) => {

@@ -1,42 +1,42 @@
-//! How far two evaluations of a constraint are apart.
+//! Deviations between two evaluations of a constraint.
 
 use cutis_constraints::{Constraint, Eval, Scalar};
 use nalgebra::Vector3;
 
 use crate::{Case, SCALES};
 
-/// The largest length of a vector of the gradient; NaN if any is.
+/// The largest norm among the vectors of a gradient; NaN if any is NaN.
 pub(crate) fn length<const N: usize>(grad: &[Vector3<f64>; N]) -> f64 {
     grad.iter().map(Vector3::norm).fold(0.0, largest)
 }
 
-/// The larger number; NaN if one of them is.
+/// The larger number; NaN if one of them is NaN.
 pub(crate) fn largest(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// The numbers of an evaluation in `f64`.
+/// An evaluation converted to `f64`.
 pub(crate) fn double<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> Eval<f64, N> {
     Eval { c: eval.c.to_f64(), grad: eval.grad.map(|g| g.map(T::to_f64)) }
 }
 
-/// The numbers of an evaluation in a row: the value, then the gradients.
+/// The numbers of an evaluation: the value, then the gradients.
 pub(crate) fn numbers<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> impl Iterator<Item = T> {
     std::iter::once(eval.c).chain(eval.grad.iter().flatten().copied())
 }
 
-/// Errors of many numbers: the worst, and the root mean square.
+/// The largest and the mean of many errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Deviation {
-    /// The largest error; NaN if any is.
-    pub worst: f64,
-    /// Root mean square.
-    pub rms: f64,
+pub(crate) struct Deviation {
+    /// The largest error; NaN if any is NaN.
+    pub(crate) worst: f64,
+    /// The root mean square of the errors.
+    pub(crate) rms: f64,
 }
 
 impl Deviation {
-    /// Of these errors.
-    pub fn of(errors: impl IntoIterator<Item = f64>) -> Self {
+    /// The deviation of these errors.
+    pub(crate) fn of(errors: impl IntoIterator<Item = f64>) -> Self {
         let (mut worst, mut sum, mut count) = (0.0, 0.0, 0.0);
         for error in errors {
             worst = largest(error, worst);
@@ -47,37 +47,39 @@ impl Deviation {
     }
 }
 
-/// How many times as much as the CPU in `f32` a device may deviate from `f64`.
+/// Allowed deviation of a device from `f64`, as a multiple of that of the CPU in `f32`.
 pub const ALLOWANCE: f64 = 4.0;
 
-/// The least that the CPU is taken to deviate, in ulp: where it is exact by luck, a device still divides to 2.5 ulp and takes
-/// square roots by two such operations (Vulkan 1.3, "Precision and Operation of SPIR-V Instructions").
+/// Smallest assumed deviation of the CPU, in ulp. Where the CPU is exact by chance, a device still
+/// divides to 2.5 ulp and computes square roots by two such operations (Vulkan 1.3, "Precision and
+/// Operation of SPIR-V Instructions").
 const FLOOR: f64 = 2.0;
 
-/// What a device may deviate where the CPU deviates by `cpu`; an ulp is `ulp`.
+/// The allowed deviation of a device where the CPU deviates by `cpu`. `ulp` is the size of an ulp.
 pub(crate) fn tolerance(cpu: Deviation, ulp: f64) -> Deviation {
     let of = |cpu: f64| ALLOWANCE * largest(cpu, FLOOR * ulp);
     Deviation { worst: of(cpu.worst), rms: of(cpu.rms) }
 }
 
-/// How many times the tolerance a deviation is.
+/// A deviation divided by its tolerance.
 pub(crate) fn excess(found: Deviation, tolerance: Deviation) -> f64 {
     largest(found.worst / tolerance.worst, found.rms / tolerance.rms)
 }
 
 /// Errors of value and gradient at one length scale, relative to [`Case::size`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Errors {
+pub(crate) struct Errors {
     /// Length scale in m.
-    pub scale: f64,
-    /// Of the value.
-    pub value: Deviation,
-    /// Of the gradient.
-    pub gradient: Deviation,
+    pub(crate) scale: f64,
+    /// Errors of the value.
+    pub(crate) value: Deviation,
+    /// Errors of the gradient.
+    pub(crate) gradient: Deviation,
 }
 
-/// What `found` deviates from the evaluation in `f64`, per scale. `found` has one evaluation for each case.
-pub fn errors<C: Constraint<N>, T: Scalar, const N: usize>(
+/// Deviations of `found` from the evaluation in `f64`, per scale. `found` has one evaluation for
+/// each case.
+pub(crate) fn errors<C: Constraint<N>, T: Scalar, const N: usize>(
     cases: &[Case<N>],
     found: &[Eval<T, N>],
 ) -> Vec<Errors> {
@@ -99,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_nan_is_not_lost() {
+    fn a_nan_is_reported() {
         assert!(largest(f64::NAN, 1.0).is_nan() && largest(1.0, f64::NAN).is_nan());
         let deviation = Deviation::of([1.0, f64::NAN, 2.0]);
         assert!(deviation.worst.is_nan() && deviation.rms.is_nan());

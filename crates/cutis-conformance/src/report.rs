@@ -1,65 +1,66 @@
-//! What a check found: figures, each with what it had to be.
+//! The results of a check: measured values with their limits.
 
 use std::fmt;
 
-/// What a figure had to be.
+/// The limit of a measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limit {
-    /// At most this.
+    /// The value must be at most this.
     AtMost(f64),
-    /// More than this. A **negative control**: something that is wrong on purpose has to be seen.
+    /// The value must be more than this. This is a **negative control**: the check must notice a
+    /// deliberate error.
     MoreThan(f64),
 }
 
-/// One figure of a check.
+/// A measured value of a check and its limit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
-    /// What was measured, of what.
+pub struct Finding {
+    /// The measured quantity.
     pub what: String,
-    /// What came out.
-    pub figure: f64,
-    /// What it had to be.
+    /// The measured value.
+    pub value: f64,
+    /// The limit of the value.
     pub limit: Limit,
 }
 
-impl Row {
-    /// Whether the figure is what it had to be. NaN never is.
+impl Finding {
+    /// Whether the value is within its limit. NaN never is.
     pub fn passed(&self) -> bool {
         match self.limit {
-            Limit::AtMost(bound) => self.figure <= bound,
-            Limit::MoreThan(bound) => self.figure > bound,
+            Limit::AtMost(bound) => self.value <= bound,
+            Limit::MoreThan(bound) => self.value > bound,
         }
     }
 
-    /// Whether it is a negative control.
+    /// Whether this is a negative control.
     pub fn is_control(&self) -> bool {
         matches!(self.limit, Limit::MoreThan(_))
     }
 }
 
-impl fmt::Display for Row {
+impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let verdict = if self.passed() { "ok    " } else { "FAILED" };
         let (sign, bound) = match self.limit {
             Limit::AtMost(bound) => ("≤", bound),
             Limit::MoreThan(bound) => (">", bound),
         };
-        write!(f, "{verdict} {}: {:.3e} ({sign} {bound:.3e})", self.what, self.figure)
+        write!(f, "{verdict} {}: {:.3e} ({sign} {bound:.3e})", self.what, self.value)
     }
 }
 
-/// How a check ended.
+/// The overall result of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// All figures are what they had to be, and every control was seen.
+pub enum Verdict {
+    /// All values are within their limits, and every negative control was noticed.
     Passed,
-    /// Some figure is not.
+    /// At least one value is not within its limit.
     Failed,
-    /// Not applicable, with the reason.
-    LeftOut(&'static str),
+    /// The check does not apply, for this reason.
+    Skipped(&'static str),
 }
 
-/// What a check found about a constraint.
+/// The results of one check of a constraint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// The constraint's name.
@@ -68,58 +69,58 @@ pub struct Report {
     pub check: &'static str,
     /// Name of the adapter, for a check on a device.
     pub adapter: Option<String>,
-    /// Why the check was not made.
-    pub left_out: Option<&'static str>,
-    /// What was measured.
-    pub rows: Vec<Row>,
-    /// Remarks that explain the rows: a compiler's message, the name of what was found.
+    /// The reason if the check was skipped.
+    pub skipped: Option<&'static str>,
+    /// The measured values.
+    pub findings: Vec<Finding>,
+    /// Remarks that explain the findings, such as a compiler message.
     pub notes: Vec<String>,
 }
 
 impl Report {
     pub(crate) fn new(constraint: &'static str, check: &'static str) -> Self {
-        Self { constraint, check, adapter: None, left_out: None, rows: Vec::new(), notes: Vec::new() }
+        Self { constraint, check, adapter: None, skipped: None, findings: Vec::new(), notes: Vec::new() }
     }
 
-    pub(crate) fn left_out(constraint: &'static str, check: &'static str, reason: &'static str) -> Self {
-        Self { left_out: Some(reason), ..Self::new(constraint, check) }
+    pub(crate) fn skipped(constraint: &'static str, check: &'static str, reason: &'static str) -> Self {
+        Self { skipped: Some(reason), ..Self::new(constraint, check) }
     }
 
-    pub(crate) fn at_most(&mut self, what: impl Into<String>, figure: f64, bound: f64) {
-        self.rows.push(Row { what: what.into(), figure, limit: Limit::AtMost(bound) });
+    pub(crate) fn at_most(&mut self, what: impl Into<String>, value: f64, bound: f64) {
+        self.findings.push(Finding { what: what.into(), value, limit: Limit::AtMost(bound) });
     }
 
-    pub(crate) fn control(&mut self, what: impl fmt::Display, figure: f64, bound: f64) {
+    pub(crate) fn control(&mut self, what: impl fmt::Display, value: f64, bound: f64) {
         let what = format!("control, {what}");
-        self.rows.push(Row { what, figure, limit: Limit::MoreThan(bound) });
+        self.findings.push(Finding { what, value, limit: Limit::MoreThan(bound) });
     }
 
     pub(crate) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
     }
 
-    /// How the check ended. A check that measured nothing, though not left out, failed.
-    pub fn outcome(&self) -> Outcome {
-        match self.left_out {
-            Some(reason) => Outcome::LeftOut(reason),
-            None if !self.rows.is_empty() && self.rows.iter().all(Row::passed) => Outcome::Passed,
-            None => Outcome::Failed,
+    /// The overall result. A check that measured nothing and was not skipped failed.
+    pub fn verdict(&self) -> Verdict {
+        match self.skipped {
+            Some(reason) => Verdict::Skipped(reason),
+            None if !self.findings.is_empty() && self.findings.iter().all(Finding::passed) => Verdict::Passed,
+            None => Verdict::Failed,
         }
     }
 
-    /// Rows that are not what they had to be.
-    pub fn failures(&self) -> impl Iterator<Item = &Row> {
-        self.rows.iter().filter(|row| !row.passed())
+    /// The findings outside their limits.
+    fn failures(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| !finding.passed())
     }
 
-    /// For tests: ends them unless the check passed or was left out.
+    /// Panics unless the check passed or was skipped. For tests.
     ///
     /// # Panics
-    /// If the check failed, with the rows that did.
+    /// If the check failed; the message lists the failed findings.
     #[track_caller]
     pub fn assert_passed(&self) {
-        let rows = self.failures().cloned().collect();
-        assert!(self.outcome() != Outcome::Failed, "{}", Self { rows, ..self.clone() });
+        let findings = self.failures().cloned().collect();
+        assert!(self.verdict() != Verdict::Failed, "{}", Self { findings, ..self.clone() });
     }
 }
 
@@ -129,13 +130,13 @@ impl fmt::Display for Report {
         if let Some(adapter) = &self.adapter {
             write!(f, " on {adapter}")?;
         }
-        match self.outcome() {
-            Outcome::Passed => write!(f, ": passed")?,
-            Outcome::Failed => write!(f, ": FAILED")?,
-            Outcome::LeftOut(reason) => write!(f, ": left out, {reason}")?,
+        match self.verdict() {
+            Verdict::Passed => write!(f, ": passed")?,
+            Verdict::Failed => write!(f, ": FAILED")?,
+            Verdict::Skipped(reason) => write!(f, ": skipped, {reason}")?,
         }
-        for row in &self.rows {
-            write!(f, "\n  {row}")?;
+        for finding in &self.findings {
+            write!(f, "\n  {finding}")?;
         }
         for note in &self.notes {
             write!(f, "\n  note: {note}")?;
@@ -149,27 +150,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_figure_that_is_no_number_fails_either_way() {
+    fn a_value_that_is_not_a_number_fails() {
         let mut report = Report::new("c", "check");
         report.at_most("error", f64::NAN, 1.0);
         report.control("error", f64::NAN, 1.0);
         assert_eq!(report.failures().count(), 2);
-        assert_eq!(report.outcome(), Outcome::Failed);
+        assert_eq!(report.verdict(), Verdict::Failed);
     }
 
     #[test]
-    fn a_check_that_measured_nothing_failed() {
-        assert_eq!(Report::new("c", "check").outcome(), Outcome::Failed);
-        assert_eq!(Report::left_out("c", "check", "why").outcome(), Outcome::LeftOut("why"));
+    fn a_check_without_findings_fails() {
+        assert_eq!(Report::new("c", "check").verdict(), Verdict::Failed);
+        assert_eq!(Report::skipped("c", "check", "why").verdict(), Verdict::Skipped("why"));
     }
 
     #[test]
-    fn a_control_that_is_not_seen_fails() {
+    fn an_unnoticed_control_fails() {
         let mut report = Report::new("c", "check");
         report.at_most("error", 1e-7, 1e-6);
-        assert_eq!(report.outcome(), Outcome::Passed);
+        assert_eq!(report.verdict(), Verdict::Passed);
         report.control("off by 1e-3", 1e-7, 1e-6);
-        assert_eq!(report.outcome(), Outcome::Failed);
+        assert_eq!(report.verdict(), Verdict::Failed);
         let text = report.to_string();
         assert!(text.contains("FAILED control, off by 1e-3: 1.000e-7 (> 1.000e-6)"), "{text}");
     }

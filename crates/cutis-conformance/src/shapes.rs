@@ -1,16 +1,17 @@
-//! Shapes of `N` points: random ones that are far from degenerate, and degenerate ones.
+//! Random shapes of `N` points that are far from degenerate, and degenerate shapes.
 
 use nalgebra::{Point3, Vector3};
 
-use crate::Random;
+use crate::random::Random;
 
-/// How thin a random shape may be: its edges, triangles and tetrahedra, by length, cross product and determinant.
+/// Smallest thickness of a random shape: the least of the lengths of edges, the cross products of
+/// triangles and the determinants of tetrahedra.
 const THINNEST: f64 = 0.05;
-/// Random shapes looked at before the least thin of them is taken.
+/// Number of random shapes to try before the thickest one is taken.
 const DRAWS: usize = 16;
 
-/// A random shape of points from −1 to 1, none of whose edges, triangles and tetrahedra is near to having no size.
-pub fn solid<const N: usize>(random: &mut Random) -> [Point3<f64>; N] {
+/// A random shape of points from −1 to 1 that is not degenerate.
+pub(crate) fn solid<const N: usize>(random: &mut Random) -> [Point3<f64>; N] {
     let mut best = [Point3::origin(); N];
     let mut best_thickness = -1.0;
     for _ in 0..DRAWS {
@@ -26,7 +27,7 @@ pub fn solid<const N: usize>(random: &mut Random) -> [Point3<f64>; N] {
     best
 }
 
-/// The smallest edge, triangle (cross product) or tetrahedron (determinant) among the points.
+/// The smallest edge length, triangle cross product or tetrahedron determinant among the points.
 fn thickness(x: &[Point3<f64>]) -> f64 {
     let mut least = f64::INFINITY;
     for (i, a) in x.iter().enumerate() {
@@ -45,10 +46,10 @@ fn thickness(x: &[Point3<f64>]) -> f64 {
     least
 }
 
-/// Shapes that have lost a dimension, with what is wrong with them: all points at zero, at one place, on a line, in a plane,
-/// and every pair of them at one place.
-pub fn degenerate<const N: usize>() -> Vec<(String, [Point3<f64>; N])> {
-    // No round numbers, so that nothing is exact by luck.
+/// Degenerate shapes and their descriptions: all points at zero, at one place, on a line or in a
+/// plane, and each pair of points at one place.
+pub(crate) fn degenerate<const N: usize>() -> Vec<(String, [Point3<f64>; N])> {
+    // These are no round numbers, so that no result is exact by chance.
     let (origin, along, across) =
         (Point3::new(0.1, -0.7, 1.3), Vector3::new(0.8, 1.0, -1.1), Vector3::new(-0.5, 1.5, -0.7));
     let step = |i: usize| i as f64 * (1.0 + i as f64) / 3.0;
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_shapes_are_not() {
+    fn degenerate_shapes_are_not_solid() {
         for (what, x) in degenerate::<4>() {
             assert!(thickness(&x) < 1e-12, "{what}");
         }

@@ -1,21 +1,23 @@
-//! What is examined: a constraint type, the materials to build it with, and what it claims of itself.
+//! The subject of the battery: a constraint type, its materials, and its properties.
 
 use std::marker::PhantomData;
 
 use cutis_constraints::{Constraint, Eval, Params, Scalar};
 use nalgebra::Point3;
 
-use crate::{Random, shapes};
+use crate::random::Random;
+use crate::shapes;
 
-/// Length scales of the samples in m. No constraint may know a length of its own.
+/// Length scales of the samples in m.
 pub const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
 /// Samples per material and scale.
 const SAMPLES: usize = 100;
 
-/// A constraint type with all that the battery has to know about it.
+/// A constraint type with the information that the battery needs.
 ///
-/// By default it is taken to depend on the shape alone, not on where it lies or how it is turned; to know no length of its
-/// own; and to have the exact gradient of its value. Say so where that is not meant:
+/// By default the battery assumes that the constraint depends only on the shape and not on its
+/// place or orientation, that it contains no length, and that its gradient is exact. Declare
+/// exceptions with the methods below:
 ///
 /// ```
 /// use cutis_conformance::Subject;
@@ -28,7 +30,6 @@ const SAMPLES: usize = 100;
 /// ```
 pub struct Subject<C: Constraint<N>, const N: usize> {
     materials: Vec<C::Material>,
-    shapes: fn(&mut Random) -> [Point3<f64>; N],
     pub(crate) anchored: bool,
     pub(crate) has_length: bool,
     pub(crate) direction_only: bool,
@@ -36,11 +37,12 @@ pub struct Subject<C: Constraint<N>, const N: usize> {
 }
 
 impl<C: Constraint<N>, const N: usize> Subject<C, N> {
-    /// A constraint with the materials to examine it with: so chosen that each of its parameters has an effect.
+    /// A constraint type with materials for the samples. Choose materials for which each parameter
+    /// has an effect.
     pub fn new(materials: impl IntoIterator<Item = C::Material>) -> Self {
         Self {
             materials: materials.into_iter().collect(),
-            shapes: shapes::solid,
+
             anchored: false,
             has_length: false,
             direction_only: false,
@@ -48,32 +50,26 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
         }
     }
 
-    /// The constraint depends on where the points lie in space, so that it may push and turn a body: momentum is not
-    /// checked.
+    /// Declares that the constraint depends on the position of the points in space, so it may push
+    /// and turn a body. Skips the momentum check.
     pub fn anchored(self) -> Self {
         Self { anchored: true, ..self }
     }
 
-    /// The constraint or its materials have a length of their own, so that it may not look the same at every scale: that is
-    /// not checked.
+    /// Declares that the constraint or its materials contain a length, so results may depend on the
+    /// scale. Skips the scale check.
     pub fn with_own_length(self) -> Self {
         Self { has_length: true, ..self }
     }
 
-    /// For PBD alone: `grad` has the direction of the gradient of `c`, but not its length, and there is no energy. XPBD is not
-    /// checked.
+    /// Declares a constraint for PBD only: `grad` has the direction of the gradient of `c` but not
+    /// its length, and there is no energy. Skips XPBD and vertex block descent.
     pub fn direction_only(self) -> Self {
         Self { direction_only: true, ..self }
     }
 
-    /// Draws rest shapes and deformed ones with `shapes`: points of about −1 to 1, later scaled. By default any points do that
-    /// are far from degenerate.
-    pub fn shapes(self, shapes: fn(&mut Random) -> [Point3<f64>; N]) -> Self {
-        Self { shapes, ..self }
-    }
-
-    /// The samples, the same in every run: for each material and scale 100 random rest shapes, each with another random shape as
-    /// the deformed one. All numbers are such that `f32` holds them exactly.
+    /// The samples, the same in every run: for each material and scale 100 pairs of random shapes,
+    /// one as the rest shape and one as the deformed shape. `f32` represents all numbers exactly.
     pub fn cases(&self) -> Vec<Case<N>> {
         let single = |x: f64| f64::from(x as f32);
         self.draw(|scale, x| x.map(|p| p.map(|v| single(v * scale))))
@@ -81,24 +77,19 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
             .collect()
     }
 
-    /// The samples with exactly the same shapes at every scale, for `f64`.
+    /// Samples with exactly the same shapes at every scale, for `f64`.
     pub(crate) fn similar_cases(&self) -> Vec<Case<N>> {
         self.draw(|scale, x| x.map(|p| p * scale)).collect()
     }
 
-    /// Parameters of a rest shape for each material; only those that are finite in `f32`, as others are refused when a system
-    /// is built.
+    /// The parameters of a rest shape for each material. Those that are not finite in `f32` are
+    /// omitted, because a system refuses them.
     pub(crate) fn params_of(&self, rest: &[Point3<f64>; N]) -> Vec<Vec<f64>> {
         let of = |material| {
             C::from_rest(rest, material).as_ref().iter().map(|&p: &f64| f64::from(p as f32)).collect()
         };
         let finite = |params: &Vec<f64>| params.iter().all(|p| p.is_finite());
         self.materials.iter().map(of).filter(finite).collect()
-    }
-
-    /// One shape of the subject's.
-    pub(crate) fn shape(&self, random: &mut Random) -> [Point3<f64>; N] {
-        (self.shapes)(random)
     }
 
     fn draw(
@@ -110,8 +101,8 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
             let mut cases = Vec::with_capacity(self.materials.len() * SAMPLES);
             for material in &self.materials {
                 for _ in 0..SAMPLES {
-                    let rest = place(scale, (self.shapes)(&mut random));
-                    let x = place(scale, (self.shapes)(&mut random));
+                    let rest = place(scale, shapes::solid(&mut random));
+                    let x = place(scale, shapes::solid(&mut random));
                     let params = C::from_rest::<f64>(&rest, material).as_ref().to_vec();
                     cases.push(Case { scale, x, params });
                 }
@@ -122,13 +113,13 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
 }
 
 impl<C: Constraint<N, Material: Default>, const N: usize> Default for Subject<C, N> {
-    /// With the default material.
+    /// A subject with the default material.
     fn default() -> Self {
         Self::new([C::Material::default()])
     }
 }
 
-/// One sample: a constraint with its parameters at a shape.
+/// A sample: the parameters and the deformed shape of a constraint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case<const N: usize> {
     /// Length scale in m.
@@ -150,13 +141,14 @@ impl<const N: usize> Case<N> {
         self.x.map(|p| p.map(T::constant))
     }
 
-    /// Value and gradients in the number type `T`.
+    /// Value and gradients, computed in the number type `T`.
     pub fn eval<C: Constraint<N>, T: Scalar>(&self) -> Eval<T, N> {
         C::eval(&self.positions(), &self.params::<C, T>())
     }
 
-    /// What errors of the value are compared with: the rest size, or what moving the points by the scale would change, whichever
-    /// is larger. Errors of the gradient are compared with the same over the scale.
+    /// The reference size for errors of the value: the rest size, or the change of the value when
+    /// the points move by the scale, whichever is larger. Errors of the gradient are relative to
+    /// this size divided by the scale.
     pub fn size<C: Constraint<N>>(&self) -> f64 {
         let eval = self.eval::<C, f64>();
         let rest_size = C::rest_size(&self.params::<C, f64>()).abs();

@@ -5,7 +5,7 @@
 //! software every number has to be the CPU's. Controls: the shader with value or gradient off by 1e-3, with gradients swapped,
 //! with the exponent of infinity.
 
-use cutis_conformance::{ConformanceError, Limit, Report, Row, Subject, device};
+use cutis_conformance::{ConformanceError, Finding, Limit, Report, Subject, device};
 use cutis_constraints::{
     Constraint, Distance, DistanceMaterial, SkinTension, SkinTensionMaterial, SkinTensionPaper,
     SkinTensionPaperMaterial, Volume, VolumeMaterial,
@@ -57,12 +57,12 @@ fn check(
 ) -> Result<(), Failure> {
     let mut report = None;
     bench.compare(Ring::Op, name, |gpu, _| Ok(comparison(report.insert(examine(gpu)?), compared)))?;
-    for (what, rows) in report.iter().flat_map(|report| controls(&report.rows)) {
+    for (what, rows) in report.iter().flat_map(|report| controls(&report.findings)) {
         let agrees = !rows.iter().all(|row| row.passed());
         let figures = Figures {
             compared: 1,
             differing: 1,
-            worst: rows[0].figure,
+            worst: rows[0].value,
             tolerance: bound(rows[0]),
             of: compared.1,
         };
@@ -72,8 +72,8 @@ fn check(
 }
 
 /// The controls with their rows: on software each is looked at twice, within tolerance and for equality.
-fn controls(rows: &[Row]) -> Vec<(&str, Vec<&Row>)> {
-    let mut found: Vec<(&str, Vec<&Row>)> = Vec::new();
+fn controls(rows: &[Finding]) -> Vec<(&str, Vec<&Finding>)> {
+    let mut found: Vec<(&str, Vec<&Finding>)> = Vec::new();
     for row in rows.iter().filter(|row| row.is_control()) {
         let what = row.what.trim_start_matches("control, ").trim_end_matches(", other numbers");
         match found.last_mut() {
@@ -84,7 +84,7 @@ fn controls(rows: &[Row]) -> Vec<(&str, Vec<&Row>)> {
     found
 }
 
-fn bound(row: &Row) -> f64 {
+fn bound(row: &Finding) -> f64 {
     match row.limit {
         Limit::AtMost(bound) | Limit::MoreThan(bound) => bound,
     }
@@ -92,11 +92,11 @@ fn bound(row: &Row) -> f64 {
 
 /// The rows of a report in one: figures over what is allowed, and the count of numbers that had to be equal.
 fn comparison(report: &Report, (compared, of): (usize, &'static str)) -> Measured {
-    let rows = || report.rows.iter().filter(|row| !row.is_control());
-    let differing: f64 = rows().filter(|row| bound(row) == 0.0).map(|row| row.figure).sum();
-    let relative = rows().filter(|row| bound(row) > 0.0).map(|row| row.figure / bound(row));
+    let rows = || report.findings.iter().filter(|row| !row.is_control());
+    let differing: f64 = rows().filter(|row| bound(row) == 0.0).map(|row| row.value).sum();
+    let relative = rows().filter(|row| bound(row) > 0.0).map(|row| row.value / bound(row));
     let worst = relative.fold(differing.min(1.0), f64::max);
-    let agrees = rows().all(Row::passed);
+    let agrees = rows().all(Finding::passed);
     let compared = compared.max(rows().count()) as u64;
     let figures = Figures { compared, differing: differing as u64, worst, tolerance: 1.0, of };
     Measured::new(agrees, figures)
@@ -106,8 +106,8 @@ fn comparison(report: &Report, (compared, of): (usize, &'static str)) -> Measure
 mod tests {
     use super::*;
 
-    fn row(what: &str, figure: f64, limit: Limit) -> Row {
-        Row { what: what.into(), figure, limit }
+    fn row(what: &str, value: f64, limit: Limit) -> Finding {
+        Finding { what: what.into(), value, limit }
     }
 
     #[test]
@@ -116,10 +116,10 @@ mod tests {
             constraint: "c",
             check: "evaluation",
             adapter: None,
-            left_out: None,
-            rows: vec![
+            skipped: None,
+            findings: vec![
                 row("value", 1.0, Limit::AtMost(4.0)),
-                row("others than on the CPU", different, Limit::AtMost(0.0)),
+                row("different from the CPU", different, Limit::AtMost(0.0)),
                 row("control, value × 1.001", 500.0, Limit::MoreThan(1.0)),
                 row("control, value × 1.001, other numbers", seen, Limit::MoreThan(0.0)),
                 row("control, swapped", 2e3, Limit::MoreThan(1.0)),
@@ -133,7 +133,7 @@ mod tests {
         assert!(!found.agrees);
         assert_eq!((found.figures.differing, found.figures.worst), (3, 1.0));
 
-        let rows = report(0.0, 0.0).rows;
+        let rows = report(0.0, 0.0).findings;
         let controls = controls(&rows);
         let seen = |n: usize| controls[n].1.iter().all(|row| row.passed());
         assert_eq!((controls[0].0, controls[0].1.len(), seen(0)), ("value × 1.001", 2, false));

@@ -50,7 +50,7 @@ impl Suite {
     /// Arguments of `cargo test`.
     pub fn arguments(self) -> &'static [&'static str] {
         match self {
-            Self::Conformance => &["-p", "cutis-conformance", "--test", "builtin"],
+            Self::Conformance => &["-p", "cutis-conformance", "--test", "all", "builtin"],
             Self::Solver => &["-p", "cutis-solver-gpu", "--test", "suite"],
             Self::Resample => &["-p", "cutis-resample", "--features", "gpu", "--test", "gpu"],
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],

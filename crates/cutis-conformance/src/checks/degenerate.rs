@@ -1,15 +1,18 @@
-//! Degenerate shapes stay finite.
+//! Check: degenerate shapes stay finite.
 
 use cutis_constraints::{Constraint, Eval, Scalar};
 
 use crate::measure::numbers;
-use crate::{Case, Random, Report, SCALES, Subject, shapes};
+use crate::random::Random;
+use crate::{Case, Report, SCALES, Subject, shapes};
 
-/// Value and gradient are finite where points coincide, lie on a line, in a plane, or all at zero: as the deformed shape of a
-/// regular rest shape, as a rest shape, and as both, at every scale, in `f32` and in `f64`.
+/// Value and gradient are finite where points coincide, lie on a line or in a plane, or are all at
+/// zero. Such shapes occur as the deformed shape of a regular rest shape, as the rest shape, and as
+/// both, at every scale, in `f32` and in `f64`.
 ///
-/// Parameters of a degenerate rest shape that are not finite do not count, as [`SystemBuilder`](cutis_solver::SystemBuilder)
-/// refuses them. Control: a division by the distance of two points that coincide must be seen.
+/// Parameters of a degenerate rest shape that are not finite are ignored, because
+/// [`SystemBuilder`](cutis_solver::SystemBuilder) refuses them. Control: a division by the distance
+/// of two coincident points must be noticed.
 pub fn degenerate<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "degenerate");
     let cases = degenerate_cases(subject);
@@ -36,14 +39,15 @@ pub(crate) fn finite<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> bool {
     numbers(eval).all(|value| value.to_f64().is_finite())
 }
 
-/// Degenerate shapes with parameters of regular ones and their own, and regular shapes with the parameters of degenerate ones.
+/// Degenerate shapes with regular and with degenerate rest shapes, and regular shapes with
+/// degenerate rest shapes.
 pub(crate) fn degenerate_cases<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Vec<Case<N>> {
     let mut random = Random::new(3);
     let mut cases = Vec::new();
     for scale in SCALES {
         for (_, shape) in shapes::degenerate::<N>() {
             let place = |x: [nalgebra::Point3<f64>; N]| x.map(|p| p.map(|v| f64::from((v * scale) as f32)));
-            let (flat, regular) = (place(shape), place(subject.shape(&mut random)));
+            let (flat, regular) = (place(shape), place(shapes::solid(&mut random)));
             for (x, rest) in [(flat, regular), (flat, flat), (regular, flat)] {
                 let params = subject.params_of(&rest);
                 cases.extend(params.into_iter().map(|params| Case { scale, x, params }));

@@ -1,21 +1,22 @@
-//! The gradient is that of the value.
+//! Check: the gradient is that of the value.
 
 use cutis_constraints::{Constraint, Eval};
 use nalgebra::Vector3;
 
-use crate::alter::Alteration;
+use crate::alteration::Alteration;
 use crate::measure::{largest, length};
 use crate::{Case, Report, Subject};
 
-/// Bound on the relative error against finite differences; the controls are off by 1e-3.
+/// Bound on the relative error against finite differences. The controls are off by 1e-3.
 const BOUND: f64 = 1e-6;
-/// Step of the differences over the length scale.
+/// Step of the differences, relative to the length scale.
 const STEP: f64 = 1e-4;
 
-/// The gradient against central finite differences of fourth order, in `f64`, relative to its own length: at most 1e-6.
+/// The gradient agrees with central finite differences of fourth order in `f64` to 1e-6 of its own
+/// length.
 ///
-/// Of a constraint with [`direction_only`](Subject::direction_only) the directions are compared. Controls: each gradient off by
-/// 1e-3, and neighbors swapped, must be seen.
+/// For a constraint with [`direction_only`](Subject::direction_only), only the directions are
+/// compared. Controls: each gradient off by 1e-3, and swapped neighbors, must be noticed.
 pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "gradient");
     let cases = subject.cases();
@@ -28,14 +29,14 @@ pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
     };
     report.at_most("error against finite differences", error(&|eval| eval), BOUND);
     let alterations = Alteration::of::<C, N>(&cases).into_iter().filter(|&one| one != Alteration::Value);
-    // The length of the only gradient is not its direction.
+    // With a single gradient, a wrong length does not change the direction.
     for alteration in alterations.filter(|_| N > 1 || !subject.direction_only) {
         report.control(alteration, error(&|eval| alteration.apply(eval)), 100.0 * BOUND);
     }
     report
 }
 
-/// Central differences of the value by every coordinate.
+/// Central differences of the value in every coordinate.
 fn differences<C: Constraint<N>, const N: usize>(case: &Case<N>) -> [Vector3<f64>; N] {
     let step = STEP * case.scale;
     let mut result = [Vector3::zeros(); N];

@@ -1,4 +1,5 @@
-//! The checks that need no device, each a function from a [`Subject`](crate::Subject) to a [`Report`](crate::Report).
+//! The checks that need no device. Each is a function from a [`Subject`](crate::Subject) to a
+//! [`Report`](crate::Report).
 
 mod degenerate;
 mod gradient;

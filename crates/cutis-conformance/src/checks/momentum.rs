@@ -1,24 +1,25 @@
-//! A projection makes neither force nor torque.
+//! Check: a projection creates no force and no torque.
 
 use cutis_constraints::Constraint;
 use nalgebra::Vector3;
 
-use crate::alter::{Alteration, FACTOR};
+use crate::alteration::{Alteration, FACTOR};
 use crate::measure::{largest, length};
 use crate::{Case, Report, Subject};
 
-/// Bound on what rounding in `f64` creates.
+/// Bound on the rounding error in `f64`.
 const BOUND: f64 = 1e-11;
 
-/// The gradients sum to zero, `Σ ∇_iC = 0`, and make no torque, `Σ x_i × ∇_iC = 0`: in `f64`, relative to their length and the
-/// length scale, at most 1e-11.
+/// The gradients sum to zero, `Σ ∇_iC = 0`, and have no torque, `Σ x_i × ∇_iC = 0`: in `f64`,
+/// relative to their length and the length scale, to 1e-11.
 ///
-/// Left out for [`anchored`](Subject::anchored) constraints. Controls: each gradient off by 1e-3 must be seen in the sum; a
-/// couple, which the sum does not show, in the torque.
+/// Skipped for [`anchored`](Subject::anchored) constraints. Controls: each gradient off by 1e-3
+/// must be noticed in the sum. A couple, which is invisible in the sum, must be noticed in the
+/// torque.
 pub fn momentum<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let check = "momentum";
     if subject.anchored {
-        return Report::left_out(C::NAME, check, "the constraint is anchored in space");
+        return Report::skipped(C::NAME, check, "the constraint is anchored in space");
     }
     let mut report = Report::new(C::NAME, check);
     let cases = subject.cases();
@@ -36,12 +37,12 @@ pub fn momentum<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
             grad[i] *= FACTOR;
             grad
         };
-        let figure = worst(&|_, grad| force(&altered(grad)));
-        report.control(format!("sum, {}", Alteration::Gradient(i)), figure, 1e5 * BOUND);
+        let value = worst(&|_, grad| force(&altered(grad)));
+        report.control(format!("sum, {}", Alteration::Gradient(i)), value, 1e5 * BOUND);
     }
     if N > 1 {
-        let figure = worst(&|case, grad| torque(case, with_couple(case, grad)));
-        report.control("torque, a couple of 1e-3", figure, 1e5 * BOUND);
+        let value = worst(&|case, grad| torque(case, with_couple(case, grad)));
+        report.control("torque, a couple of 1e-3", value, 1e5 * BOUND);
     }
     report
 }
@@ -50,13 +51,13 @@ fn force<const N: usize>(grad: &[Vector3<f64>; N]) -> f64 {
     grad.iter().sum::<Vector3<f64>>().norm() / length(grad)
 }
 
-/// About the first point, so that a shape's place adds no rounding.
+/// The torque about the first point, so that the position of the shape adds no rounding error.
 fn torque<const N: usize>(case: &Case<N>, grad: [Vector3<f64>; N]) -> f64 {
     let torque: Vector3<f64> = (0..N).map(|i| (case.x[i] - case.x[0]).cross(&grad[i])).sum();
     torque.norm() / (case.scale * length(&grad))
 }
 
-/// Two more vectors that sum to zero, across the line between the first two points.
+/// Adds two vectors that sum to zero, perpendicular to the line between the first two points.
 fn with_couple<const N: usize>(case: &Case<N>, mut grad: [Vector3<f64>; N]) -> [Vector3<f64>; N] {
     let arm = case.x[1] - case.x[0];
     let across = arm.cross(&Vector3::new(arm.y, arm.z, -arm.x));

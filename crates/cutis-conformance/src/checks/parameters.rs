@@ -1,17 +1,20 @@
-//! Every parameter has an effect on the samples, so that the other checks can see a parameter that is wrong.
+//! Check: every parameter has an effect on the samples, so that the other checks can notice a wrong
+//! one.
 
 use cutis_constraints::{Constraint, Params};
 
-use crate::alter::FACTOR;
+use crate::alteration::FACTOR;
 use crate::measure::{largest, length};
 use crate::{Case, Report, Subject};
 
-/// The least effect of a change by 1e-3 that still shows.
+/// Smallest relative effect of a change by 1e-3.
 const VISIBLE: f64 = 1e-6;
 
-/// Parameters are finite, and each of them, off by 1e-3, changes value or gradient by more than 1e-6 in some sample. If one does
-/// not, it is useless or the materials leave it idle (an amplification of 0, say): choose others with
-/// [`Subject::new`].
+/// The parameters are finite. A change of each by 1e-3 changes value or gradient by more than 1e-6
+/// in at least one sample.
+///
+/// A parameter without effect is useless, or the materials leave it idle, such as an amplification
+/// of 0. In the second case choose other materials with [`Subject::new`].
 pub fn parameters<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "parameters");
     let cases = subject.cases();
@@ -24,7 +27,7 @@ pub fn parameters<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> 
     report
 }
 
-/// What a change of parameter `k` does, relative to the size of the sample.
+/// The effect of a change of parameter `k`, relative to the size of the sample.
 fn effect<C: Constraint<N>, const N: usize>(case: &Case<N>, k: usize) -> f64 {
     let mut changed = case.clone();
     changed.params[k] *= FACTOR;

@@ -1,16 +1,17 @@
-//! Single precision is enough.
+//! Check: single precision is sufficient.
 
 use cutis_constraints::Constraint;
 
-use crate::alter::Alteration;
+use crate::alteration::Alteration;
 use crate::measure::{Deviation, errors};
 use crate::{Case, Report, Subject};
 
-/// Bound on the deviation of `f32` from `f64`: a tenth of what the controls are off by.
+/// Bound on the deviation of `f32` from `f64`: a tenth of the error of the controls.
 const BOUND: f64 = 1e-4;
 
-/// Value and gradient in `f32` against `f64` on the same numbers, per scale, relative to [`Case::size`]: at most 1e-4. A formula
-/// that loses more to rounding could hide an error of 1e-3 on a device. Controls: each alteration must be seen.
+/// Value and gradient in `f32` agree with `f64` on the same numbers to 1e-4, per scale, relative to
+/// [`Case::size`]. With a larger rounding error, an error of 1e-3 on a device could remain hidden.
+/// Controls: each alteration must be noticed.
 pub fn precision<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "precision");
     let cases = subject.cases();

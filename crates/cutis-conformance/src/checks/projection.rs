@@ -1,18 +1,20 @@
-//! What a solver does with the constraint on the CPU.
+//! Check: solvers on the CPU handle the constraint.
 
 use cutis_constraints::Constraint;
 use cutis_solver_cpu::SolverCpu;
 
-use crate::body::{Body, Plan, after_a_frame, differing};
+use crate::test_body::{Plan, TestBody, after_a_frame, differing};
 use crate::{ConformanceError, Report, SCALES, Subject};
 
-/// Elements on their own and, unless [`anchored`](Subject::anchored), a chain of elements, run for a frame: one projection and
-/// several, PBD and XPBD, with multipliers and without. The threaded backend ends with the bits of the reference.
+/// Runs separate elements and, unless [`anchored`](Subject::anchored), a chain of elements for a
+/// frame: one projection and several, PBD, XPBD and vertex block descent, with and without
+/// multipliers. The threaded backend must give the bits of the reference.
 ///
-/// Controls: a value and a gradient that are off by 1e-3 must move the vertices by more than 4 times what rounding to `f32` does.
+/// Controls: a value and a gradient that are off by 1e-3 must move the vertices by more than 4
+/// times the rounding error of `f32`.
 ///
 /// # Errors
-/// A body that is refused or leaves the finite numbers.
+/// A body that is refused or becomes infinite.
 pub fn projection<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
 ) -> Result<Report, ConformanceError> {
@@ -32,17 +34,17 @@ pub fn projection<C: Constraint<N>, const N: usize>(
     Ok(report)
 }
 
-/// The bodies that solvers run.
+/// The bodies for the solvers.
 pub(crate) fn bodies<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
-) -> Result<Vec<Body<N>>, ConformanceError> {
+) -> Result<Vec<TestBody<N>>, ConformanceError> {
     let cases = subject.cases();
     let mut bodies = Vec::new();
     for scale in SCALES {
-        bodies.push(Body::soup(&cases, scale)?);
+        bodies.push(TestBody::soup(&cases, scale)?);
     }
     if N > 1 && !subject.anchored {
-        bodies.push(Body::chain(&cases, 1.0)?);
+        bodies.push(TestBody::chain(&cases, 1.0)?);
     }
     Ok(bodies)
 }

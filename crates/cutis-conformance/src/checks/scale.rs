@@ -1,24 +1,25 @@
-//! No length of its own: the same shape looks the same at every scale.
+//! Check: the formula contains no length, so a shape gives the same results at every scale.
 
 use cutis_constraints::{Constraint, Eval};
 
 use crate::measure::{largest, numbers};
 use crate::{Case, Report, SCALES, Subject};
 
-/// Bound on what rounding in `f64` creates.
+/// Bound on the rounding error in `f64`.
 const BOUND: f64 = 1e-9;
-/// The absolute length in m of the control.
+/// The absolute length of the control, in m.
 const LENGTH: f64 = 1e-6;
 
-/// The same shapes at 1 mm, 1 m and 1 km have the same value over rest size, and the same gradient times length over rest size:
-/// in `f64`, to 1e-9. An absolute length or an absolute epsilon in the formula shows here.
+/// The same shapes at 1 mm, 1 m and 1 km have the same value over rest size, and the same gradient
+/// times length over rest size, in `f64` to 1e-9. This reveals an absolute length or an absolute
+/// epsilon in the formula.
 ///
-/// Left out for constraints [`with_own_length`](Subject::with_own_length). Control: a micrometer added to one coordinate must be
-/// seen.
+/// Skipped for constraints [`with_own_length`](Subject::with_own_length). Control: a micrometer
+/// added to one coordinate must be noticed.
 pub fn scale<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let check = "scale";
     if subject.has_length {
-        return Report::left_out(C::NAME, check, "the constraint has a length of its own");
+        return Report::skipped(C::NAME, check, "the constraint contains a length");
     }
     let mut report = Report::new(C::NAME, check);
     let cases = subject.similar_cases();
@@ -40,7 +41,8 @@ pub fn scale<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Repor
     report
 }
 
-/// Value over rest size, gradients times length over rest size, with a coordinate moved by an absolute length.
+/// Value over rest size and gradients times length over rest size, with one coordinate moved by an
+/// absolute length.
 fn without_unit<C: Constraint<N>, const N: usize>(case: &Case<N>, absolute: f64) -> Eval<f64, N> {
     let mut moved = case.clone();
     moved.x[0].x += absolute;

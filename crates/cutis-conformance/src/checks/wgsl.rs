@@ -1,10 +1,10 @@
-//! The shader is valid, and its parameters lie as the host stores them.
+//! Check: the shader is valid, and its parameters have the layout of the host.
 
 use cutis_constraints::{Constraint, Params};
 use cutis_shaders::solver::{self, Multiplier, Rule, Stiffness};
 use naga::{Expression, MathFunction, Module, ScalarKind, TypeInner};
 
-use crate::alter::wrapped;
+use crate::alteration::wrapped;
 use crate::{Report, Subject};
 
 /// Functions that give the bits of the CPU on a software device. All others round differently.
@@ -22,30 +22,31 @@ const EXACT: [MathFunction; 11] = [
     MathFunction::Length,
 ];
 
-/// [`Constraint::WGSL`], joined with each pass of the solver, is valid within WebGPU's baseline; `Params` has as many members as
-/// the host has scalars, all of them `f32`; and no function is called that rounds differently from the CPU. No device is
-/// needed. Controls: a statement that names nothing, a parameter too many and a call of `normalize` must be seen.
+/// [`Constraint::WGSL`], joined with each pass of the solver, is valid within WebGPU's baseline.
+/// `Params` has one `f32` member for each scalar of the host. No function is called that rounds
+/// differently from the CPU. This check needs no device. Controls: a statement with an unknown
+/// name, an extra parameter and a call of `normalize` must be noticed.
 pub fn wgsl<C: Constraint<N>, const N: usize>(_: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "wgsl");
     let scalars = <C::Params<f32> as Params<f32>>::LEN;
     let faults = |wgsl: &str| Faults::of(N, wgsl, scalars);
 
     let found = faults(C::WGSL);
-    report.at_most("passes that are not valid", found.invalid as f64, 0.0);
+    report.at_most("invalid passes", found.invalid as f64, 0.0);
     report.at_most("faults of the parameters", found.parameters as f64, 0.0);
-    report.at_most("functions with other bits than the CPU's", found.inexact as f64, 0.0);
+    report.at_most("functions that round differently from the CPU", found.inexact as f64, 0.0);
     report.notes = found.notes;
 
     let control = faults(&wrapped(C::WGSL, "found.c = nothing_of_this_name;"));
-    report.control("a name that is not there", control.invalid as f64, 0.0);
-    let control = faults(&with_one_more_parameter(C::WGSL));
-    report.control("a parameter too many", (control.parameters + control.invalid) as f64, 0.0);
+    report.control("an unknown name", control.invalid as f64, 0.0);
+    let control = faults(&with_extra_parameter(C::WGSL));
+    report.control("an extra parameter", (control.parameters + control.invalid) as f64, 0.0);
     let control = faults(&wrapped(C::WGSL, "found.grad[0] = normalize(found.grad[0]);"));
     report.control("normalize", control.inexact as f64, 0.0);
     report
 }
 
-/// What is wrong with a constraint's source.
+/// Numbers of faults in the source of a constraint.
 #[derive(Default)]
 struct Faults {
     invalid: usize,
@@ -102,16 +103,16 @@ fn valid_module(source: &str) -> Result<Module, String> {
     Ok(module)
 }
 
-fn with_one_more_parameter(wgsl: &str) -> String {
+fn with_extra_parameter(wgsl: &str) -> String {
     let mut source = wgsl.to_owned();
     let name = source.find("struct Params");
     if let Some(brace) = name.and_then(|name| source[name..].find('{').map(|brace| name + brace)) {
-        source.insert_str(brace + 1, " one_too_many: f32,");
+        source.insert_str(brace + 1, " extra: f32,");
     }
     source
 }
 
-/// How `struct Params` differs from `scalars` numbers of type `f32` in a row.
+/// The difference between `struct Params` and `scalars` numbers of type `f32`, if there is one.
 fn fault_of_params(module: &Module, scalars: usize) -> Option<String> {
     let params = module.types.iter().find(|(_, one)| one.name.as_deref() == Some("Params"));
     let Some((_, params)) = params else { return Some("there is no `struct Params`".to_owned()) };
@@ -137,7 +138,7 @@ fn fault_of_params(module: &Module, scalars: usize) -> Option<String> {
     None
 }
 
-/// Functions called anywhere in the module that round differently from the CPU.
+/// Messages about called functions that round differently from the CPU.
 fn inexact_functions(module: &Module) -> Vec<String> {
     let functions = module.functions.iter().map(|(_, function)| function);
     let mut found = Vec::new();
@@ -145,7 +146,7 @@ fn inexact_functions(module: &Module) -> Vec<String> {
         if let Expression::Math { fun, .. } = expression
             && !EXACT.contains(fun)
         {
-            found.push(format!("`{fun:?}` gives other bits on a device than on the CPU: write it out"));
+            found.push(format!("`{fun:?}` rounds differently on a device; replace it by exact operations"));
         }
     }
     found

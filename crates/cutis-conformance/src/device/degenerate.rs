@@ -1,4 +1,4 @@
-//! Degenerate shapes stay finite on a device.
+//! Check: degenerate shapes stay finite on a device.
 
 use cutis_constraints::Constraint;
 use cutis_gpu::Gpu;
@@ -7,17 +7,21 @@ use cutis_solver_gpu::SolverGpu;
 
 use super::evaluation::{differing, evaluate};
 use super::{is_exact, report};
-use crate::alter::wrapped;
-use crate::body::{Body, Plan, after_a_frame};
+use crate::alteration::wrapped;
 use crate::checks::{degenerate_cases, finite};
+use crate::test_body::{Plan, TestBody, after_a_frame};
 use crate::{Case, ConformanceError, Report, SCALES, Subject};
 
-/// As [`degenerate`](fn@crate::checks::degenerate) on the device: value and gradient are finite, on a software adapter they are
-/// those of the CPU, and a solver that projects such elements stays finite. Control: a value with the exponent of infinity
-/// must be seen. (A division by zero will not do: what it gives is up to the device.)
+/// The check [`degenerate`](fn@crate::checks::degenerate) on the device: value and gradient are
+/// finite, on a software adapter they equal those of the CPU, and a solver that projects such
+/// elements stays finite.
+///
+/// Control: a value with the exponent of infinity must be noticed. A division by zero would not do,
+/// because its result depends on the device.
 ///
 /// # Errors
-/// [`ConformanceError::Gpu`] if the shader is refused or the device fails; a body that is refused.
+/// [`ConformanceError::Gpu`] if the shader is refused or the device fails, and the errors of a
+/// refused body.
 pub fn degenerate<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
     gpu: &Gpu,
@@ -32,12 +36,12 @@ pub fn degenerate<C: Constraint<N>, const N: usize>(
     report.at_most(format!("of {} samples, not finite", cases.len()), count, 0.0);
     if is_exact(gpu) {
         let cpu: Vec<_> = cases.iter().map(Case::eval::<C, f32>).collect();
-        report.at_most("numbers that are not those of the CPU", differing(&found, &cpu) as f64, 0.0);
+        report.at_most("numbers that differ from the CPU", differing(&found, &cpu) as f64, 0.0);
     }
     let spoiled = wrapped(C::WGSL, "found.c = bitcast<f32>(bitcast<u32>(found.c) | 0x7f800000u);");
     report.control("the exponent of infinity", not_finite(&spoiled)?.0, 0.0);
     for scale in SCALES {
-        let body = Body::soup(&cases, scale)?;
+        let body = TestBody::soup(&cases, scale)?;
         for plan in Plan::of(subject.direction_only) {
             let mut solver = SolverGpu::new(gpu, body.system::<C, f32>(plan)?, plan.settings())?;
             let failed = match after_a_frame(&mut solver) {

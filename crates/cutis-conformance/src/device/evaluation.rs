@@ -1,4 +1,4 @@
-//! Value and gradient on a device.
+//! Check: value and gradient on a device.
 
 use cutis_constraints::{Constraint, Eval, Params};
 use cutis_gpu::{Gpu, GpuError};
@@ -6,15 +6,16 @@ use cutis_shaders::solver;
 use nalgebra::Vector3;
 
 use super::{is_exact, report};
-use crate::alter::Alteration;
+use crate::alteration::Alteration;
 use crate::measure::{Deviation, Errors, errors, excess, largest, numbers, tolerance};
 use crate::{Case, ConformanceError, Report, Subject};
 
-/// Value and gradient on the device and on the CPU, in `f32`, against `f64` on the same numbers, per scale and relative to
-/// [`Case::size`]. The device may deviate at most 4 times as much as the CPU; on a software adapter every number must be that
-/// of the CPU.
+/// Value and gradient on the device and on the CPU, in `f32`, compared with `f64` on the same
+/// numbers, per scale and relative to [`Case::size`]. The device may deviate at most 4 times as
+/// much as the CPU. On a software adapter every number must be equal.
 ///
-/// Controls: the shader with the value or one gradient off by 1e-3, or with neighboring gradients swapped, must be seen.
+/// Controls: the shader with the value or one gradient off by 1e-3, or with swapped neighboring
+/// gradients, must be noticed.
 ///
 /// # Errors
 /// [`ConformanceError::Gpu`] if the shader is refused or the device fails.
@@ -40,7 +41,7 @@ pub fn evaluation<C: Constraint<N>, const N: usize>(
     if is_exact(gpu) {
         let different = differing(&on_device, &cpu);
         report.at_most(
-            format!("of {} numbers, others than on the CPU", cpu.len() * (1 + 3 * N)),
+            format!("of {} numbers, different from the CPU", cpu.len() * (1 + 3 * N)),
             different as f64,
             0.0,
         );
@@ -55,11 +56,11 @@ pub fn evaluation<C: Constraint<N>, const N: usize>(
     Ok(report)
 }
 
-/// Value and gradients of the samples on the device, by the source of a constraint in WGSL.
+/// Value and gradients of the samples on the device, from the WGSL source of a constraint.
 ///
 /// # Errors
-/// [`GpuError::Shader`] if the source is refused; what else may happen to a device.
-pub fn evaluate<C: Constraint<N>, const N: usize>(
+/// [`GpuError::Shader`] if the source is refused, and the errors of the device.
+pub(super) fn evaluate<C: Constraint<N>, const N: usize>(
     gpu: &Gpu,
     constraint: &str,
     cases: &[Case<N>],
@@ -84,12 +85,12 @@ pub fn evaluate<C: Constraint<N>, const N: usize>(
     Ok(found.chunks_exact(N).map(eval).collect())
 }
 
-/// Numbers that are not equal.
+/// Number of numbers that are not equal.
 pub(super) fn differing<const N: usize>(a: &[Eval<f32, N>], b: &[Eval<f32, N>]) -> usize {
     a.iter().flat_map(numbers).zip(b.iter().flat_map(numbers)).filter(|(a, b)| a != b).count()
 }
 
-/// How many times the tolerance value or gradient are, at the scale where it shows least.
+/// The deviation of value or gradient divided by its tolerance, at the scale where it is smallest.
 fn least_excess(found: &[Errors], cpu: &[Errors]) -> f64 {
     let of = |found: Deviation, cpu: Deviation| excess(found, tolerance(cpu, f32::EPSILON.into()));
     let both = |(found, cpu): (&Errors, &Errors)| {

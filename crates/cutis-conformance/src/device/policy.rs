@@ -1,18 +1,19 @@
-//! Whether there is a GPU, and whether there has to be one.
+//! Opening a GPU: which one, and whether one is required.
 
 use cutis_gpu::{Gpu, GpuError, GpuOptions};
 
 use crate::ConformanceError;
 
-/// Variables of the environment by which a missing adapter is an error: any value but the empty one, `0` and `false`.
+/// Environment variables that make a missing adapter an error. Any value counts except the empty
+/// one, `0` and `false`.
 pub const REQUIRE: [&str; 2] = ["CI", "CUTIS_REQUIRE_GPU"];
 
-/// Opens the first adapter of the machine; none if there is none and no variable of [`REQUIRE`] is set. The reason then goes to
-/// standard error.
+/// Opens the first adapter of the machine. Returns `None` if there is none and no variable of
+/// [`REQUIRE`] is set; the reason is printed to standard error.
 ///
 /// # Errors
-/// [`ConformanceError::DeviceRequired`] if there is no adapter and a variable is set; [`ConformanceError::Gpu`] if there is one and
-/// it fails.
+/// [`ConformanceError::DeviceRequired`] if there is no adapter and a variable is set.
+/// [`ConformanceError::Gpu`] if there is an adapter and it fails.
 pub fn open() -> Result<Option<Gpu>, ConformanceError> {
     let set = |variable: &&str| {
         std::env::var_os(variable).is_some_and(|value| !["", "0", "false"].map(Into::into).contains(&value))
@@ -30,7 +31,7 @@ fn decide(
             Err(ConformanceError::DeviceRequired { variable, source })
         }
         (Err(error @ GpuError::NoAdapter), None) => {
-            eprintln!("skipped on the GPU: {error}");
+            eprintln!("skipped, no GPU: {error}");
             Ok(None)
         }
         (Err(error), _) => Err(error.into()),
@@ -42,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_a_missing_adapter_that_nobody_asks_for_is_skipped() {
+    fn only_a_missing_adapter_that_is_not_required_is_skipped() {
         assert!(matches!(decide(Err(GpuError::NoAdapter), None), Ok(None)));
         let required = decide(Err(GpuError::NoAdapter), Some("CI"));
         let error = required.map(|_| ()).unwrap_err();

@@ -1,22 +1,23 @@
-//! What the GPU backend does with the constraint.
+//! Check: the GPU backend handles the constraint.
 
 use cutis_constraints::Constraint;
 use cutis_gpu::Gpu;
 use cutis_solver_gpu::SolverGpu;
 
 use super::{is_exact, report};
-use crate::body::{Plan, after_a_frame, differing};
 use crate::checks::bodies;
+use crate::test_body::{Plan, after_a_frame, differing};
 use crate::{ConformanceError, Report, Subject};
 
-/// The bodies of [`projection`](fn@crate::checks::projection) on the GPU backend. Its vertices may end at most 4 times as far
-/// from those of the reference solver in `f64` as the reference solver's in `f32`, and on a software adapter exactly where those
-/// end.
+/// Runs the bodies of [`projection`](fn@crate::checks::projection) on the GPU backend. Its vertices
+/// may deviate from the reference solver in `f64` at most 4 times as much as the reference solver
+/// in `f32` does. On a software adapter they must equal the latter.
 ///
-/// Controls: a reference whose value or gradient is off by 1e-3 must be seen.
+/// Controls: a reference whose value or gradient is off by 1e-3 must be noticed.
 ///
 /// # Errors
-/// [`ConformanceError::SolverGpu`] and [`ConformanceError::Solver`] if the device fails, the shader or a body is refused.
+/// [`ConformanceError::SolverGpu`] and [`ConformanceError::Solver`] if the device fails, or the
+/// shader or a body is refused.
 pub fn projection<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
     gpu: &Gpu,
@@ -34,7 +35,7 @@ pub fn projection<C: Constraint<N>, const N: usize>(
             report.at_most(format!("{what}: root mean square"), found.rms, tolerance.rms);
             if is_exact(gpu) {
                 let different = differing(&on_device, &single) as f64;
-                report.at_most(format!("{what}: coordinates that are not the CPU's"), different, 0.0);
+                report.at_most(format!("{what}: coordinates that differ from the CPU"), different, 0.0);
             }
             body.controls::<C>(&mut report, plan, &on_device, tolerance)?;
         }

@@ -1,4 +1,5 @@
-//! Negative controls: a constraint that is wrong on purpose, by a thousandth or by a swap, in Rust and in WGSL.
+//! Deliberate errors for negative controls: a number off by a thousandth, or two swapped gradients,
+//! in Rust and in WGSL.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -8,29 +9,29 @@ use nalgebra::Point3;
 
 use crate::Case;
 
-/// How much a number of a control is off.
+/// The factor by which a number of a negative control is wrong.
 pub const FACTOR: f64 = 1.001;
 
-/// One thing that is wrong with an evaluation.
+/// A deliberate error in an evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alteration {
-    /// The value is [`FACTOR`] times what it should be.
+    /// The value is multiplied by [`FACTOR`].
     Value,
-    /// The gradient at one vertex is.
+    /// The gradient at one vertex is multiplied by [`FACTOR`].
     Gradient(usize),
-    /// The gradients of two vertices are exchanged.
+    /// The gradients of two vertices are swapped.
     Swapped(usize, usize),
 }
 
 impl Alteration {
-    /// Everything that can be wrong with a constraint over `arity` vertices.
+    /// All alterations of a constraint over `arity` vertices.
     pub fn all(arity: usize) -> Vec<Self> {
         let gradients = (0..arity).map(Self::Gradient);
         let swaps = (1..arity).map(|i| Self::Swapped(i - 1, i));
         std::iter::once(Self::Value).chain(gradients).chain(swaps).collect()
     }
 
-    /// Those that change anything in these samples: gradients that are equal everywhere cannot be swapped.
+    /// The alterations that change at least one sample. Swapping equal gradients changes nothing.
     pub(crate) fn of<C: Constraint<N>, const N: usize>(cases: &[Case<N>]) -> Vec<Self> {
         let changes = |alteration: &Self| match *alteration {
             Self::Swapped(i, j) => cases.iter().any(|case| {
@@ -42,7 +43,7 @@ impl Alteration {
         Self::all(N).into_iter().filter(changes).collect()
     }
 
-    /// The evaluation with that wrong.
+    /// The evaluation with this error.
     #[inline(always)]
     pub fn apply<T: Real, const N: usize>(self, mut eval: Eval<T, N>) -> Eval<T, N> {
         let factor = T::constant(FACTOR);
@@ -54,16 +55,17 @@ impl Alteration {
         eval
     }
 
-    /// The source of a constraint with that wrong: its `eval` under another name, and around it one that spoils the result.
+    /// The WGSL source of a constraint with this error. Its `eval` gets another name, and a new
+    /// `eval` alters the result.
     pub fn wgsl(self, constraint: &str) -> String {
-        let spoil = match self {
+        let statement = match self {
             Self::Value => format!("found.c = found.c * {FACTOR};"),
             Self::Gradient(i) => format!("found.grad[{i}] = found.grad[{i}] * {FACTOR};"),
             Self::Swapped(i, j) => format!(
                 "let first = found.grad[{i}]; found.grad[{i}] = found.grad[{j}]; found.grad[{j}] = first;"
             ),
         };
-        wrapped(constraint, &spoil)
+        wrapped(constraint, &statement)
     }
 }
 
@@ -77,7 +79,7 @@ impl fmt::Display for Alteration {
     }
 }
 
-/// A constraint's source whose `eval` ends with `statements`, which may change `found`.
+/// The source of a constraint whose `eval` ends with `statements`, which may change `found`.
 pub(crate) fn wrapped(constraint: &str, statements: &str) -> String {
     let original = renamed(constraint, "eval", "unaltered_eval");
     format!(
@@ -86,7 +88,7 @@ pub(crate) fn wrapped(constraint: &str, statements: &str) -> String {
     )
 }
 
-/// `source` with every whole word `from` replaced.
+/// `source` with `from` replaced wherever it is a whole word.
 fn renamed(source: &str, from: &str, to: &str) -> String {
     let in_word = |character: char| character.is_alphanumeric() || character == '_';
     let mut result = String::with_capacity(source.len());
@@ -102,17 +104,17 @@ fn renamed(source: &str, from: &str, to: &str) -> String {
     result + rest
 }
 
-/// The constraint `C` with something wrong with it in Rust, and its WGSL as it is.
+/// The constraint `C` with an error in its Rust code. Its WGSL is correct.
 pub(crate) struct Altered<C, A>(PhantomData<fn() -> (C, A)>);
 
-/// A choice of [`Alteration`] as a type.
+/// An [`Alteration`] as a type.
 pub(crate) trait Choice: Send + Sync + 'static {
     const ALTERATION: Alteration;
 }
 
-/// The value is off.
+/// A wrong value.
 pub(crate) struct WrongValue;
-/// The first gradient is off.
+/// A wrong gradient at the first vertex.
 pub(crate) struct WrongGradient;
 
 impl Choice for WrongValue {
@@ -161,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn all_alterations_of_a_triangle() {
+    fn a_triangle_has_six_alterations() {
         assert_eq!(Alteration::all(3).len(), 1 + 3 + 2);
         assert_eq!(Alteration::all(1), [Alteration::Value, Alteration::Gradient(0)]);
     }

@@ -1,9 +1,9 @@
-//! Two constraints that are right, and variants of them that are wrong in one way each.
+//! Two correct constraints, and variants of them with one fault each.
 
 use cutis_constraints::{Constraint, Eval, Real};
 use nalgebra::{Point3, Vector3};
 
-/// Head and tail of the shader of a stretch; between them stands what makes the variants.
+/// The shader of a stretch with the given end of its body.
 macro_rules! stretch_wgsl {
     ($body:literal) => {
         concat!(
@@ -22,7 +22,8 @@ const STRETCH: &str = stretch_wgsl!(
     return Eval(length - p.rest_length * p.slack, array<vec3f, N>(direction, -direction));"
 );
 
-/// Implements a variant of the stretch `C = |x1 − x2| − L s` with its own `eval`, and another shader where one is given.
+/// Implements a variant of the stretch `C = |x1 − x2| − L s` with its own `eval` and, if given,
+/// another shader.
 macro_rules! stretch {
     ($(#[$doc:meta])* $name:ident, $eval:expr $(, $wgsl:expr)?) => {
         $(#[$doc])*
@@ -67,12 +68,12 @@ fn stretch<T: Real>(x: &[Point3<T>; 2], &[rest_length, slack]: &[T; 2]) -> Eval<
 }
 
 stretch!(
-    /// As it should be.
+    /// The correct stretch.
     Stretch,
     stretch
 );
 stretch!(
-    /// Pushes where it should pull.
+    /// Pushes instead of pulling.
     WrongSign,
     |x, p| {
         let Eval { c, grad } = stretch(x, p);
@@ -91,7 +92,7 @@ stretch!(
     )
 );
 stretch!(
-    /// Takes a tenth of a millimeter for zero.
+    /// Adds a tenth of a millimeter to the length.
     AbsoluteEpsilon,
     |x, p| {
         let length = length(x) + T::constant(1e-4);
@@ -105,7 +106,7 @@ stretch!(
     )
 );
 stretch!(
-    /// Reads one of its two parameters.
+    /// Reads only one of its two parameters.
     Idle,
     |x, &[rest_length, _]| stretch(x, &[rest_length, T::one()]),
     stretch_wgsl!(
@@ -116,7 +117,7 @@ stretch!(
     )
 );
 stretch!(
-    /// Adds and takes away ten thousand lengths.
+    /// Adds and subtracts ten thousand lengths.
     Canceling,
     |x, p| {
         let detour = p[0] * T::constant(1e4);
@@ -125,7 +126,7 @@ stretch!(
     }
 );
 stretch!(
-    /// Looks at the largest length of all lanes.
+    /// Uses the largest length of all lanes.
     LanesMixed,
     |x, p| {
         let longest = T::splat(length(x).simd_horizontal_max());
@@ -142,7 +143,7 @@ stretch!(
     }
 );
 stretch!(
-    /// Divides by a length that may be zero, in the shader.
+    /// Divides by a length that may be zero, in the shader only.
     UnguardedShader,
     stretch,
     stretch_wgsl!(
@@ -158,13 +159,13 @@ stretch!(
     ""
 );
 stretch!(
-    /// The shader names what is not there.
+    /// The shader uses an unknown name.
     UnknownName,
     stretch,
     stretch_wgsl!("return Eval(sqrt(dot(d, d)) - p.length, array<vec3f, N>(d, -d));")
 );
 stretch!(
-    /// The shader declares what the solver declares.
+    /// The shader declares a name of the solver.
     TakenName,
     stretch,
     concat!(
@@ -178,7 +179,7 @@ stretch!(
     )
 );
 stretch!(
-    /// The shader has more parameters than the host stores.
+    /// The shader has more parameters than the host.
     TooManyParams,
     stretch,
     "struct Params { rest_length: f32, slack: f32, more: f32 }
@@ -188,7 +189,7 @@ stretch!(
     }"
 );
 stretch!(
-    /// The shader takes a number for an integer.
+    /// The shader declares a parameter as an integer.
     IntegerParams,
     stretch,
     "struct Params { rest_length: f32, slack: u32 }
@@ -198,7 +199,7 @@ stretch!(
     }"
 );
 stretch!(
-    /// The shader calls what rounds differently.
+    /// The shader calls a function that rounds differently.
     Normalized,
     stretch,
     stretch_wgsl!(
@@ -207,7 +208,7 @@ stretch!(
     )
 );
 stretch!(
-    /// The shader names its parameters in another order.
+    /// The shader declares its parameters in another order.
     SwappedFields,
     |x, &[rest_length, slack]| {
         let Eval { c, grad } = stretch(x, &[rest_length, slack]);
@@ -224,7 +225,7 @@ stretch!(
     }"
 );
 
-/// Head of the shader of a content, up to its value.
+/// The shader of a content with the given end of its body.
 macro_rules! content_wgsl {
     ($tail:literal) => {
         concat!(
@@ -240,7 +241,8 @@ macro_rules! content_wgsl {
     };
 }
 
-/// Implements a variant of the content of a tetrahedron, `C = a·(b×c)/6 − V0`: its gradient, from the three cross products.
+/// Implements a variant of the content of a tetrahedron, `C = a·(b×c)/6 − V0`. The gradient is a
+/// function of the three cross products.
 macro_rules! content {
     ($(#[$doc:meta])* $name:ident, $gradient:expr, $wgsl:expr) => {
         $(#[$doc])*
@@ -282,19 +284,19 @@ fn gradient<T: Real>([bc, ca, ab]: [Vector3<T>; 3]) -> [Vector3<T>; 4] {
 }
 
 content!(
-    /// As it should be.
+    /// The correct content.
     Content,
     gradient,
     content_wgsl!("return Eval(v, array<vec3f, N>(-(((bc + ca) + ab) * sixth), bc * sixth, ca * sixth, ab * sixth));")
 );
 content!(
-    /// The 1/6 is in the value and not in the gradient.
+    /// The factor 1/6 is in the value but not in the gradient.
     WithoutSixth,
     |[bc, ca, ab]| [-(bc + ca + ab), bc, ca, ab],
     content_wgsl!("return Eval(v, array<vec3f, N>(-((bc + ca) + ab), bc, ca, ab));")
 );
 content!(
-    /// A term is missing in one gradient of the shader.
+    /// A gradient of the shader lacks a term.
     LacksTerm,
     gradient,
     content_wgsl!("return Eval(v, array<vec3f, N>(-((bc + ca) * sixth), bc * sixth, ca * sixth, ab * sixth));")

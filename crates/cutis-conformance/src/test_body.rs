@@ -7,16 +7,18 @@ use cutis_solver::{
 };
 use nalgebra::Point3;
 
-use crate::alter::{Altered, WrongGradient, WrongValue};
+use crate::alteration::{Altered, WrongGradient, WrongValue};
 use crate::measure::{Deviation, excess, tolerance};
-use crate::{Case, ConformanceError, Random, Report};
+use crate::random::Random;
+use crate::{Case, ConformanceError, Report};
 
-/// Time of a frame in s.
+/// Duration of a frame in s.
 const DT: f64 = 1.0 / 60.0;
-/// Damping times substep: an element that swings through itself would blow up the smallest difference.
+/// Damping rate times substep. Without damping, an element that swings through itself would amplify
+/// the smallest difference.
 const DAMPING: f64 = 2.0;
 
-/// What a body is run with.
+/// The solver settings of a run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plan {
     pub(crate) name: &'static str,
@@ -26,7 +28,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// One projection, then several with what is kept between them.
+    /// One projection, and several with multipliers or velocities between them.
     const ALL: [Self; 5] = [
         Self { name: "one PBD projection", formulation: Formulation::Pbd, substeps: 1, iterations: 1 },
         Self { name: "PBD", formulation: Formulation::Pbd, substeps: 3, iterations: 2 },
@@ -35,7 +37,7 @@ impl Plan {
         Self { name: "vertex block descent", formulation: Formulation::Vbd, substeps: 3, iterations: 2 },
     ];
 
-    /// Those that a constraint can be run with.
+    /// The plans that a constraint can run with.
     pub(crate) fn of(pbd_only: bool) -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(move |plan| !pbd_only || plan.formulation == Formulation::Pbd)
     }
@@ -47,8 +49,8 @@ impl Plan {
     }
 }
 
-/// Constraints over vertices, with all numbers such that `f32` holds them exactly.
-pub(crate) struct Body<const N: usize> {
+/// Constraints over vertices. `f32` represents all numbers exactly.
+pub(crate) struct TestBody<const N: usize> {
     pub(crate) name: String,
     pub(crate) scale: f64,
     positions: Vec<Point3<f64>>,
@@ -56,18 +58,19 @@ pub(crate) struct Body<const N: usize> {
     tuples: Vec<[u32; N]>,
     params: Vec<Vec<f64>>,
     groups: Groups,
-    /// A stiffness for each constraint, or one for all.
+    /// Whether each constraint has its own stiffness.
     each: bool,
 }
 
-impl<const N: usize> Body<N> {
-    /// The samples of one scale, each with vertices of its own: one color, which is more than one workgroup.
+impl<const N: usize> TestBody<N> {
+    /// The samples of one scale without common vertices: one color, which is larger than a
+    /// workgroup.
     pub(crate) fn soup(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
-        let name = format!("elements on their own at {scale} m");
+        let name = format!("separate elements at {scale} m");
         Self::new(name, cases, scale, |_, x| x, |k, i| k * N + i, true)
     }
 
-    /// The samples of one scale, each hung onto the one before by a vertex: two colors.
+    /// The samples of one scale, each joined to the previous one by a vertex: two colors.
     pub(crate) fn chain(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
         let mut end = Point3::origin();
         let place = move |k: usize, x: [Point3<f64>; N]| {
@@ -108,7 +111,8 @@ impl<const N: usize> Body<N> {
         Ok(Self { name, scale, positions, inverse_masses, tuples, params, groups, each })
     }
 
-    /// The body with constraints of the type `C`, each about as stiff as its vertices are heavy.
+    /// The body with constraints of type `C`, whose stiffness is of the order of the vertices'
+    /// inertia.
     pub(crate) fn system<C: Constraint<N>, T: Scalar>(&self, plan: Plan) -> Result<System<T>, SolverError> {
         let params: Vec<C::Params<T>> =
             self.params.iter().map(|p| Params::from_fn(|k| T::constant(p[k]))).collect();
@@ -127,7 +131,7 @@ impl<const N: usize> Body<N> {
             }
             Formulation::Xpbd | Formulation::Vbd => {
                 let h = plan.settings().substep_s();
-                // A collapsed element would be rigid, which vertex block descent cannot take.
+                // A collapsed element would be rigid, which vertex block descent does not support.
                 let descends = plan.formulation == Formulation::Vbd;
                 let compliance = |k: usize| {
                     let square = self.weighted_square::<C>(k);
@@ -147,7 +151,7 @@ impl<const N: usize> Body<N> {
         case.eval::<C, f64>().grad.iter().map(|g| g.norm_squared()).sum()
     }
 
-    /// Where the vertices are after one frame of the reference solver.
+    /// Positions after one frame of the reference solver.
     pub(crate) fn reference<C: Constraint<N>, T: Scalar>(
         &self,
         plan: Plan,
@@ -156,19 +160,21 @@ impl<const N: usize> Body<N> {
         after_a_frame(&mut SolverReference::new(system, plan.settings())?)
     }
 
-    /// Distances between the vertices of two runs, over the scale.
+    /// Distances between the vertices of two runs, relative to the scale.
     pub(crate) fn deviation(&self, a: &[Point3<f64>], b: &[Point3<f64>]) -> Deviation {
         Deviation::of(a.iter().zip(b).map(|(a, b)| (a - b).norm() / self.scale))
     }
 
-    /// How far from `exact` vertices may be where the CPU ends at `single`; the least is an ulp of the largest coordinate.
+    /// The allowed deviation from `exact` where the CPU in `f32` ends at `single`. The smallest
+    /// assumed error is an ulp of the largest coordinate.
     pub(crate) fn tolerance(&self, single: &[Point3<f64>], exact: &[Point3<f64>]) -> Deviation {
         let coordinates = self.positions.iter().flat_map(|p| p.coords.iter());
         let extent = coordinates.fold(0.0, |most, x| f64::max(most, x.abs())) / self.scale;
         tolerance(self.deviation(single, exact), f64::from(f32::EPSILON) * extent)
     }
 
-    /// Controls: that `found` is seen not to be the result of a constraint whose value or gradient is off by 1e-3.
+    /// Adds negative controls: `found` must differ from the result of a constraint whose value or
+    /// gradient is off by 1e-3.
     pub(crate) fn controls<C: Constraint<N>>(
         &self,
         report: &mut Report,
@@ -187,13 +193,13 @@ impl<const N: usize> Body<N> {
     }
 }
 
-/// Where the vertices are after one frame.
+/// Positions after one frame.
 pub(crate) fn after_a_frame<T: Scalar>(solver: &mut dyn Solver<T>) -> Result<Vec<Point3<f64>>, SolverError> {
     solver.step(1)?;
     Ok(solver.positions()?.iter().map(|p| p.map(T::to_f64)).collect())
 }
 
-/// Coordinates that differ between two runs.
+/// Number of coordinates that differ between two runs.
 pub(crate) fn differing(a: &[Point3<f64>], b: &[Point3<f64>]) -> usize {
     let coordinates = |x: &[Point3<f64>]| x.iter().flat_map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>();
     coordinates(a).iter().zip(coordinates(b)).filter(|&(a, b)| *a != b).count()

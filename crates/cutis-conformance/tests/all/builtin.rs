@@ -1,4 +1,4 @@
-//! The battery for the constraints of Cutis, with materials that use every parameter.
+//! The battery for the constraint types of Cutis, with materials that use every parameter.
 
 use cutis_conformance::{Subject, conformance};
 use cutis_constraints::{

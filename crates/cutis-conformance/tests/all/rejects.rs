@@ -1,18 +1,18 @@
-//! The battery rejects types that are wrong, each in the check that is there for it.
+//! The battery rejects wrong types, each in the check that is meant to notice the fault.
 
-mod wrong;
-
-use cutis_conformance::{ConformanceError, Outcome, Report, Subject, checks, device};
+use cutis_conformance::{ConformanceError, Report, Subject, Verdict, checks, device};
 use cutis_constraints::Constraint;
-use wrong::*;
 
-/// Checks that fail for a type, in the order of the battery, those on a device as `gpu …`.
+use crate::wrong::*;
+
+/// The names of the checks that fail for a type, in the order of the battery. Checks on a device
+/// start with `gpu`.
 fn rejected_by<C: Constraint<N, Material = ()>, const N: usize>() -> Vec<String> {
     let subject = Subject::<C, N>::new([()]);
     let mut failed = Vec::new();
     let mut note = |place: &str, name: &str, report: Result<Report, ConformanceError>| {
         let (rejected, why) = match report {
-            Ok(report) => (report.outcome() == Outcome::Failed, report.to_string()),
+            Ok(report) => (report.verdict() == Verdict::Failed, report.to_string()),
             Err(error) => (true, error.to_string()),
         };
         if rejected {
@@ -29,7 +29,7 @@ fn rejected_by<C: Constraint<N, Material = ()>, const N: usize>() -> Vec<String>
     note("", "degenerate", Ok(checks::degenerate(&subject)));
     note("", "wgsl", Ok(checks::wgsl(&subject)));
     note("", "projection", checks::projection(&subject));
-    if let Some(gpu) = device::open().expect("a device, or a reason to do without") {
+    if let Some(gpu) = device::open().expect("a device can be opened, or is not required") {
         note("gpu ", "evaluation", device::evaluation(&subject, &gpu));
         note("gpu ", "projection", device::projection(&subject, &gpu));
         note("gpu ", "degenerate", device::degenerate(&subject, &gpu));
@@ -37,7 +37,8 @@ fn rejected_by<C: Constraint<N, Material = ()>, const N: usize>() -> Vec<String>
     failed
 }
 
-/// Fails unless the type is rejected by `check` (where there is a device, for the checks on one) and by no check in `not`.
+/// Fails unless the type is rejected by `check` and by no check in `not`. Without a device, checks
+/// on a device are not required to reject it.
 #[track_caller]
 fn assert_rejected<C: Constraint<N, Material = ()>, const N: usize>(check: &str, not: &[&str]) {
     let failed = rejected_by::<C, N>();
@@ -46,61 +47,61 @@ fn assert_rejected<C: Constraint<N, Material = ()>, const N: usize>(check: &str,
     assert!(!failed.iter().any(|name| not.contains(&name.as_str())), "{}: {failed:?}", C::NAME);
 }
 
-/// The yardstick: what the wrong types are variants of is right.
+/// The types from which the wrong ones are derived are correct.
 #[test]
-fn the_right_type_passes() {
+fn the_correct_types_pass() {
     assert_eq!(rejected_by::<Stretch, 2>(), [""; 0]);
     assert_eq!(rejected_by::<Content, 4>(), [""; 0]);
 }
 
 #[test]
-fn a_wrong_sign_is_no_gradient() {
+fn a_wrong_sign_is_rejected() {
     assert_rejected::<WrongSign, 2>("gradient", &["scale", "lanes", "degenerate", "wgsl"]);
-    // The shader has the right sign, so the device differs too.
+    // The shader has the correct sign, so the device differs too.
     assert_rejected::<WrongSign, 2>("gpu evaluation", &[]);
 }
 
 #[test]
-fn a_gradient_without_the_sixth_is_no_gradient() {
-    // The sum is zero all the same, and both languages agree: nothing else can see it.
+fn a_gradient_without_the_sixth_is_rejected() {
+    // The sum is still zero and both languages agree, so no other check can notice it.
     assert_rejected::<WithoutSixth, 4>("gradient", &["momentum", "wgsl", "gpu evaluation", "gpu projection"]);
 }
 
 #[test]
-fn a_gradient_that_pushes_makes_momentum() {
+fn a_gradient_that_creates_momentum_is_rejected() {
     assert_rejected::<OneSided, 2>("momentum", &["lanes", "degenerate", "wgsl"]);
 }
 
 #[test]
-fn an_absolute_epsilon_has_a_length() {
+fn an_absolute_epsilon_is_rejected() {
     assert_rejected::<AbsoluteEpsilon, 2>("scale", &["momentum", "wgsl", "gpu evaluation"]);
 }
 
 #[test]
-fn a_parameter_without_effect_is_idle() {
+fn a_parameter_without_effect_is_rejected() {
     assert_rejected::<Idle, 2>("parameters", &["gradient", "wgsl", "gpu evaluation", "gpu projection"]);
 }
 
 #[test]
-fn cancellation_costs_precision() {
+fn cancellation_is_rejected() {
     assert_rejected::<Canceling, 2>("precision", &["gradient", "momentum", "lanes", "wgsl"]);
 }
 
 #[test]
-fn lanes_that_look_at_each_other_differ_from_scalars() {
+fn lanes_that_depend_on_each_other_are_rejected() {
     assert_rejected::<LanesMixed, 2>("lanes", &["gradient", "momentum", "wgsl", "gpu evaluation"]);
-    // The threads of the CPU backend run in lanes.
+    // The CPU backend evaluates in lanes.
     assert_rejected::<LanesMixed, 2>("projection", &[]);
 }
 
 #[test]
-fn a_division_without_guard_is_not_finite() {
+fn a_division_without_guard_is_rejected() {
     assert_rejected::<Unguarded, 2>("degenerate", &["gradient", "momentum", "wgsl", "gpu evaluation"]);
     assert_rejected::<UnguardedShader, 2>("gpu degenerate", &["degenerate", "wgsl", "gpu evaluation"]);
 }
 
 #[test]
-fn shaders_that_do_not_fit_are_not_valid() {
+fn invalid_shaders_are_rejected() {
     for failed in [
         rejected_by::<NoShader, 2>(),
         rejected_by::<UnknownName, 2>(),
@@ -115,14 +116,14 @@ fn shaders_that_do_not_fit_are_not_valid() {
 }
 
 #[test]
-fn a_shader_with_swapped_fields_computes_something_else() {
+fn a_shader_with_swapped_fields_is_rejected() {
     let host = ["gradient", "momentum", "scale", "parameters", "precision", "lanes", "degenerate", "wgsl"];
     assert_rejected::<SwappedFields, 2>("gpu evaluation", &host);
     assert_rejected::<SwappedFields, 2>("gpu projection", &host);
 }
 
 #[test]
-fn a_shader_that_lacks_a_term_computes_something_else() {
+fn a_shader_without_a_term_is_rejected() {
     let host = ["gradient", "momentum", "scale", "parameters", "precision", "lanes", "degenerate", "wgsl"];
     assert_rejected::<LacksTerm, 4>("gpu evaluation", &host);
     assert_rejected::<LacksTerm, 4>("gpu projection", &host);
