@@ -1,4 +1,4 @@
-//! Gradients and Hessians held against differences of what they are derivatives of.
+//! Comparison of gradients and Hessians with finite differences.
 
 use nalgebra::{Point3, Vector3};
 
@@ -6,24 +6,26 @@ use crate::hessian::{assemble, extent};
 use crate::objective::{Objective, Outer, State};
 use crate::{NewtonError, Problem};
 
-/// The largest relative deviations that were found.
+/// The largest relative deviations of the derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derivatives {
-    /// Slope of the energy along a direction, by the gradient and by central differences of the energy: their difference over the
-    /// sum of what each force contributes to the slope.
+    /// Deviation of the slope of the energy along a direction from central differences, relative to
+    /// the sum of the contributions of the forces.
     pub gradient: f64,
-    /// Change of the gradient along a direction, by the Hessian and by central differences of the gradient: the norm of their
-    /// difference over that of the change.
+    /// Deviation of the change of the gradient along a direction from central differences, relative
+    /// to the norm of the change.
     pub hessian: f64,
 }
 
 impl Problem {
-    /// Checks the derivatives of elastic energy and gravity at `x` along `samples` directions without pattern. Right derivatives
-    /// deviate by what differences leave: about 1e-9, more where elements are slivers. Where no element has a size to take a step by,
-    /// the deviations are not a number.
+    /// Compares the derivatives of elastic energy and gravity at `x` with central differences along
+    /// `samples` pseudo-random directions.
+    ///
+    /// Correct derivatives deviate by the error of the differences: about 1e-9, and more for thin
+    /// elements. If no element has a size from which a step can be derived, the deviations are NaN.
     ///
     /// # Errors
-    /// A wrong length, a position that is not finite, no memory.
+    /// A wrong length, a position that is not finite, or a lack of memory.
     pub fn check_derivatives(&self, x: &[Point3<f64>], samples: usize) -> Result<Derivatives, NewtonError> {
         self.check("x", x)?;
         let objective = Objective { problem: self, outer: Outer::Gravity(self.gravity) };
@@ -55,7 +57,7 @@ impl Problem {
         Ok(found)
     }
 
-    /// The size of the smallest element that has one; infinite if there is none.
+    /// The size of the smallest element with a size above 0; infinite if there is none.
     fn smallest_extent(&self, state: &State) -> f64 {
         let mut smallest = f64::INFINITY;
         for (elements, evaluated) in self.elastic.kinds.iter().zip(&state.field.kinds) {
@@ -73,13 +75,13 @@ impl Problem {
     }
 }
 
-/// The larger one of a deviation and `error/scale`; what is not a number is larger than any.
+/// The larger one of a deviation and `error/scale`. NaN counts as the largest.
 fn larger(deviation: f64, error: f64, scale: f64) -> f64 {
     let ratio = if error == 0.0 { 0.0 } else { error / scale };
     if deviation.is_nan() || ratio <= deviation { deviation } else { ratio }
 }
 
-/// A number from −1 to 1 without pattern.
+/// A pseudo-random number from −1 to 1.
 fn noise(sample: usize, n: usize) -> f64 {
     let mixed = (n as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (sample as u64 + 1).wrapping_mul(0xD1B5_4A32_D192_ED03);
@@ -92,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_a_number_stays_the_largest() {
+    fn nan_is_the_largest_deviation() {
         assert!(larger(f64::NAN, 0.1, 1.0).is_nan() && larger(0.1, f64::NAN, 1.0).is_nan());
         assert_eq!((larger(0.1, 0.0, 0.0), larger(0.1, 1.0, 2.0)), (0.1, 0.5));
     }

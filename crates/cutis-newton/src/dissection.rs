@@ -1,17 +1,20 @@
-//! An elimination order that leaves the factors of the Hessian sparse: nested dissection by coordinates.
+//! An elimination order that keeps the factors of the Hessian sparse: nested dissection by
+//! coordinates.
 //!
-//! A plane across the body parts its vertices into two halves and a thin separator, which is eliminated last; the halves are
-//! parted in the same way. On a lattice of `n` vertices the factors then have `O(n^(4/3))` entries (George 1973; Lipton, Rose
-//! and Tarjan 1979). The positions are known here, so no graph partitioner is needed.
+//! A plane divides the vertices of the body into two halves and a thin separator. The separator is
+//! eliminated last, and the halves are divided in the same way. On a lattice of `n` vertices the
+//! factors then have `O(n^(4/3))` entries (George 1973; Lipton, Rose and Tarjan 1979). The
+//! positions are known, so no graph partitioner is needed.
 
 use nalgebra::Point3;
 
-/// Parts of so few vertices are eliminated in the order they come in.
+/// Parts with at most this many vertices are eliminated in the given order.
 const LEAF: usize = 12;
-/// Shares of the vertices below the planes that are tried.
+/// Fractions of the vertices below the candidate planes.
 const SHARES: [f64; 7] = [0.5, 0.46, 0.54, 0.42, 0.58, 0.38, 0.62];
 
-/// Who shares a constraint with whom: the neighbors of vertex `v` are `targets[offsets[v]..offsets[v + 1]]`, ascending.
+/// Vertices that share a constraint: the neighbors of vertex `v` are
+/// `targets[offsets[v]..offsets[v + 1]]`, ascending.
 pub(crate) struct Graph {
     pub offsets: Vec<usize>,
     pub targets: Vec<u32>,
@@ -24,11 +27,11 @@ impl Graph {
     }
 }
 
-/// The vertices of `graph`, at `positions`, in the order of their elimination.
+/// The vertices of `graph` in the order of elimination.
 pub(crate) fn order(graph: &Graph, positions: &[Point3<f64>]) -> Vec<u32> {
     let mut vertices: Vec<u32> = (0..positions.len() as u32).collect();
     let mut dissection = Dissection { graph, positions, side: vec![Side::Outside; positions.len()] };
-    dissection.part(&mut vertices);
+    dissection.divide(&mut vertices);
     vertices
 }
 
@@ -47,14 +50,14 @@ struct Dissection<'a> {
 
 impl Dissection<'_> {
     /// Orders `vertices`: the lower half, the upper half, the separator.
-    fn part(&mut self, vertices: &mut [u32]) {
+    fn divide(&mut self, vertices: &mut [u32]) {
         if vertices.len() <= LEAF {
             return;
         }
         let (axis, middle) = self.best_plane(vertices);
         self.sort(vertices, axis);
         self.mark(vertices, middle);
-        // The separator: what lies below the plane and touches what lies above.
+        // The separator: vertices below the plane with a neighbor above it.
         let touches =
             |&v: &u32| self.graph.neighbors(v).iter().any(|&n| self.side[n as usize] == Side::Above);
         let (separator, below): (Vec<u32>, Vec<u32>) = vertices[..middle].iter().partition(|v| touches(v));
@@ -66,11 +69,12 @@ impl Dissection<'_> {
         vertices[..lower].copy_from_slice(&below);
         vertices[lower..upper].copy_from_slice(&above);
         vertices[upper..].copy_from_slice(&separator);
-        self.part(&mut vertices[..lower]);
-        self.part(&mut vertices[lower..upper]);
+        self.divide(&mut vertices[..lower]);
+        self.divide(&mut vertices[lower..upper]);
     }
 
-    /// The axis and the number of vertices below the plane with the smallest separator for how well it balances.
+    /// The axis, and the number of vertices below the plane, of the plane with the best compromise
+    /// between a small separator and equal halves.
     fn best_plane(&mut self, vertices: &mut [u32]) -> (usize, usize) {
         let mut best = (f64::INFINITY, 0, vertices.len() / 2);
         for axis in 0..3 {
@@ -95,7 +99,8 @@ impl Dissection<'_> {
         (best.1, best.2)
     }
 
-    /// `middle`, moved to the nearest place where the coordinate changes, if there is one that still parts the vertices.
+    /// `middle`, moved to the nearest position where the coordinate changes, unless the halves
+    /// would become too unequal.
     fn between_planes(&self, vertices: &[u32], axis: usize, middle: usize) -> usize {
         let at = |n: usize| self.positions[vertices[n] as usize][axis];
         let value = at(middle);

@@ -1,5 +1,6 @@
-//! The constraints of one kind as energies `½C²/α`, all evaluated at once: in parallel, with the same bits for any number of
-//! threads, since each result has its own place and is summed up afterwards in a fixed order.
+//! The constraints of one kind as energies `½C²/α`, evaluated in parallel. The bits do not depend
+//! on the number of threads, because each result has its own place and the sums follow in a fixed
+//! order.
 
 use cutis_solver::{Kind, Stiffness, Values};
 use nalgebra::{Point3, Vector3};
@@ -7,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::NewtonError;
 
-/// Constraints that a thread takes at least, so that sharing out costs less than the work.
+/// Least number of constraints per thread, so that distributing them costs less than the work.
 const MIN_LEN: usize = 256;
 
 /// The constraints of one kind and their compliances.
@@ -18,14 +19,14 @@ pub(crate) struct Elements {
 
 /// Values and gradients of all constraints of a kind.
 pub(crate) struct Evaluated {
-    /// `C` of each.
+    /// `C` of each constraint.
     pub values: Vec<f64>,
-    /// `∇C` of each, as many as it has vertices.
+    /// `∇C` of each constraint, one vector per vertex.
     pub gradients: Vec<Vector3<f64>>,
 }
 
 impl Elements {
-    /// Refuses what stands for no finite energy.
+    /// The constraints of a kind. Refuses those without a finite energy.
     pub fn new(kind: Kind<f64>) -> Result<Self, NewtonError> {
         let Stiffness::Compliance(compliance) = kind.stiffness().clone() else {
             return Err(NewtonError::PbdStiffness { kind: kind.name() });
@@ -61,19 +62,19 @@ impl Elements {
         self.compliance.at(k)
     }
 
-    /// Where the vertices of constraint `k` are.
+    /// Copies the positions of the vertices of constraint `k` to `places`.
     pub fn gather(&self, k: usize, x: &[Point3<f64>], places: &mut [Point3<f64>]) {
         for (place, &vertex) in places.iter_mut().zip(self.vertices(k)) {
             *place = x[vertex as usize];
         }
     }
 
-    /// `C` of constraint `k` with its vertices at `places`; `gradients` takes `∇C`.
+    /// `C` of constraint `k` with its vertices at `places`. Writes `∇C` to `gradients`.
     pub fn evaluate_one(&self, k: usize, places: &[Point3<f64>], gradients: &mut [Vector3<f64>]) -> f64 {
         self.kind.evaluate(k, places, gradients)
     }
 
-    /// All of them, with the body's vertices at `x`.
+    /// Evaluates all constraints, with the body's vertices at `x`.
     pub fn evaluate(&self, x: &[Point3<f64>]) -> Evaluated {
         let arity = self.arity();
         let mut values = vec![0.0; self.len()];

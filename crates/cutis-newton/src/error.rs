@@ -1,94 +1,99 @@
-//! Everything that can be wrong with a problem, its options or a minimization.
+//! The errors of this crate.
 
-/// Why a system has no minimum that could be found.
+/// An invalid problem or option, or a minimization that failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NewtonError {
-    /// A kind has a PBD stiffness, which stands for no energy.
-    #[error("{kind} has a PBD stiffness, which stands for no energy; expected compliances (XPBD)")]
+    /// A kind has a PBD stiffness, which has no energy.
+    #[error("{kind} has a PBD stiffness, which has no energy; expected compliances (XPBD)")]
     PbdStiffness {
-        /// Which kind.
+        /// The kind.
         kind: &'static str,
     },
-    /// A constraint has the compliance 0: its energy is infinite wherever it is not met.
+    /// A constraint has the compliance 0, or one so small that its energy is infinite wherever it
+    /// is not met.
     #[error(
         "{kind} of the vertices {vertices:?} has compliance {compliance}, whose energy ½C²/α is not finite; \
          expected a compliance above 0 with a finite inverse"
     )]
     Rigid {
-        /// Which kind.
+        /// The kind.
         kind: &'static str,
         /// The vertices of the constraint.
         vertices: Vec<u32>,
-        /// Its compliance.
+        /// The compliance.
         compliance: f64,
     },
     /// No vertex has a finite mass.
-    #[error("none of {vertices} vertices can move; expected at least one with an inverse mass above 0")]
+    #[error("none of the {vertices} vertices can move; expected at least one inverse mass above 0")]
     NothingMoves {
         /// The number of vertices.
         vertices: usize,
     },
-    /// An array given for the vertices has the wrong length.
+    /// A per-vertex array has the wrong length.
     #[error("{what} has {found} entries; expected {expected}, one per vertex")]
     Length {
-        /// Which array.
+        /// The name of the array.
         what: &'static str,
         /// Its length.
         found: usize,
         /// The number of vertices.
         expected: usize,
     },
-    /// A number that was given cannot be used.
+    /// An argument is out of range.
     #[error("{what} is {value}; expected {expected}")]
     Value {
-        /// What it is.
+        /// The name of the argument.
         what: &'static str,
-        /// The number.
+        /// The value.
         value: f64,
-        /// What would be right.
+        /// The valid range.
         expected: &'static str,
     },
-    /// A vertex has a coordinate or, where the minimization starts, a force that is not finite.
+    /// A vertex has a coordinate or, at the start of a minimization, a force that is not finite.
     #[error("vertex {vertex}: {what} is not finite")]
     NotFinite {
-        /// Which vertex.
+        /// The vertex.
         vertex: usize,
-        /// What of it.
+        /// The name of the quantity.
         what: &'static str,
     },
-    /// A part of the body hangs together, but nothing holds it: it can move as a whole, and has no equilibrium or endlessly
-    /// many.
+    /// Nothing holds a connected part of the body. It can move as a whole, so it has no equilibrium
+    /// or infinitely many.
     #[error(
-        "vertex {vertex} belongs to a part of {vertices} vertices that nothing holds: it can move as a whole; \
-         hold a vertex of each part (inverse mass 0)"
+        "nothing holds the part of {vertices} vertices with vertex {vertex}, so it can move as a whole; \
+         fix a vertex of each part (inverse mass 0)"
     )]
     Floating {
         /// The first vertex of that part.
         vertex: usize,
-        /// How many vertices it has.
+        /// Number of its vertices.
         vertices: usize,
     },
-    /// The factors of the Hessian do not fit into memory, or cannot be numbered.
-    #[error("the factors of the Hessian of {free} vertices need {} bytes, which cannot be had", bytes.map_or("more than 2^64".into(), |b: u64| b.to_string()))]
+    /// The factors of the Hessian do not fit into memory or cannot be indexed.
+    #[error(
+        "cannot allocate {} bytes for the factors of the Hessian of {free} free vertices",
+        bytes.map_or("more than 2^64".into(), |b: u64| b.to_string())
+    )]
     Memory {
-        /// Vertices that can move.
+        /// Number of free vertices.
         free: usize,
-        /// Bytes needed, where they can be counted.
+        /// Required bytes, if they can be counted.
         bytes: Option<u64>,
     },
-    /// The gradient is still too large after as many iterations as were allowed, or no step along a descent direction lowers
-    /// the energy any more.
+    /// The gradient is still too large after the allowed iterations, or no step along a descent
+    /// direction lowers the energy.
     #[error(
         "not converged after {iterations} iterations: the gradient is {gradient:e} of its scale, above the tolerance \
          {tolerance:e}; try more iterations, a better start or a looser tolerance"
     )]
     NotConverged {
-        /// Iterations done.
+        /// Number of iterations.
         iterations: usize,
-        /// Relative gradient reached, see [`Options::tolerance`](crate::Options::tolerance).
+        /// The relative gradient that was reached, see
+        /// [`Options::tolerance`](crate::Options::tolerance).
         gradient: f64,
-        /// What was asked for.
+        /// The requested tolerance.
         tolerance: f64,
     },
 }

@@ -1,4 +1,5 @@
-//! The elastic energy of a body at one placement of its vertices: value, gradient, and how exactly both can be known.
+//! The elastic energy of a body at one placement of its vertices: value, gradient and rounding
+//! errors.
 
 use cutis_solver::System;
 use nalgebra::{Point3, Vector3};
@@ -11,7 +12,7 @@ pub(crate) struct Elastic {
     pub kinds: Vec<Elements>,
 }
 
-/// What the constraints are and do at one placement.
+/// The values and gradients of all constraints at one placement, and their sums.
 pub(crate) struct Field {
     /// Values and gradients, kind by kind.
     pub kinds: Vec<Evaluated>,
@@ -19,17 +20,18 @@ pub(crate) struct Field {
     pub energy: f64,
     /// `Σ (C/α)∇_vC` for each vertex, in N.
     pub gradient: Vec<Vector3<f64>>,
-    /// `Σ |(C/α)∇_vC|` for each vertex, in N: the size of what cancels in the gradient.
+    /// `Σ |(C/α)∇_vC|` for each vertex, in N: the size of the terms that cancel in the gradient.
     pub parts: Vec<f64>,
-    /// `Σ |∇_vC| R/α` for each vertex, in N, with the reach `R = Σ_i |x_i||∇_iC|`: times the machine's epsilon, how far the
-    /// gradient is off because positions are rounded.
+    /// `Σ |∇_vC| R/α` for each vertex, in N, with the reach `R = Σ_i |x_i||∇_iC|`. Times the
+    /// machine epsilon, this is the error of the gradient due to rounded positions.
     pub rounding: Vec<f64>,
-    /// `Σ |C| R/α` in J: times the machine's epsilon, how far the energy is off for the same reason.
+    /// `Σ |C| R/α` in J. Times the machine epsilon, this is the error of the energy due to rounded
+    /// positions.
     pub energy_rounding: f64,
 }
 
 impl Elastic {
-    /// The kinds of a system, refused where they stand for no finite energy.
+    /// The constraints of a system. Refuses kinds without a finite energy.
     pub fn of(system: &System<f64>) -> Result<Self, NewtonError> {
         let kinds = system.kinds().iter().map(|kind| Elements::new(kind.clone()));
         Ok(Self { kinds: kinds.collect::<Result<_, _>>()? })
@@ -46,7 +48,7 @@ impl Elastic {
         energy
     }
 
-    /// Everything about the placement `x`.
+    /// The values and gradients at the placement `x`.
     pub fn at(&self, x: &[Point3<f64>]) -> Field {
         let mut field = Field {
             kinds: Vec::with_capacity(self.kinds.len()),
@@ -79,8 +81,8 @@ impl Elastic {
         field
     }
 
-    /// The elastic energy at `to` less that at `from`, summed over the differences of each constraint, so that it is exact
-    /// to the rounding of the change and not to that of the whole.
+    /// The elastic energy at `to` minus that at `from`. It sums the differences of the constraints,
+    /// so it is accurate to the rounding of the difference and not of the energies.
     pub fn difference(&self, from: &Field, to: &Field) -> f64 {
         let mut sum = 0.0;
         for (elements, (from, to)) in self.kinds.iter().zip(from.kinds.iter().zip(&to.kinds)) {

@@ -1,14 +1,18 @@
-//! Parts of a body that nothing holds.
+//! Detection of parts of a body that nothing holds.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::{NewtonError, Problem};
 
-/// Below this share of the gradients' sizes, their sum is zero: the constraint does not mind being moved as a whole.
+/// Gradients whose sum is below this fraction of their sizes sum to zero: moving the constraint as
+/// a whole costs nothing.
 const NO_FORCE: f64 = 1e-9;
 
-/// Refuses a part of the body that hangs together, has no vertex that is held, and no constraint that ties it to a place
-/// (one whose gradients do not sum to zero). Where the gradients of a part are all zero, nothing ties it.
+/// Refuses a body with a connected part that nothing holds.
+///
+/// A part is held if one of its vertices is fixed, or if a constraint ties it to a place. A
+/// constraint ties it if its gradients do not sum to zero. Constraints whose gradients are all zero
+/// tie nothing.
 pub(crate) fn refuse(problem: &Problem, x: &[Point3<f64>]) -> Result<(), NewtonError> {
     let count = problem.masses().len();
     let mut parents: Vec<u32> = (0..count as u32).collect();
@@ -41,7 +45,7 @@ pub(crate) fn refuse(problem: &Problem, x: &[Point3<f64>]) -> Result<(), NewtonE
     }
 }
 
-/// The lowest vertex of what `v` is joined to so far; shortens the way there.
+/// The lowest vertex of the part of `v` so far. Shortens the path to it.
 fn root(parents: &mut [u32], mut v: u32) -> u32 {
     while parents[v as usize] != v {
         let above = parents[parents[v as usize] as usize];

@@ -1,9 +1,12 @@
-//! The Hessian of the objective: `(∇C∇Cᵀ + C∇²C)/α` of each constraint, and the inertia on the diagonal.
+//! The Hessian of the objective: `(∇C∇Cᵀ + C∇²C)/α` of each constraint, plus the inertia on the
+//! diagonal.
 //!
-//! `∇²C` comes from central differences of the exact gradients, with a step in proportion to the element. Far from a minimum the
-//! Hessian may not be positive definite, as in compressed springs; then a share of the negative eigenvalues of each element's block
-//! is turned upwards. All of it gives their absolute values (Chen et al., *Stabler Neo-Hookean Simulation: Absolute Eigenvalue Filtering
-//! for Projected Newton*, SIGGRAPH 2024), and a sum that is positive semidefinite.
+//! `∇²C` comes from central differences of the exact gradients, with a step in proportion to the
+//! element. Far from a minimum the Hessian may not be positive definite, for example in compressed
+//! springs. A fraction of the negative eigenvalues of each element's block is then flipped to
+//! positive. Flipping all of them gives their absolute values (Chen et al., *Stabler Neo-Hookean
+//! Simulation: Absolute Eigenvalue Filtering for Projected Newton*, SIGGRAPH 2024), and a positive
+//! semidefinite sum.
 
 use nalgebra::{DMatrix, Matrix3, Point3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
@@ -12,16 +15,17 @@ use crate::elements::Elements;
 use crate::objective::{Objective, State};
 use crate::pattern::Factors;
 
-/// Elements whose blocks are computed side by side before they are summed up in order.
+/// Number of elements whose blocks are computed in parallel before they are summed in order.
 const CHUNK: usize = 8192;
 
-/// The Hessian of the objective at `state`, into `factors`, with the share `turned` of each element's negative curvature turned upwards: 0
-/// for the second derivatives as they are, 1 for the absolute values of their eigenvalues.
+/// Writes the Hessian of the objective at `state` to `factors`. `flipped` is the fraction of each
+/// element's negative curvature that is flipped: 0 for the plain second derivatives, 1 for the
+/// absolute values of the eigenvalues.
 pub(crate) fn assemble(
     objective: &Objective<'_>,
     state: &State,
     places: &[u32],
-    turned: f64,
+    flipped: f64,
     factors: &mut Factors<'_>,
 ) {
     factors.values.fill(0.0);
@@ -33,7 +37,7 @@ pub(crate) fn assemble(
             let blocks = &mut blocks[..count * n * n];
             blocks.par_chunks_mut((n * n).max(1)).enumerate().for_each_init(
                 || Workspace::new(elements.arity()),
-                |workspace, (k, block)| workspace.hessian(elements, first + k, &state.x, turned, block),
+                |workspace, (k, block)| workspace.hessian(elements, first + k, &state.x, flipped, block),
             );
             for (k, block) in blocks.chunks_exact((n * n).max(1)).enumerate() {
                 scatter(elements.vertices(first + k), places, block, factors);
@@ -47,7 +51,7 @@ pub(crate) fn assemble(
     }
 }
 
-/// Adds the blocks of one element where its vertices can move.
+/// Adds the blocks of an element for its free vertices.
 fn scatter(vertices: &[u32], places: &[u32], block: &[f64], factors: &mut Factors<'_>) {
     let n = 3 * vertices.len();
     for (i, &row) in vertices.iter().enumerate() {
@@ -61,7 +65,7 @@ fn scatter(vertices: &[u32], places: &[u32], block: &[f64], factors: &mut Factor
     }
 }
 
-/// Room for one element.
+/// Buffers for one element.
 struct Workspace {
     places: Vec<Point3<f64>>,
     gradient: Vec<Vector3<f64>>,
@@ -80,8 +84,8 @@ impl Workspace {
         }
     }
 
-    /// `(∇C∇Cᵀ + C∇²C)/α` of element `k`, column by column into `block`.
-    fn hessian(&mut self, elements: &Elements, k: usize, x: &[Point3<f64>], turned: f64, block: &mut [f64]) {
+    /// Writes `(∇C∇Cᵀ + C∇²C)/α` of element `k` to `block`, column by column.
+    fn hessian(&mut self, elements: &Elements, k: usize, x: &[Point3<f64>], flipped: f64, block: &mut [f64]) {
         elements.gather(k, x, &mut self.places);
         let c = elements.evaluate_one(k, &self.places, &mut self.gradient);
         let n = 3 * self.places.len();
@@ -114,17 +118,18 @@ impl Workspace {
                 block[row * n + column] = mean;
             }
         }
-        if turned > 0.0 {
+        if flipped > 0.0 {
             let eigen = SymmetricEigen::new(DMatrix::from_column_slice(n, n, block));
-            let values = eigen.eigenvalues.map(|value| value + turned * (value.abs() - value));
+            let values = eigen.eigenvalues.map(|value| value + flipped * (value.abs() - value));
             let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&values);
             block.copy_from_slice((scaled * eigen.eigenvectors.transpose()).as_slice());
         }
     }
 }
 
-/// The size of an element, in m: the largest distance of a vertex from the first; for a constraint on one vertex, how far it has to
-/// go to be met. Zero where there is none.
+/// The size of an element in m: the largest distance of a vertex from the first one. For a
+/// constraint on one vertex, it is the distance at which the constraint is met. Zero if there is no
+/// size.
 pub(crate) fn extent(points: &[Point3<f64>], c: f64, gradients: &[Vector3<f64>]) -> f64 {
     match (points, gradients) {
         ([_], [gradient]) if gradient.norm() > 0.0 => c.abs() / gradient.norm(),

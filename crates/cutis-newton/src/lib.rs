@@ -1,9 +1,11 @@
-//! The yardstick for the errors of a solver: implicit steps and static equilibria of a body, by Newton's method in double
-//! precision with a sparse direct solver.
+//! Reference solutions for measuring the errors of a solver: implicit steps and static equilibria
+//! of a body, by Newton's method in double precision with a sparse direct solver.
 //!
-//! A [`Problem`] takes the energies `½C²/α`, masses and positions from a system of `cutis-solver` and nothing of how that
-//! steps. [`Problem::step`] finds the minimizer of an implicit Euler step, which XPBD approaches with its iterations;
-//! [`Problem::equilibrium`] finds where the body comes to rest. [`relative_rms`] says how far a solver is from either.
+//! A [`Problem`] takes the energies `½C²/α`, the masses and the positions from a system of
+//! `cutis-solver`. It shares no stepping code with the solvers. [`Problem::step`] finds the
+//! minimizer of an implicit Euler step, which XPBD approaches with its iterations.
+//! [`Problem::equilibrium`] finds the state of rest. [`relative_rms`] measures the distance of a
+//! solver's result from either.
 #![forbid(unsafe_code)]
 
 mod derivatives;

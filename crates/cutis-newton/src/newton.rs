@@ -1,4 +1,4 @@
-//! Newton's method with a line search, and a shift of the Hessian where it is not positive definite.
+//! Newton's method with a line search. Where the Hessian is not positive definite, it is modified.
 
 use nalgebra::Point3;
 
@@ -7,18 +7,18 @@ use crate::objective::{Objective, State};
 use crate::pattern::{Factors, Pattern};
 use crate::{NewtonError, Options};
 
-/// Share of the decrease promised by the slope that a step must bring (Armijo).
+/// Fraction of the decrease predicted by the slope that a step must reach (Armijo).
 const DECREASE: f64 = 1e-4;
-/// Step lengths below this are given up.
+/// Shortest step length. Shorter steps are given up.
 const SHORTEST: f64 = 1e-9;
-/// The least share of the negative curvature that is turned upwards.
-const LEAST_TURNED: f64 = 1e-3;
-/// The first shift of the Hessian, as a share of its diagonal.
+/// The least fraction of the negative curvature that is flipped.
+const LEAST_FLIPPED: f64 = 1e-3;
+/// The first shift of the Hessian, as a fraction of its diagonal.
 const FIRST_SHIFT: f64 = 1e-6;
-/// With so large a shift every matrix with a positive diagonal would be definite.
+/// The largest shift. It makes every matrix with a positive diagonal definite.
 const LARGEST_SHIFT: f64 = 1e6;
 
-/// The end of a minimization.
+/// The result of a minimization.
 pub(crate) struct Found {
     pub state: State,
     /// Relative gradient.
@@ -35,7 +35,7 @@ pub(crate) fn minimize(
 ) -> Result<Found, NewtonError> {
     let pattern = objective.problem.pattern()?;
     let mut search =
-        Search { objective, pattern, factors: pattern.factors()?, turned: 1.0, shift: 0.0, definite: None };
+        Search { objective, pattern, factors: pattern.factors()?, flipped: 1.0, shift: 0.0, definite: None };
     let mut state = objective.at(start);
     if let Some(n) = state.gradient.iter().position(|g| !g.is_finite()) {
         let (vertex, what) = (objective.problem.free[n / 3] as usize, "the force at the start");
@@ -63,16 +63,17 @@ struct Search<'a> {
     objective: &'a Objective<'a>,
     pattern: &'a Pattern,
     factors: Factors<'a>,
-    /// How much of the elements' negative curvature is turned upwards where the Hessian is not definite.
-    turned: f64,
-    /// What is added to the diagonal of the Hessian, as a share of it. Zero near a minimum.
+    /// Fraction of the elements' negative curvature that is flipped where the Hessian is not
+    /// definite.
+    flipped: f64,
+    /// Addition to the diagonal of the Hessian, as a fraction of it. Zero near a minimum.
     shift: f64,
-    /// Whether the Hessian was positive definite as it is, when last looked at.
+    /// Whether the unmodified Hessian was positive definite at the last factorization.
     definite: Option<bool>,
 }
 
 impl Search<'_> {
-    /// The next state, lower than `state`; `None` if no step is.
+    /// The next state, which is lower than `state`; `None` if no step lowers it.
     fn step(&mut self, state: &State) -> Option<State> {
         let plain = self.factorize(state, 0.0, 0.0);
         self.definite = Some(plain);
@@ -80,42 +81,43 @@ impl Search<'_> {
             self.shift = 0.0;
             return Some(next);
         }
-        // Where the Hessian bends downwards: as little of that turned upwards as makes it definite. Beside a saddle, where elements that
-        // bend upwards and downwards all but cancel, the steps would be short with more.
+        // The Hessian is indefinite. Flip only as much of the negative curvature as makes it
+        // definite. Near a saddle, where positive and negative curvature of the elements almost
+        // cancel, flipping more would make the steps short.
         while self.shift <= LARGEST_SHIFT {
-            if self.factorize(state, self.turned, self.shift)
+            if self.factorize(state, self.flipped, self.shift)
                 && let Some((next, length)) = self.along_direction(state)
             {
                 match length {
-                    1.0 => self.loosen(),
-                    length if length < 0.1 => self.tighten(),
+                    1.0 => self.modify_less(),
+                    length if length < 0.1 => self.modify_more(),
                     _ => (),
                 }
                 return Some(next);
             }
-            self.tighten();
+            self.modify_more();
         }
         None
     }
 
-    fn tighten(&mut self) {
-        if self.turned < 1.0 {
-            self.turned = (4.0 * self.turned).min(1.0);
+    fn modify_more(&mut self) {
+        if self.flipped < 1.0 {
+            self.flipped = (4.0 * self.flipped).min(1.0);
         } else {
             self.shift = (10.0 * self.shift).max(FIRST_SHIFT);
         }
     }
 
-    fn loosen(&mut self) {
+    fn modify_less(&mut self) {
         if self.shift > 0.0 {
             self.shift = if self.shift <= FIRST_SHIFT { 0.0 } else { self.shift / 10.0 };
         } else {
-            self.turned = (0.5 * self.turned).max(LEAST_TURNED);
+            self.flipped = (0.5 * self.flipped).max(LEAST_FLIPPED);
         }
     }
 
-    fn factorize(&mut self, state: &State, turned: f64, shift: f64) -> bool {
-        assemble(self.objective, state, &self.pattern.places, turned, &mut self.factors);
+    fn factorize(&mut self, state: &State, flipped: f64, shift: f64) -> bool {
+        assemble(self.objective, state, &self.pattern.places, flipped, &mut self.factors);
         if shift > 0.0 {
             let diagonal: Vec<usize> = (0..state.gradient.len()).map(|n| self.factors.diagonal(n)).collect();
             let mean = diagonal.iter().map(|&n| self.factors.values[n]).sum::<f64>() / diagonal.len() as f64;
@@ -126,7 +128,7 @@ impl Search<'_> {
         self.factors.factorize()
     }
 
-    /// A step along the direction that the factors give, and its length as a share of the whole.
+    /// A step along the direction that the factors give, and its length relative to the full step.
     fn along_direction(&mut self, state: &State) -> Option<(State, f64)> {
         let descent: Vec<f64> = state.gradient.iter().map(|g| -g).collect();
         let direction = self.factors.solve(&descent);
@@ -141,7 +143,7 @@ impl Search<'_> {
             if decreases(change, slope, length, state.noise + next.noise, dot(&next.gradient, &direction)) {
                 return Some((next, length));
             }
-            // The minimum of the parabola through what is known, within bounds.
+            // The minimum of the parabola through the known values, within bounds.
             let parabola = -0.5 * slope * length * length / (change - slope * length);
             let within = (0.1 * length)..=(0.5 * length);
             length = if within.contains(&parabola) { parabola } else { 0.3 * length };
@@ -150,15 +152,16 @@ impl Search<'_> {
     }
 }
 
-/// Whether a step of `length` brings enough: by the energy, or, where its change drowns in the rounding `noise`, by the slope at the
-/// end, which for a parabola says the same (Hager and Zhang, *A new conjugate gradient method with guaranteed descent*, SIAM J.
-/// Optim. 16 (2005), eq. 4.1).
-fn decreases(change: f64, slope: f64, length: f64, noise: f64, slope_there: f64) -> bool {
-    if !(change.is_finite() && slope_there.is_finite()) {
+/// Whether a step of `length` lowers the objective enough. Where the change of the energy is below
+/// the rounding `noise`, the slope at the end decides, which is equivalent for a parabola (Hager
+/// and Zhang, *A new conjugate gradient method with guaranteed descent*, SIAM J. Optim. 16 (2005),
+/// eq. 4.1).
+fn decreases(change: f64, slope: f64, length: f64, noise: f64, end_slope: f64) -> bool {
+    if !(change.is_finite() && end_slope.is_finite()) {
         return false;
     }
-    let drowned = change.abs() <= noise && slope_there <= (2.0 * DECREASE - 1.0) * slope;
-    change <= DECREASE * length * slope && change < -noise || drowned
+    let hidden = change.abs() <= noise && end_slope <= (2.0 * DECREASE - 1.0) * slope;
+    change <= DECREASE * length * slope && change < -noise || hidden
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

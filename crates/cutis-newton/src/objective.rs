@@ -1,49 +1,52 @@
-//! What is minimized: the elastic energy, and with it either gravity or the inertia of an implicit step.
+//! The objective of a minimization: the elastic energy plus either gravity or the inertia of an
+//! implicit step.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::Problem;
 use crate::field::Field;
 
-/// What stands beside the elastic energy.
+/// The term that is added to the elastic energy.
 pub(crate) enum Outer {
-    /// `−m g·x` for a gravity `g` in m/s²: static equilibrium.
+    /// `−m g·x` with the gravity `g` in m/s²: static equilibrium.
     Gravity(Vector3<f64>),
     /// `m/(2h²)|x − x̃|²`: an implicit step.
     Inertia {
-        /// `x̃` of each vertex, in the problem's own coordinates.
+        /// `x̃` of each vertex, in the problem's local coordinates.
         predicted: Vec<Point3<f64>>,
         /// `1/h²` in 1/s².
         inverse_h_squared: f64,
     },
 }
 
-/// An energy to be minimized over the vertices that can move.
+/// An energy to be minimized over the free vertices.
 pub(crate) struct Objective<'a> {
     pub problem: &'a Problem,
     pub outer: Outer,
 }
 
-/// The objective at one placement of all vertices. Gradient, parts and rounding are those of the vertices that can move.
+/// The objective at one placement of all vertices. Gradient, force sums and rounding cover the free
+/// vertices only.
 pub(crate) struct State {
     pub x: Vec<Point3<f64>>,
     pub field: Field,
-    /// `∂U/∂x` of each vertex that can move, three numbers in a row.
+    /// `∂U/∂x` of each free vertex, three numbers per vertex.
     pub gradient: Vec<f64>,
-    /// Sum of the norms of what is summed up in the gradient at each of them, in N.
+    /// For each free vertex, the sum of the norms of the terms of its gradient, in N.
     pub parts: Vec<f64>,
     /// Norm of the gradient, in N.
     pub norm: f64,
-    /// Norm of the parts, in N.
+    /// Norm of `parts`, in N.
     pub scale: f64,
-    /// Norm of what rounding alone can leave of the gradient, in N.
+    /// Norm of the gradient that rounding alone can cause, in N.
     pub floor: f64,
-    /// Energy that rounding alone can feign, in J.
+    /// Change of the energy that rounding alone can cause, in J.
     pub noise: f64,
 }
 
 impl Objective<'_> {
-    /// Stiffness of the inertia of `mass`, in N/m: what the outer energy adds to the diagonal of the Hessian.
+    /// Stiffness of the inertia of `mass` in N/m, which the outer energy adds to the diagonal of
+    /// the Hessian.
     pub fn inertia(&self, mass: f64) -> f64 {
         match self.outer {
             Outer::Gravity(_) => 0.0,
@@ -51,7 +54,8 @@ impl Objective<'_> {
         }
     }
 
-    /// Gradient of the outer energy at vertex `v`, and the sizes of what it is the sum of (m as a factor of eps).
+    /// Gradient of the outer energy at vertex `v`, and the size of its rounding error in units of
+    /// the machine epsilon.
     fn outer_gradient(&self, v: usize, x: &Point3<f64>) -> (Vector3<f64>, f64) {
         let mass = self.problem.masses()[v];
         match &self.outer {
@@ -63,7 +67,7 @@ impl Objective<'_> {
         }
     }
 
-    /// Everything about the placement `x`.
+    /// The objective and its derivatives at the placement `x`.
     pub fn at(&self, x: Vec<Point3<f64>>) -> State {
         let field = self.problem.elastic.at(&x);
         let free = &self.problem.free;
@@ -86,7 +90,8 @@ impl Objective<'_> {
         State { x, field, gradient, parts, norm, scale, floor, noise }
     }
 
-    /// The objective at `to` less that at `from`, to the rounding of the change.
+    /// The objective at `to` minus the objective at `from`, accurate to the rounding of the
+    /// difference.
     pub fn difference(&self, from: &State, to: &State) -> f64 {
         let mut sum = self.problem.elastic.difference(&from.field, &to.field);
         for &v in &self.problem.free {
@@ -103,7 +108,7 @@ impl Objective<'_> {
         sum
     }
 
-    /// `from` with the vertices that can move displaced by `length · direction`.
+    /// `from` with the free vertices displaced by `length · direction`.
     pub fn moved(&self, from: &State, direction: &[f64], length: f64) -> State {
         let mut x = from.x.clone();
         for (&v, step) in self.problem.free.iter().zip(direction.chunks_exact(3)) {

@@ -1,28 +1,30 @@
-//! What a minimization is asked for, and what it finds.
+//! Options and results of a minimization.
 
 use nalgebra::Point3;
 
 use crate::NewtonError;
 
-/// When to stop.
+/// When a minimization stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// The norm of the gradient over the norm of its scale, at which a minimum is taken as found.
+    /// Relative gradient at which a minimum counts as found, from 0 to below 1.
     ///
-    /// The gradient at a vertex is a sum of forces: of each constraint, and of gravity or inertia. Its scale there is the sum of the
-    /// norms of these; so the quotient says how well the forces cancel, from 0 to 1, whatever the units. Both norms are the root of
-    /// the sum of squares over the vertices that can move. The scale is the largest of those met on the way, so that a body which
-    /// comes to rest without any force has a minimum too.
+    /// The gradient at a vertex is a sum of forces: of each constraint, and of gravity or inertia.
+    /// The scale at a vertex is the sum of the norms of these forces. The relative gradient is the
+    /// norm of the gradient over the norm of the scale. It measures how well the forces cancel,
+    /// from 0 to 1, in any units. Both norms are the root of the sum of squares over the free
+    /// vertices. The largest scale during the iterations counts, so that a body that comes to rest
+    /// without any force has a minimum too.
     ///
-    /// Below what the rounding of positions leaves of the gradient there is nothing to be gained; what is known to no better than
-    /// that is taken as found as well, and [`Minimum::gradient`] says how far it is.
+    /// A gradient below the rounding error of the positions cannot be improved and also counts as
+    /// found. [`Minimum::gradient`] is the value that was reached.
     pub tolerance: f64,
-    /// Iterations, each with one factorization at least.
+    /// Largest number of iterations. Each factorizes the Hessian at least once.
     pub max_iterations: usize,
 }
 
 impl Default for Options {
-    /// 1e-10, within 200 iterations.
+    /// A tolerance of 1e-10 within 200 iterations.
     fn default() -> Self {
         Self { tolerance: 1e-10, max_iterations: 200 }
     }
@@ -38,27 +40,31 @@ impl Options {
     }
 }
 
-/// A minimum that was found.
+/// The result of a minimization.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Minimum {
     /// Positions of all vertices in m, in the caller's coordinates.
     pub positions: Vec<Point3<f64>>,
-    /// Relative gradient reached; see [`Options::tolerance`].
+    /// The relative gradient that was reached; see [`Options::tolerance`].
     pub gradient: f64,
-    /// Iterations that it took.
+    /// Number of iterations.
     pub iterations: usize,
-    /// Elastic and gravitational energy there, in J. Zero for gravity is at the caller's origin.
+    /// Elastic and gravitational energy in J. The gravitational energy is zero at the caller's
+    /// origin.
     pub energy_j: f64,
-    /// Whether the Hessian, when it was last factorized, was positive definite: then this is a minimum and the only one near. If not,
-    /// it may be a saddle, as a straight column under too heavy a load, or one of many, as of a body on a hinge.
+    /// Whether the Hessian was positive definite at the last factorization. If so, the result is an
+    /// isolated minimum. If not, it may be a saddle, such as a straight column under too large a
+    /// load, or one of many minima, such as a body on a hinge.
     pub definite: bool,
 }
 
-/// Root of the sum of `|found − reference|²` over that of `|reference − start|²`: how far `found` is from the reference, as a share of
-/// the way from `start` to it. Without unit; 0 where nothing differs, infinite where only the way is zero.
+/// The distance of `found` from `reference`, relative to the displacement from `start` to
+/// `reference`: the root of `Σ |found − reference|²` over `Σ |reference − start|²`.
 ///
-/// With the minimizer of an implicit step as reference and what the step started from it is the error E1; with other references the
-/// same serves for errors in time and against closed forms. Vertices that do not move add nothing to either sum.
+/// The result has no unit. It is 0 if `found` equals the reference, and infinite if only the
+/// displacement is zero. Fixed vertices add nothing to either sum. With the minimizer of an
+/// implicit step as the reference and the start of the step, this is the error E1. Other references
+/// give errors in time or against closed forms.
 ///
 /// # Panics
 /// If the lengths differ.

@@ -1,4 +1,5 @@
-//! Where the entries of the Hessian are, and of its factors: found once for a problem, since only the numbers change.
+//! The sparsity pattern of the Hessian and of its factors. It is found once per problem, because
+//! only the numbers change.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltParams, LltRegularization};
@@ -14,21 +15,21 @@ use nalgebra::{Matrix3, Point3};
 use crate::dissection::{self, Graph};
 use crate::{NewtonError, Problem};
 
-/// Below this share of a diagonal entry of the Hessian, its pivot is nothing but rounding.
+/// A pivot below this fraction of the diagonal entry of the Hessian consists of rounding errors.
 const SINGULAR: f64 = 16.0 * f64::EPSILON;
 
-/// The upper triangle of the Hessian in 3×3 blocks, one row and column for each vertex that can move, in the order of their
-/// elimination.
+/// The upper triangle of the Hessian in 3×3 blocks, with one block row and column for each free
+/// vertex in the order of elimination.
 pub(crate) struct Pattern {
-    /// The row and column of each vertex of the body; `u32::MAX` for those that do not move.
+    /// The block row of each vertex of the body; `u32::MAX` for fixed vertices.
     pub places: Vec<u32>,
-    /// The row and column of each vertex that can move.
+    /// The block row of each free vertex.
     ranks: Vec<u32>,
     /// Start of each block column in `rows`.
     starts: Vec<usize>,
-    /// The block rows of each column, ascending, up to the diagonal.
+    /// The block rows of each block column, ascending, up to the diagonal.
     rows: Vec<u32>,
-    /// The same for single numbers, three columns for each vertex.
+    /// The same for single numbers, three columns per vertex.
     column_starts: Vec<usize>,
     row_indices: Vec<usize>,
     symbolic: SymbolicCholesky<usize>,
@@ -44,7 +45,8 @@ pub(crate) struct Factors<'a> {
 }
 
 impl Pattern {
-    /// The pattern of a problem whose vertices are about at `x`.
+    /// The pattern of a problem with vertices near `x`. The positions only affect the order of
+    /// elimination.
     pub fn of(problem: &Problem, x: &[Point3<f64>]) -> Result<Self, NewtonError> {
         let free = &problem.free;
         let mut numbers = vec![u32::MAX; x.len()];
@@ -82,7 +84,7 @@ impl Pattern {
         Ok(Self { places, ranks, starts, rows, column_starts, row_indices, symbolic })
     }
 
-    /// Three numbers for each vertex that can move, brought into the order of elimination.
+    /// Three numbers for each free vertex, permuted into the order of elimination.
     pub fn permuted(&self, by_vertex: &[f64]) -> Vec<f64> {
         let mut by_rank = vec![0.0; by_vertex.len()];
         for (&rank, from) in self.ranks.iter().zip(by_vertex.chunks_exact(3)) {
@@ -96,12 +98,12 @@ impl Pattern {
         self.ranks.iter().flat_map(|&rank| &by_rank[3 * rank as usize..][..3]).copied().collect()
     }
 
-    /// Numbers in the factors.
+    /// Number of entries in the factors.
     pub fn factor_len(&self) -> usize {
         self.symbolic.len_val()
     }
 
-    /// Room for the numbers, all zero.
+    /// Allocates a Hessian and its factors, all zero.
     pub fn factors(&self) -> Result<Factors<'_>, NewtonError> {
         let bytes = |numbers: usize| u64::try_from(numbers).ok()?.checked_mul(size_of::<f64>() as u64);
         let error = |numbers| NewtonError::Memory { free: self.starts.len() - 1, bytes: bytes(numbers) };
@@ -122,7 +124,7 @@ impl Pattern {
     }
 }
 
-/// Vertices that can move, by number, and those they share a constraint with.
+/// The free vertices, by number, and their neighbors.
 fn graph(problem: &Problem, numbers: &[u32]) -> Graph {
     let mut pairs = Vec::new();
     for elements in &problem.elastic.kinds {
@@ -144,7 +146,7 @@ fn graph(problem: &Problem, numbers: &[u32]) -> Graph {
     Graph { offsets, targets: pairs.into_iter().map(|(_, to)| to).collect() }
 }
 
-/// Starts of the columns and rows of the single numbers of blocks.
+/// Column starts and row indices of the single numbers of the blocks.
 fn single(starts: &[usize], rows: &[u32]) -> (Vec<usize>, Vec<usize>) {
     let (mut column_starts, mut row_indices) = (vec![0], Vec::with_capacity(9 * rows.len()));
     for column in starts.windows(2) {
@@ -162,7 +164,8 @@ fn parameters() -> Spec<LltParams, f64> {
 }
 
 impl Factors<'_> {
-    /// Adds a block to the Hessian. Blocks below the diagonal are those above it, transposed, and are left out.
+    /// Adds a block to the Hessian. Blocks below the diagonal are ignored, because they are the
+    /// transposed ones above it.
     pub fn add(&mut self, row: u32, column: u32, block: &Matrix3<f64>) {
         if row > column {
             return;
@@ -180,13 +183,13 @@ impl Factors<'_> {
         }
     }
 
-    /// Where the diagonal entry `n` is among the numbers of the Hessian.
+    /// Index of the diagonal entry `n` among the numbers of the Hessian.
     pub fn diagonal(&self, n: usize) -> usize {
         // The diagonal block is the last of its columns.
         self.pattern.column_starts[n + 1] - 3 + n % 3
     }
 
-    /// The Hessian times `x`: three numbers for each vertex that can move, in their order.
+    /// The Hessian times `x`: three numbers for each free vertex, in their order.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let pattern = self.pattern;
         let x = pattern.permuted(x);
@@ -195,7 +198,7 @@ impl Factors<'_> {
             let entries = pattern.column_starts[column]..pattern.column_starts[column + 1];
             for (&row, value) in pattern.row_indices[entries.clone()].iter().zip(&self.values[entries]) {
                 y[row] += value * x[column];
-                // The diagonal blocks are whole, of the others only the upper ones are there.
+                // Diagonal blocks are stored completely. Of the others only the upper ones are.
                 if row / 3 != column / 3 {
                     y[column] += value * x[row];
                 }
@@ -204,7 +207,7 @@ impl Factors<'_> {
         pattern.restored(&y)
     }
 
-    /// Factorizes the Hessian. False where it is not positive definite, to rounding.
+    /// Factorizes the Hessian. Returns false if it is not positive definite to rounding.
     pub fn factorize(&mut self) -> bool {
         let pattern = self.pattern;
         let n = pattern.column_starts.len() - 1;
@@ -219,11 +222,11 @@ impl Factors<'_> {
             MemStack::new(&mut self.scratch),
             parameters(),
         );
-        done.is_ok() && self.pivots_stand_out()
+        done.is_ok() && self.pivots_exceed_rounding()
     }
 
-    /// Whether every pivot is more than what rounding leaves of the diagonal entry it comes from.
-    fn pivots_stand_out(&self) -> bool {
+    /// Whether every pivot is larger than the rounding error of its diagonal entry.
+    fn pivots_exceed_rounding(&self) -> bool {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.pattern.symbolic.raw() else { return true };
         let factors = SupernodalLltRef::new(symbolic, &self.factors);
         (0..symbolic.n_supernodes()).all(|s| {
@@ -236,8 +239,8 @@ impl Factors<'_> {
         })
     }
 
-    /// The solution of `H x = b`, with the Hessian that was factorized last. Three numbers for each vertex that can move, in their
-    /// order.
+    /// The solution of `H x = b` with the last factorized Hessian. `b` has three numbers for each
+    /// free vertex, in their order.
     pub fn solve(&mut self, b: &[f64]) -> Vec<f64> {
         let mut x = self.pattern.permuted(b);
         let factors = faer::sparse::linalg::cholesky::LltRef::new(&self.pattern.symbolic, &self.factors);
@@ -252,23 +255,13 @@ mod tests {
     use cutis_coloring::greedy;
     use cutis_constraints::Distance;
     use cutis_solver::{Stiffness, SystemBuilder};
+    use cutis_test_kit::Kuhn;
 
     use super::*;
 
-    /// Springs along the axes and one way across the cubes of a lattice of `n³` vertices, one of them held.
-    fn lattice(n: u32) -> Problem {
-        let index = |i: u32, j: u32, k: u32| i + n * (j + n * k);
-        let points = || (0..n.pow(3)).map(|v| [v % n, v / n % n, v / (n * n)]);
-        let positions: Vec<_> = points().map(|p| Point3::from(p.map(f64::from))).collect();
-        let mut springs = Vec::new();
-        for [i, j, k] in points() {
-            for [di, dj, dk] in [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1], [1, 1, 1]]
-            {
-                if i + di < n && j + dj < n && k + dk < n {
-                    springs.push([index(i, j, k), index(i + di, j + dj, k + dk)]);
-                }
-            }
-        }
+    /// A lattice of `n³` vertices with springs on its edges. The first vertex is fixed.
+    fn lattice(n: usize) -> Problem {
+        let Kuhn { positions, edges: springs, .. } = Kuhn::new([n; 3], 1.0);
         let inverse_masses: Vec<f64> = (0..positions.len()).map(|v| f64::from(v > 0)).collect();
         let system = SystemBuilder::<f64>::new(&positions, &inverse_masses)
             .unwrap()
@@ -284,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn dissection_fills_in_less_than_minimum_degree() {
+    fn dissection_gives_less_fill_in_than_minimum_degree() {
         for (n, share) in [(8, 1.0), (14, 0.8)] {
             let problem = lattice(n);
             let pattern = problem.pattern().unwrap();
@@ -312,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn factors_solve_what_the_product_says() {
+    fn a_solution_inverts_the_product() {
         let problem = lattice(5);
         let pattern = problem.pattern().unwrap();
         let mut factors = pattern.factors().unwrap();
@@ -334,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_singular_or_bends_down_is_told() {
+    fn singular_and_indefinite_matrices_are_reported() {
         let problem = lattice(2);
         let pattern = problem.pattern().unwrap();
         for (value, definite) in [(1.0, true), (0.0, false), (-1.0, false), (1e-15, false), (f64::NAN, false)]
@@ -343,7 +336,7 @@ mod tests {
             for rank in 0..problem.free.len() as u32 {
                 factors.add(rank, rank, &Matrix3::identity());
             }
-            // A pivot that is left of 1 less 1 − value.
+            // The last pivot becomes 1 − (1 − value).
             let block = Matrix3::from_diagonal(&nalgebra::Vector3::new((1.0_f64 - value).sqrt(), 0.0, 0.0));
             let block = if value < 0.0 { Matrix3::identity() * (1.0 - value) } else { block };
             let last = problem.free.len() as u32 - 1;

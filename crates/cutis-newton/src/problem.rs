@@ -1,4 +1,4 @@
-//! A body as a sum of energies: masses, constraints, gravity, and nothing of how a solver steps.
+//! A body as a sum of energies: masses, constraints and gravity, without any stepping scheme.
 
 use std::sync::OnceLock;
 
@@ -13,13 +13,14 @@ use crate::objective::{Objective, Outer};
 use crate::pattern::Pattern;
 use crate::{Minimum, NewtonError, Options};
 
-/// The energies of a system, in double precision and independent of it: the constraints as `½C²/α`, the masses, gravity.
+/// The energies of a system in double precision: the constraints as `½C²/α`, the masses and
+/// gravity.
 ///
-/// Positions that are given and returned are in meters, in the caller's coordinates, one per vertex of the system.
-/// Vertices with inverse mass 0 do not move.
+/// All positions in arguments and results are in meters, in the caller's coordinates, one per
+/// vertex of the system. Vertices with inverse mass 0 are fixed. The others are free.
 pub struct Problem {
     pub(crate) elastic: Elastic,
-    /// The vertices that can move, ascending.
+    /// The free vertices, ascending.
     pub(crate) free: Vec<u32>,
     origin: Vector3<f64>,
     positions: Vec<Point3<f64>>,
@@ -29,10 +30,12 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// What `system` is made of, with the parameters and stiffnesses that it stores, under the gravity given in m/s².
+    /// The problem of `system`, with the parameters and stiffnesses that it stores, under a gravity
+    /// in m/s².
     ///
     /// # Errors
-    /// A kind with a PBD stiffness, a constraint with compliance 0, no vertex that can move, a gravity that is not finite.
+    /// A kind with a PBD stiffness, a constraint with compliance 0, no free vertex, or a gravity
+    /// that is not finite.
     pub fn of<T: Scalar>(system: &System<T>, gravity_m_s2: [f64; 3]) -> Result<Self, NewtonError> {
         for value in gravity_m_s2 {
             if !value.is_finite() {
@@ -59,52 +62,52 @@ impl Problem {
         })
     }
 
-    /// Positions that the system had, in m.
+    /// The positions of the system, in m.
     pub fn positions(&self) -> &[Point3<f64>] {
         &self.positions
     }
 
-    /// Mass of each vertex in kg; infinity for those that do not move.
+    /// Mass of each vertex in kg; infinity for fixed vertices.
     pub fn masses(&self) -> &[f64] {
         &self.masses
     }
 
-    /// Bytes that the factors of the Hessian take, the most of what a minimization needs.
+    /// Bytes of the factors of the Hessian, the largest part of the memory of a minimization.
     ///
     /// # Errors
-    /// [`NewtonError::Memory`] if they cannot be counted.
+    /// [`NewtonError::Memory`] if the factors cannot be indexed.
     pub fn factor_bytes(&self) -> Result<usize, NewtonError> {
         Ok(self.pattern()?.factor_len().saturating_mul(size_of::<f64>()))
     }
 
-    /// Number of vertices that can move.
+    /// Number of free vertices.
     pub fn free_count(&self) -> usize {
         self.free.len()
     }
 
-    /// `Σ ½C²/α − Σ m g·x` in J; the second sum is over the vertices that can move.
+    /// `Σ ½C²/α − Σ m g·x` in J. The second sum is over the free vertices.
     ///
     /// # Panics
-    /// If `x` has not one position per vertex.
+    /// If `x` does not have one position per vertex.
     pub fn energy(&self, x: &[Point3<f64>]) -> f64 {
         let weight = |&v: &u32| self.masses[v as usize] * self.gravity.dot(&x[v as usize].coords);
         self.elastic.energy(&self.local(x)) - self.free.iter().map(weight).sum::<f64>()
     }
 
-    /// `−∂U/∂x` of the elastic energy at each vertex, in N. At vertices that do not move it is the force that the body
-    /// exerts on what holds them.
+    /// `−∂U/∂x` of the elastic energy at each vertex, in N. At fixed vertices it is the force that
+    /// the body exerts on its support.
     ///
     /// # Panics
-    /// If `x` has not one position per vertex.
+    /// If `x` does not have one position per vertex.
     pub fn forces(&self, x: &[Point3<f64>]) -> Vec<Vector3<f64>> {
         self.elastic.at(&self.local(x)).gradient.into_iter().map(|gradient| -gradient).collect()
     }
 
-    /// `x̃ = x + h·v + h²·g` of the vertices that can move, for a step of `h` seconds from the positions `x` and the
-    /// velocities `v` (m/s). The others stay where `x` has them.
+    /// `x̃ = x + h·v + h²·g` of the free vertices, for a step of `h` seconds from the positions `x`
+    /// with the velocities `v` (m/s). Fixed vertices stay at `x`.
     ///
     /// # Panics
-    /// If `x` or `v` has not one entry per vertex.
+    /// If `x` or `v` does not have one entry per vertex.
     pub fn predicted(&self, x: &[Point3<f64>], v: &[Vector3<f64>], h: f64) -> Vec<Point3<f64>> {
         assert_eq!((x.len(), v.len()), (self.masses.len(), self.masses.len()), "one entry per vertex");
         let mut predicted = x.to_vec();
@@ -115,11 +118,13 @@ impl Problem {
         predicted
     }
 
-    /// An implicit Euler step of `h` seconds: the minimizer of `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`, from `start`. Gravity is in
-    /// `x̃`, see [`predicted`](Self::predicted). Vertices that do not move stay where `start` has them.
+    /// An implicit Euler step of `h` seconds: the minimizer of `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`,
+    /// found from `start`. Gravity is part of `x̃`, see [`predicted`](Self::predicted). Fixed
+    /// vertices stay at `start`.
     ///
     /// # Errors
-    /// Lengths that differ, numbers that are not finite, an `h` of 0 or less, no memory, no convergence.
+    /// Different lengths, numbers that are not finite, an `h` of 0 or less, a lack of memory, or no
+    /// convergence.
     pub fn step(
         &self,
         start: &[Point3<f64>],
@@ -138,11 +143,12 @@ impl Problem {
         self.minimum(start, outer, options)
     }
 
-    /// Static equilibrium under gravity: a minimum of [`energy`](Self::energy), from `start`. Vertices that do not move stay
-    /// where `start` has them.
+    /// Static equilibrium under gravity: a minimum of [`energy`](Self::energy), found from `start`.
+    /// Fixed vertices stay at `start`.
     ///
     /// # Errors
-    /// As for [`step`](Self::step), and [`NewtonError::Floating`] for a part of the body that nothing holds.
+    /// The errors of [`step`](Self::step), and [`NewtonError::Floating`] for a part of the body
+    /// that nothing holds.
     pub fn equilibrium(&self, start: &[Point3<f64>], options: &Options) -> Result<Minimum, NewtonError> {
         self.check("start", start)?;
         floating::refuse(self, &self.local(start))?;
@@ -167,13 +173,13 @@ impl Problem {
         Ok(Minimum { positions, gradient, iterations, energy_j, definite })
     }
 
-    /// Where the entries of the Hessian and of its factors are; found once.
+    /// The sparsity pattern of the Hessian and of its factors, found at the first call.
     pub(crate) fn pattern(&self) -> Result<&Pattern, NewtonError> {
         let pattern = self.pattern.get_or_init(|| Pattern::of(self, &self.local(&self.positions)));
         pattern.as_ref().map_err(Clone::clone)
     }
 
-    /// Positions relative to the system's origin, in which its constraints are stored.
+    /// Positions relative to the system's origin. The parameters of its constraints refer to these.
     pub(crate) fn local(&self, x: &[Point3<f64>]) -> Vec<Point3<f64>> {
         assert_eq!(x.len(), self.masses.len(), "one position per vertex");
         x.iter().map(|x| x - self.origin).collect()
