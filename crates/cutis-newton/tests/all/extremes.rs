@@ -1,16 +1,17 @@
-//! Random stiffnesses (over eight orders of magnitude), masses, steps and starts: a minimum is found to the tolerance, or to the
-//! rounding of positions.
+//! Random stiffnesses (over eight orders of magnitude), masses, steps and starts: a minimum is
+//! found to the tolerance, or to the rounding of positions.
 
 use cutis_coloring::greedy;
-use cutis_constraints::{Distance, SkinTension, SkinTensionMaterial, Volume};
+use cutis_constraints::{SkinTension, SkinTensionMaterial};
 use cutis_newton::{Options, Problem};
-use cutis_solver::{Stiffness, SystemBuilder};
+use cutis_solver::Stiffness;
+use cutis_test_kit::Kuhn;
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
-use crate::blocks::{Kuhn, noise, shaken};
+use crate::blocks::{noise, shaken, solid};
 
-/// A block with the compliances given (in units that fit the scale) and masses.
+/// A block with the given compliances, in units that fit the scale, and masses.
 fn problem(scale: f64, [springs, solids, skin]: [f64; 3], mass: f64) -> Problem {
     let lattice = Kuhn::new([4, 3, 3], scale);
     let count = lattice.positions.len();
@@ -18,22 +19,7 @@ fn problem(scale: f64, [springs, solids, skin]: [f64; 3], mass: f64) -> Problem 
     let masses: Vec<f64> =
         lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 / mass }).collect();
     let tension = SkinTensionMaterial { rest_area_scale: 0.8, amplification: 10.0 };
-    let builder = SystemBuilder::<f64>::new(&lattice.positions, &masses).unwrap();
-    let system = builder
-        .add_from_rest::<Distance, 2>(
-            &lattice.edges,
-            &Default::default(),
-            Stiffness::compliance(springs),
-            &greedy(&lattice.edges, count).unwrap(),
-        )
-        .unwrap()
-        .add_from_rest::<Volume, 4>(
-            &lattice.tets,
-            &Default::default(),
-            Stiffness::compliance(solids * scale.powi(4)),
-            &greedy(&lattice.tets, count).unwrap(),
-        )
-        .unwrap()
+    let system = solid(&lattice, &lattice.positions, &masses, [springs, solids * scale.powi(4)])
         .add_from_rest::<SkinTension, 3>(
             &faces,
             &tension,
@@ -45,7 +31,7 @@ fn problem(scale: f64, [springs, solids, skin]: [f64; 3], mass: f64) -> Problem 
     Problem::of(&system, [0.0, 0.0, -scale]).unwrap()
 }
 
-/// The gradient at the end of a step, from the forces.
+/// The gradient at the end of a step, computed from the forces.
 fn gradient(problem: &Problem, x: &[Point3<f64>], predicted: &[Point3<f64>], h: f64) -> Vec<Vector3<f64>> {
     let forces = problem.forces(x);
     let inertia = |v: usize| (x[v] - predicted[v]) * (problem.masses()[v] / (h * h));
@@ -53,7 +39,8 @@ fn gradient(problem: &Problem, x: &[Point3<f64>], predicted: &[Point3<f64>], h: 
     free.map(|v| inertia(v) - forces[v]).collect()
 }
 
-/// Whether what is left of a gradient is less than what the last bits of the positions make of it, ten times over.
+/// Whether the gradient is less than ten times the change that the last bits of the positions
+/// cause.
 fn is_rounding(problem: &Problem, x: &[Point3<f64>], predicted: &[Point3<f64>], h: f64) -> bool {
     let norm = |vectors: &[Vector3<f64>]| vectors.iter().map(Vector3::norm_squared).sum::<f64>().sqrt();
     let nudged: Vec<_> =
@@ -64,7 +51,7 @@ fn is_rounding(problem: &Problem, x: &[Point3<f64>], predicted: &[Point3<f64>], 
     norm(&here) <= 10.0 * norm(&change)
 }
 
-/// Powers of ten, by a random exponent.
+/// Powers of ten with a random exponent.
 fn tens(range: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
     range.prop_map(|exponent| 10f64.powf(exponent))
 }
@@ -73,7 +60,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
-    fn a_step_is_found_whatever_the_stiffnesses(
+    fn a_step_is_found_for_any_stiffnesses(
         scale in tens(-3.0..3.0),
         springs in tens(-6.0..2.0),
         solids in tens(-6.0..2.0),
@@ -107,9 +94,9 @@ proptest! {
     }
 }
 
-/// Beside a saddle the way down is found in a few steps, not in thousands.
+/// Near a saddle the way down is found in a few steps and not in thousands.
 #[test]
-fn a_saddle_is_left() {
+fn a_saddle_is_left_in_a_few_steps() {
     let problem = problem(1.0, [1.183, 1.168e-4, 0.1075], 1e-3);
     let start = shaken(problem.positions(), 0.781, |v| problem.masses()[v].is_infinite());
     let found = problem.equilibrium(&start, &Options::default()).unwrap();

@@ -1,4 +1,4 @@
-//! What is refused, and what the error says.
+//! Invalid problems are refused, and the error names the fault.
 
 use cutis_coloring::greedy;
 use cutis_constraints::Distance;
@@ -20,11 +20,11 @@ fn springs(stiffness: Stiffness<f64>) -> System<f64> {
 }
 
 fn error(system: &System<f64>) -> NewtonError {
-    Problem::of(system, [0.0; 3]).err().expect("is refused")
+    Problem::of(system, [0.0; 3]).err().expect("the system must be refused")
 }
 
 #[test]
-fn what_stands_for_no_finite_energy_is_refused() {
+fn kinds_without_a_finite_energy_are_refused() {
     assert_eq!(error(&springs(Stiffness::pbd(1.0))), NewtonError::PbdStiffness { kind: "distance" });
     let rigid = error(&springs(Stiffness::Compliance(Values::Each(vec![1.0, 0.0]))));
     assert_eq!(rigid, NewtonError::Rigid { kind: "distance", vertices: vec![1, 2], compliance: 0.0 });
@@ -47,11 +47,11 @@ fn a_loose_vertex_is_named() {
     let problem = Problem::of(&system, [0.0; 3]).unwrap();
     let found = problem.equilibrium(&LINE, &Options::default()).unwrap_err();
     assert_eq!(found, NewtonError::Floating { vertex: 2, vertices: 1 });
-    problem.step(&LINE, &LINE, 0.1, &Options::default()).expect("inertia holds it in a step");
+    problem.step(&LINE, &LINE, 0.1, &Options::default()).expect("inertia holds the vertex in a step");
 }
 
 #[test]
-fn numbers_that_cannot_be_used_are_named() {
+fn invalid_numbers_are_named() {
     let problem = Problem::of(&springs(Stiffness::compliance(1.0)), [0.0; 3]).unwrap();
     let options = Options::default();
     for h in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-200] {
@@ -76,12 +76,12 @@ fn numbers_that_cannot_be_used_are_named() {
 }
 
 #[test]
-fn too_few_iterations_are_told_with_figures() {
+fn too_few_iterations_are_reported_with_numbers() {
     let problem = Problem::of(&hanging(3, 1.0), [0.0, 0.0, -0.1]).unwrap();
     let found =
         problem.equilibrium(problem.positions(), &Options { max_iterations: 1, ..Options::default() });
     let NewtonError::NotConverged { iterations: 1, gradient, tolerance } = found.unwrap_err() else {
-        panic!("one iteration cannot do")
+        panic!("one iteration cannot suffice")
     };
     assert!(gradient > tolerance && tolerance == 1e-10);
 }

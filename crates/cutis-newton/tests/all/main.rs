@@ -1,4 +1,4 @@
-//! Minimizers against closed forms, differences, and a solver of another kind.
+//! Minimizers agree with closed forms, with finite differences and with a solver of another kind.
 
 mod blocks;
 mod closed_forms;
@@ -9,7 +9,7 @@ mod refusals;
 mod solver;
 mod step;
 
-/// The length scales of every problem: results may not depend on the unit of length.
+/// The length scales of every problem. Results may not depend on the unit of length.
 const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
 
 /// Fails unless `found` is within `tolerance` of `expected`, relative to `size`.

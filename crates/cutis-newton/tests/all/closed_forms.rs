@@ -1,17 +1,18 @@
-//! Equilibria that are known in closed form, at three scales.
+//! Equilibria with a known closed form, at three scales.
 
 use cutis_coloring::greedy;
-use cutis_constraints::{Distance, DistanceMaterial, Volume};
+use cutis_constraints::Distance;
 use cutis_newton::{Options, Problem};
 use cutis_solver::{Stiffness, System, SystemBuilder};
+use cutis_test_kit::Kuhn;
 use nalgebra::{Matrix3, Point3};
 
-use crate::blocks::Kuhn;
+use crate::blocks::solid;
 use crate::{SCALES, near};
 
 const GRAVITY: f64 = 9.81;
 
-/// Vertices on a line, joined by springs of `length` and the compliance given.
+/// Vertices on a line, joined by springs with the given rest length and compliance.
 pub fn chain(positions: &[Point3<f64>], inverse_masses: &[f64], length: f64, compliance: f64) -> System<f64> {
     let springs: Vec<[u32; 2]> = (1..positions.len() as u32).map(|v| [v - 1, v]).collect();
     SystemBuilder::new(positions, inverse_masses)
@@ -26,7 +27,8 @@ pub fn chain(positions: &[Point3<f64>], inverse_masses: &[f64], length: f64, com
         .build()
 }
 
-/// A mass under a fixed point hangs lower by `m g/k`. Checked against `k` of another spring.
+/// A mass below a fixed point hangs lower by `m g/k`. The expected value uses a stiffness of
+/// `assumed` times `k`.
 fn hanging_mass(scale: f64, assumed: f64) -> Result<(), String> {
     let (mass, stiffness) = (0.7, 300.0 / scale);
     let positions = [Point3::origin(), Point3::new(0.0, 0.0, -scale)];
@@ -37,7 +39,7 @@ fn hanging_mass(scale: f64, assumed: f64) -> Result<(), String> {
     let lower = mass * GRAVITY / (stiffness * assumed);
     near("height", rest.positions[1].z, -scale - lower, scale, 1e-13)?;
     near(
-        "pull on the fixed point",
+        "force on the fixed point",
         problem.forces(&rest.positions)[0].z,
         -mass * GRAVITY,
         mass * GRAVITY,
@@ -48,7 +50,7 @@ fn hanging_mass(scale: f64, assumed: f64) -> Result<(), String> {
 }
 
 #[test]
-fn a_mass_on_a_spring_hangs_by_its_weight_over_the_stiffness() {
+fn a_mass_on_a_spring_sinks_by_weight_over_stiffness() {
     for scale in SCALES {
         hanging_mass(scale, 1.0).unwrap();
     }
@@ -56,7 +58,7 @@ fn a_mass_on_a_spring_hangs_by_its_weight_over_the_stiffness() {
 }
 
 #[test]
-fn each_link_of_a_hanging_chain_carries_what_is_below() {
+fn each_link_of_a_hanging_chain_carries_the_weight_below() {
     let (links, stiffness) = (20, 1e3);
     for scale in SCALES {
         let positions: Vec<_> = (0..=links).map(|n| Point3::new(0.0, 0.0, -scale * n as f64)).collect();
@@ -73,8 +75,9 @@ fn each_link_of_a_hanging_chain_carries_what_is_below() {
     }
 }
 
-/// A chain between two points of one height, started straight, where nothing holds it sideways: in equilibrium the horizontal pull
-/// is the same in each link, and the vertical one changes by the weight of each vertex.
+/// A chain between two points at one height, started straight, where nothing holds it sideways. In
+/// equilibrium the horizontal force is the same in each link, and the vertical force changes by the
+/// weight of each vertex.
 #[test]
 fn a_chain_between_two_points_becomes_a_catenary() {
     let (links, stiffness, weight) = (16, 2e3, GRAVITY);
@@ -97,29 +100,14 @@ fn a_chain_between_two_points_becomes_a_catenary() {
     }
 }
 
-/// P6: largest deviation of the interior from the affine map of the border, over the size of the block.
+/// The patch test: largest deviation of the interior from the affine map `map` when the border
+/// moves by `hold`, relative to the size of the block.
 fn patch_deviation(scale: f64, map: Matrix3<f64>, hold: Matrix3<f64>) -> f64 {
     let n = 6;
     let lattice = Kuhn::new([n; 3], scale);
     let border = |p: &Point3<f64>| p.iter().any(|&x| x == 0.0 || x == (n - 1) as f64 * scale);
     let masses: Vec<f64> = lattice.positions.iter().map(|p| if border(p) { 0.0 } else { 1.0 }).collect();
-    let system = SystemBuilder::<f64>::new(&lattice.positions, &masses)
-        .unwrap()
-        .add_from_rest::<Distance, 2>(
-            &lattice.edges,
-            &DistanceMaterial::default(),
-            Stiffness::compliance(1.0),
-            &greedy(&lattice.edges, masses.len()).unwrap(),
-        )
-        .unwrap()
-        .add_from_rest::<Volume, 4>(
-            &lattice.tets,
-            &Default::default(),
-            Stiffness::compliance(scale.powi(4)),
-            &greedy(&lattice.tets, masses.len()).unwrap(),
-        )
-        .unwrap()
-        .build();
+    let system = solid(&lattice, &lattice.positions, &masses, [1.0, scale.powi(4)]).build();
     let problem = Problem::of(&system, [0.0; 3]).unwrap();
     let start: Vec<_> = lattice.positions.iter().map(|p| if border(p) { hold * p } else { *p }).collect();
     let rest = problem.equilibrium(&start, &Options::default()).unwrap();

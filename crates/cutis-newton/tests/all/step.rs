@@ -1,4 +1,4 @@
-//! Implicit steps: a closed form, and the objective's differences at what is said to be its minimum.
+//! Implicit steps agree with a closed form, and the objective has no slope at their end.
 
 use cutis_newton::{NewtonError, Options, Problem, relative_rms};
 use nalgebra::{Point3, Vector3};
@@ -26,7 +26,7 @@ fn a_step_along_a_spring_is_the_mean_of_inertia_and_stiffness() {
 }
 
 #[test]
-fn what_nothing_pulls_at_goes_where_inertia_takes_it() {
+fn a_vertex_without_constraints_follows_its_inertia() {
     let x = [Point3::new(1.0, 2.0, 3.0), Point3::new(-1.0, 0.5, 0.0)];
     let system = cutis_solver::SystemBuilder::<f64>::new(&x, &[1.0, 0.5]).unwrap().build();
     let problem = Problem::of(&system, [0.0, -9.81, 0.0]).unwrap();
@@ -35,8 +35,8 @@ fn what_nothing_pulls_at_goes_where_inertia_takes_it() {
     assert!(relative_rms(&found.positions, &predicted, &x) < 1e-14);
 }
 
-/// A step of the shaken block with skin, and the largest slope of the objective at its end, along each coordinate of some vertices,
-/// over the forces there. `off` moves the end: the negative control.
+/// Largest slope of the objective at the end of a step of the shaken block with skin, along any
+/// coordinate, relative to the forces. `off` displaces the end, for the negative control.
 fn worst_slope(scale: f64, h: f64, off: f64) -> f64 {
     let problem = Problem::of(&skinned([4, 3, 4], scale), [0.0, 0.0, -scale]).unwrap();
     let free = |v: usize| problem.masses()[v].is_finite();
@@ -46,7 +46,7 @@ fn worst_slope(scale: f64, h: f64, off: f64) -> f64 {
     let predicted = problem.predicted(&x, &v, h);
     let found = problem.step(&x, &predicted, h, &Options::default()).unwrap();
     assert!(found.definite && found.gradient <= 1e-10, "{} {}", found.gradient, found.iterations);
-    // Elastic energy alone, from a problem without gravity.
+    // The elastic energy alone comes from a problem without gravity.
     let elastic = Problem::of(&skinned([4, 3, 4], scale), [0.0; 3]).unwrap();
     let objective = |x: &[Point3<f64>]| {
         let inertia = |v: usize| 0.5 * problem.masses()[v] / (h * h) * (x[v] - predicted[v]).norm_squared();
@@ -72,7 +72,7 @@ fn worst_slope(scale: f64, h: f64, off: f64) -> f64 {
 }
 
 #[test]
-fn the_end_of_a_step_is_where_the_objective_has_no_slope() {
+fn the_objective_has_no_slope_at_the_end_of_a_step() {
     for scale in SCALES {
         for h in [0.01, 0.3, 10.0] {
             let worst = worst_slope(scale, h, 0.0);
@@ -82,12 +82,12 @@ fn the_end_of_a_step_is_where_the_objective_has_no_slope() {
 }
 
 #[test]
-fn control_an_end_a_ten_thousandth_off_has_a_slope() {
+fn control_an_end_off_by_1e_4_has_a_slope() {
     assert!(worst_slope(1.0, 0.3, 1e-4) > 1e-5);
 }
 
 #[test]
-fn a_problem_gives_the_same_bits_for_any_number_of_threads() -> Result<(), NewtonError> {
+fn the_bits_do_not_depend_on_the_number_of_threads() -> Result<(), NewtonError> {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
@@ -103,7 +103,7 @@ fn a_problem_gives_the_same_bits_for_any_number_of_threads() -> Result<(), Newto
 }
 
 #[test]
-fn the_relative_error_is_a_share_of_the_way() {
+fn the_relative_error_is_relative_to_the_displacement() {
     let at = |x: f64| [Point3::origin(), Point3::new(x, 0.0, 0.0)];
     assert_eq!(relative_rms(&at(2.5), &at(3.0), &at(1.0)), 0.25);
     assert_eq!(relative_rms(&at(1.0), &at(1.0), &at(1.0)), 0.0);

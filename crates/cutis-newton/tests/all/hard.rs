@@ -1,4 +1,5 @@
-//! Starts from which plain Newton would not come home: compressed, turned inside out, balanced, loose.
+//! Starts from which plain Newton would not converge: compressed, inverted, balanced and loose
+//! bodies.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Constraint, Distance, Eval, Real};
@@ -10,7 +11,8 @@ use crate::blocks::{hanging, shaken, skinned};
 use crate::closed_forms::chain;
 use crate::{SCALES, near};
 
-/// A mass of weight 1 N on a spring of 10 N/m and 1 m above a fixed point, started at the angle given from upright.
+/// The equilibrium of a mass of weight 1 N on a spring of 10 N/m and 1 m above a fixed point, and
+/// whether it is definite. `angle` is the angle of the start from upright.
 fn pendulum(angle: f64) -> (Point3<f64>, bool) {
     let start = [Point3::origin(), Point3::new(angle.sin(), 0.0, angle.cos())];
     let system = chain(&start, &[0.0, 1.0], 1.0, 0.1);
@@ -20,7 +22,7 @@ fn pendulum(angle: f64) -> (Point3<f64>, bool) {
 }
 
 #[test]
-fn a_balanced_mass_is_told_from_a_hanging_one() {
+fn a_saddle_is_distinguished_from_a_minimum() {
     let (balanced, definite) = pendulum(0.0);
     near("height", balanced.z, 0.9, 1.0, 1e-12).unwrap();
     assert!(!definite, "a saddle");
@@ -30,7 +32,7 @@ fn a_balanced_mass_is_told_from_a_hanging_one() {
 }
 
 #[test]
-fn a_spring_squeezed_to_a_hundredth_opens_again() {
+fn a_spring_compressed_to_a_hundredth_recovers() {
     for scale in SCALES {
         let start = [Point3::origin(), Point3::new(0.01 * scale, 1e-3 * scale, 0.0)];
         let problem = Problem::of(&chain(&start, &[0.0, 1.0], scale, 1.0), [0.0; 3]).unwrap();
@@ -70,7 +72,8 @@ fn a_scrambled_body_ends_in_a_minimum() {
     }
 }
 
-/// What is held together by nothing but a hinge can turn without a force: it has endlessly many equilibria.
+/// A body that is held only by a hinge can turn without a force, so it has infinitely many
+/// equilibria.
 #[test]
 fn a_body_on_a_hinge_has_no_definite_minimum() {
     let corners = [Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.5, 0.8, 0.0)];
@@ -83,7 +86,7 @@ fn a_body_on_a_hinge_has_no_definite_minimum() {
     assert_eq!(floating, NewtonError::Floating { vertex: 0, vertices: 3 });
 }
 
-/// A vertex keeps its distance from a point of space: the part of a spring whose other end is no vertex.
+/// Keeps the distance of a vertex from a point in space: a spring whose other end is not a vertex.
 struct Tether;
 
 impl Constraint<1> for Tether {
@@ -104,9 +107,10 @@ impl Constraint<1> for Tether {
     }
 }
 
-/// No vertex is held, but a constraint ties the body to a place: it hangs there, and is not called floating.
+/// No vertex is fixed, but a constraint ties the body to a place. It hangs there and is not
+/// reported as floating.
 #[test]
-fn what_a_constraint_ties_to_a_place_has_an_equilibrium() {
+fn a_body_tied_by_a_constraint_has_an_equilibrium() {
     let start = [Point3::new(0.8, 0.0, 0.1), Point3::new(1.5, 0.0, -0.5)];
     let one = greedy(&[[0]], 2).unwrap();
     let system = SystemBuilder::<f64>::new(&start, &[1.0, 1.0])
@@ -123,9 +127,10 @@ fn what_a_constraint_ties_to_a_place_has_an_equilibrium() {
     assert!(rest.definite && problem.check_derivatives(&start, 5).unwrap().hessian < 1e-7);
 }
 
-/// Turning and moving a problem as a whole turns and moves its answer; a million body sizes from the origin costs six digits.
+/// Rotating and moving a problem rotates and moves its solution. A distance of a million body sizes
+/// from the origin costs six digits.
 #[test]
-fn where_a_body_lies_and_how_it_is_turned_does_not_matter() {
+fn place_and_orientation_do_not_matter() {
     let turn = Rotation3::from_euler_angles(0.3, -0.7, 1.1);
     let gravity = Vector3::new(0.0, 0.0, -1e-3);
     let plain = Problem::of(&hanging(4, 1.0), gravity.into()).unwrap();

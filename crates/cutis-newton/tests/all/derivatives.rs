@@ -1,4 +1,4 @@
-//! The check of derivatives passes what is right and refuses what is wrong.
+//! The check of derivatives passes correct ones and refuses wrong ones.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Constraint, Distance, Eval, Real};
@@ -19,7 +19,7 @@ fn derivatives_of_all_kinds_are_those_of_the_energy() {
     }
 }
 
-/// A distance whose gradient is a millionth too long.
+/// A distance whose gradient is too long by a factor of 1e-6.
 struct TooLong;
 
 impl Constraint<2> for TooLong {
