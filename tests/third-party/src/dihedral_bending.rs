@@ -1,16 +1,17 @@
-//! Dihedral bending: two triangles keep the angle between them.
+//! The dihedral bending constraint: two triangles keep the angle between them.
 
 use cutis_constraints::{Constraint, Eval, Real};
 use nalgebra::{Point3, Vector3};
 
-/// Sine of a triangle's angle at the first vertex, and of half the opening of a fold, in units of the machine epsilon, below
-/// which a direction is rounding noise.
+/// Threshold in units of the machine epsilon, below which a direction is rounding noise. It applies
+/// to the sine of a triangle's angle at the first vertex and to half the opening of a fold.
 const NOISE: f64 = 8.0;
 
-/// Two triangles keep the angle between them: `0 1 2` and `0 3 1`, hinged on the edge `0 1`.
+/// A constraint that keeps the angle between the triangles `0 1 2` and `0 3 1`, which share the
+/// edge `0 1`.
 ///
-/// With the unit normals `m1`, `m2`, which are equal where the hinge is flat, and the angle `θ` from one to the other about
-/// the edge,
+/// Let `m1` and `m2` be the unit normals, which are equal where the hinge is flat, and `θ` the
+/// angle from one to the other about the edge. Then
 ///
 /// ```text
 /// C  = 2 sin(θ/2) − 2 sin(θ₀/2)                   [1]
@@ -20,13 +21,14 @@ const NOISE: f64 = 8.0;
 /// ∇1θ = −(s2 ∇2θ + s3 ∇3θ),  ∇0θ = −((1 − s2) ∇2θ + (1 − s3) ∇3θ)
 /// ```
 ///
-/// where `n` are the normals not made unit, `e` is the edge, and `s` is the place along it of the foot of the opposite vertex, from 0
-/// to 1. `C` grows with `θ` all the way from −π to π, and equals `θ − θ₀` for small angles, so that `½C²/α` is the energy of
-/// a hinge of stiffness `1/α` in N·m. No inverse trigonometric function is called: devices compute those differently.
+/// where `n` are the unnormalized normals and `e` is the edge. `s` is the position of the foot of
+/// the opposite vertex along the edge, from 0 to 1. `C` increases with `θ` from −π to π, and equals
+/// `θ − θ₀` for small angles. `½C²/α` is then the energy of a hinge of stiffness `1/α` in N·m. The
+/// formula needs no inverse trigonometric function, because devices compute those differently.
 ///
-/// Parameters `[2 sin(θ₀/2)]`. The gradient is zero where a triangle has no area, and `2 sin(θ/2)` counts as 0 there and where the
-/// hinge is folded shut. The gradient of `θ` is that of Bridson, Marino and Fedkiw, *Simulation of Clothing with Folds and
-/// Wrinkles*, SCA 2003.
+/// The parameters are `[2 sin(θ₀/2)]`. The gradient is zero where a triangle has no area.
+/// `2 sin(θ/2)` is 0 there, and also where the hinge is completely folded. Source of the gradient
+/// of `θ`: Bridson, Marino and Fedkiw, *Simulation of Clothing with Folds and Wrinkles*, SCA 2003.
 #[derive(Clone, Copy, Debug)]
 pub struct DihedralBending;
 
@@ -74,7 +76,7 @@ impl Constraint<4> for DihedralBending {
         Eval { c: bend - rest, grad }
     }
 
-    /// The angle has no unit: 1.
+    /// 1, because the angle has no unit.
     fn rest_size<T: Real>(_: &[T; 1]) -> T {
         T::one()
     }

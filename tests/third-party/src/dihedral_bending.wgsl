@@ -3,7 +3,7 @@ struct Params {
     rest: f32,
 }
 
-// 8 · machine epsilon: below it a direction is rounding noise.
+// 8 · machine epsilon. Below this value a direction is rounding noise.
 const NOISE: f32 = 1.0 / 1048576.0;
 
 fn eval(x: array<vec3f, N>, p: Params) -> Eval {

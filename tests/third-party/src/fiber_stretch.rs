@@ -1,9 +1,9 @@
-//! Fiber stretch: a tetrahedron keeps its length along a fiber.
+//! The fiber stretch constraint: a tetrahedron keeps its length along a fiber.
 
 use cutis_constraints::{Constraint, Eval, Real};
 use nalgebra::{Point3, Vector3};
 
-/// A tetrahedron keeps its length along a fiber.
+/// A constraint that keeps the length of a tetrahedron along a fiber.
 ///
 /// ```text
 /// f   = F a = b1 e1 + b2 e2 + b3 e3,  e_i = x_i − x_0
@@ -11,17 +11,18 @@ use nalgebra::{Point3, Vector3};
 /// ∇iC = b_i f/|f|,  ∇0C = −(b1 + b2 + b3) f/|f|       [1/m]
 /// ```
 ///
-/// `F` is the deformation gradient and `a` the direction of the fiber at rest; `b = D⁻¹ a`, where the columns of `D` are the edges
-/// at rest. Parameters `[b1, b2, b3, s]`, `b` in 1/m. The gradient is zero where the fiber has shrunk to a point.
+/// `F` is the deformation gradient and `a` is the direction of the fiber at rest. `b = D⁻¹ a`,
+/// where the columns of `D` are the edges at rest. The parameters are `[b1, b2, b3, s]`, with `b`
+/// in 1/m. The gradient is zero where the fiber has shrunk to a point.
 #[derive(Clone, Copy, Debug)]
 pub struct FiberStretch;
 
-/// How a [`FiberStretch`] is built from its rest shape.
+/// The direction and the rest stretch of a [`FiberStretch`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fiber {
-    /// Direction at rest; of any length but 0.
+    /// Direction at rest. Its length may be any number but 0.
     pub direction: [f64; 3],
-    /// Rest length over initial length: below 1 the fiber contracts.
+    /// Rest length divided by initial length. Below 1 the fiber contracts.
     pub rest_stretch: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Two constraint types that Cutis does not have, as another crate adds them: a Rust file, a WGSL file and a line of
-//! `conformance!` each, and no file of Cutis touched.
+//! Two constraint types that Cutis does not have, as an external crate adds them. Each needs a Rust
+//! file, a WGSL file and a line of `conformance!`, and no change in Cutis.
 //!
 //! | constraint | vertices | `C` |
 //! |---|---|---|

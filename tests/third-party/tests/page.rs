@@ -1,4 +1,4 @@
-//! The page of the book shows what is compiled and tested here, to the letter.
+//! The code blocks of the page `docs/book/adding-a-constraint.md` equal the tested code.
 
 const PAGE: &str = include_str!("../../../docs/book/adding-a-constraint.md");
 const RUST: &str = include_str!("../src/fiber_stretch.rs");
@@ -10,7 +10,7 @@ fn blocks(language: &str) -> Vec<&'static str> {
     PAGE.split(open.as_str()).skip(1).filter_map(|rest| rest.split("```").next()).collect()
 }
 
-/// Lines of code, without documentation and what is hidden on the page.
+/// The lines of code, without comments and lines that are hidden on the page.
 fn code(text: &str) -> Vec<&str> {
     let shown = |line: &&str| !line.is_empty() && !line.starts_with("//") && !line.starts_with("# ");
     text.lines().map(str::trim).filter(shown).collect()
@@ -24,7 +24,7 @@ fn the_shader_on_the_page_is_the_tested_one() {
 #[test]
 fn the_type_and_the_line_on_the_page_are_the_tested_ones() {
     let [in_rust, line, _] = blocks("rust")[..] else { panic!("{} blocks", blocks("rust").len()) };
-    // The page names the shader by its path from there.
+    // The page refers to the shader by a path relative to the page.
     let in_rust = in_rust.replace("../../tests/third-party/src/", "");
     let shown: Vec<&str> = [&in_rust, line].into_iter().flat_map(code).collect();
     assert_eq!(shown, code(RUST));

@@ -1,4 +1,5 @@
-//! A block of tissue with fibers through it and a skin that resists bending, next to a constraint of Cutis: both backends agree.
+//! A block of tissue with fibers in it and a skin that resists bending, combined with a constraint
+//! of Cutis. Both backends agree.
 
 use cutis_conformance::device;
 use cutis_constraints::Distance;
@@ -15,7 +16,7 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 const CELLS: [usize; 3] = [8, 3, 2];
 /// Edge of a cell in m.
 const EDGE: f64 = 0.01;
-/// What the fibers contract to.
+/// Rest stretch of the fibers.
 const CONTRACTION: f64 = 0.8;
 
 /// Positions, tetrahedra, edges and hinges of the upper face.
@@ -66,7 +67,8 @@ fn block() -> Block {
     Block { positions, tets, edges, hinges: hinges(&triangles) }
 }
 
-/// The two triangles on each inner edge: the edge in the direction in which the first triangle runs, then the opposite vertices.
+/// The two triangles at each inner edge: the edge, in the direction of the first triangle, and then
+/// the opposite vertices.
 fn hinges(triangles: &[[u32; 3]]) -> Vec<[u32; 4]> {
     let sides = |&[a, b, c]: &[u32; 3]| [[a, b, c], [b, c, a], [c, a, b]];
     let all: Vec<[u32; 3]> = triangles.iter().flat_map(sides).collect();
@@ -75,7 +77,8 @@ fn hinges(triangles: &[[u32; 3]]) -> Vec<[u32; 4]> {
     all.iter().filter_map(hinge).collect()
 }
 
-/// The block, held at one end, with fibers along x that contract. Without them, or without hinges, for comparison.
+/// The block, fixed at one end, with fibers along x that contract. Fibers and hinges are optional,
+/// for comparison.
 fn system(formulation: Formulation, with_fibers: bool, with_hinges: bool) -> Result<System<f32>> {
     let Block { positions, tets, edges, hinges } = block();
     let count = positions.len();
@@ -150,12 +153,12 @@ fn the_backends_agree() -> Result<()> {
         let reference = run(&mut SolverReference::new(system(formulation, true, true)?, settings)?)?;
         let threaded = run(&mut SolverCpu::new(system(formulation, true, true)?, settings, Some(2))?)?;
         assert_eq!(threaded, reference, "{formulation:?}");
-        // Controls: both kinds are seen in the result.
+        // Controls: both kinds affect the result.
         for (with_fibers, with_hinges) in [(false, true), (true, false)] {
             let other = system(formulation, with_fibers, with_hinges)?;
             let other = run(&mut SolverReference::new(other, settings)?)?;
             assert!(
-                farthest(&other, &reference) > 1e-3 * EDGE,
+                largest_distance(&other, &reference) > 1e-3 * EDGE,
                 "{formulation:?} {with_fibers} {with_hinges}"
             );
         }
@@ -164,14 +167,14 @@ fn the_backends_agree() -> Result<()> {
         if gpu.adapter().kind == AdapterKind::Software {
             assert_eq!(on_device, reference, "{formulation:?}");
         } else {
-            // A device that fuses operations differs by rounding, which ten frames of motion enlarge.
-            let difference = farthest(&on_device, &reference);
+            // A device that fuses operations differs by rounding, which grows during ten frames.
+            let difference = largest_distance(&on_device, &reference);
             assert!(difference < 1e-5 * EDGE, "{formulation:?}: {difference} m");
         }
     }
     Ok(())
 }
 
-fn farthest(a: &[Point3<f32>], b: &[Point3<f32>]) -> f64 {
+fn largest_distance(a: &[Point3<f32>], b: &[Point3<f32>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from((a - b).norm())).fold(0.0, f64::max)
 }
