@@ -210,6 +210,39 @@ fn pairs_need_both_halves() {
     );
 }
 
+#[test]
+fn the_observer_receives_every_byte_of_each_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let observed = |name: &str| {
+        let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+        nifti::read_observed(folder.path().join(name), |file, bytes| {
+            let file = file.file_name().unwrap().to_string_lossy().into_owned();
+            if files.last().is_none_or(|(last, _)| *last != file) {
+                files.push((file, Vec::new()));
+            }
+            files.last_mut().unwrap().1.extend(bytes);
+        })
+        .unwrap();
+        files
+    };
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+    let mut long = Image::int16().bytes;
+    // Far more bytes after the last voxel than the reader looks at.
+    long.extend((0..3_000_000u32).flat_map(|n| n.wrapping_mul(2_654_435_761).to_le_bytes()));
+    for (name, bytes) in [("long.nii", long.clone()), ("long.nii.gz", gzip(&long))] {
+        write(name, &bytes);
+        assert!(observed(name) == [(name.into(), bytes)], "{name}");
+    }
+    let mut pair = Image::int16();
+    pair.put(344, b"ni1\0").f32(108, 0.0);
+    let header = gzip(&pair.bytes);
+    write("pair.hdr.gz", &header);
+    write("pair.img", &long[352..]);
+    let expected = [("pair.hdr.gz".into(), header), ("pair.img".into(), long[352..].to_vec())];
+    assert!(observed("pair.hdr.gz") == expected);
+    assert!(observed("pair.img") == expected);
+}
+
 fn bytes_of<const N: usize, T: Copy>(values: &[T], encode: fn(T) -> [u8; N]) -> Vec<u8> {
     (0..24).flat_map(|n| encode(values[n % values.len()])).collect()
 }

@@ -9,5 +9,5 @@ mod read;
 mod source;
 mod write;
 
-pub use read::{HuStats, Loaded, read};
+pub use read::{HuStats, Loaded, read, read_observed};
 pub use write::{Writer, write};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::convert::{Converter, VoxelType};
 use super::header::Header;
 use super::placement;
-use super::source::{PORTION, Source};
+use super::source::{Observer, PORTION, Source};
 use crate::{Grid, Volume, VolumeError};
 
 /// A volume as read, and what its file said.
@@ -44,14 +44,47 @@ pub struct HuStats {
 /// [`VolumeError::Header`], [`VolumeError::VoxelType`] for color and complex voxels, [`VolumeError::SeveralVolumes`],
 /// [`VolumeError::Truncated`], [`VolumeError::TooLarge`], [`VolumeError::Range`], [`VolumeError::Infinite`].
 pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
-    let path = path.as_ref();
+    read_files(path.as_ref(), None)
+}
+
+/// Reads a volume as [`read`] does, and passes the raw bytes of its files to `observe` on the way.
+///
+/// This serves to hash a file without reading it twice. `observe` receives the path of the file and
+/// the next portion of its bytes as they are on the disk, before decompression. When the function
+/// succeeds, it has received every byte of the file, in order, including bytes after the last voxel.
+/// Of a pair it receives first the whole `.hdr` file and then the whole `.img` file. One of the two
+/// paths is exactly `path`.
+///
+/// ```
+/// # use cutis_volume::{nifti, phantom};
+/// # let folder = std::env::temp_dir().join(format!("cutis-observed-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder).unwrap();
+/// let path = folder.join("ball.nii.gz");
+/// nifti::write(&path, &phantom::sphere([20; 3], [1.0; 3], 8.0, 40)?)?;
+/// let mut size = 0;
+/// nifti::read_observed(&path, |_file, bytes| size += bytes.len() as u64)?;
+/// assert_eq!(size, std::fs::metadata(&path).unwrap().len());
+/// # std::fs::remove_dir_all(&folder).unwrap();
+/// # Ok::<(), cutis_volume::VolumeError>(())
+/// ```
+///
+/// # Errors
+/// As [`read`]. After an error `observe` may have received only a part of the bytes.
+pub fn read_observed(
+    path: impl AsRef<Path>,
+    mut observe: impl FnMut(&Path, &[u8]),
+) -> Result<Loaded, VolumeError> {
+    read_files(path.as_ref(), Some(&mut observe))
+}
+
+fn read_files(path: &Path, mut observer: Option<&mut Observer<'_>>) -> Result<Loaded, VolumeError> {
     if path.is_dir() {
         let reason = "it is a folder; DICOM is not read yet, dcm2niix converts a series to one file";
         return Err(VolumeError::NotNifti { path: path.into(), reason });
     }
     let pair = pair(path)?;
     let header_path = pair.as_ref().map_or(path, |(header, _)| header);
-    let mut source = Source::open(header_path)?;
+    let mut source = Source::open(header_path, again(&mut observer))?;
     let header = source.header()?;
     match &pair {
         None if !header.single_file => {
@@ -61,12 +94,23 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
             return Err(wrong_magic(header_path, "ni1 or ni2 (voxels in the .img file)"));
         }
         None => {}
-        Some((_, image)) => source = Source::open(image)?,
+        Some((_, image)) => {
+            source.finish()?;
+            source = Source::open(image, again(&mut observer))?;
+        }
     }
     load(source, header_path, &header)
 }
 
-fn load(mut source: Source, header_path: &Path, header: &Header) -> Result<Loaded, VolumeError> {
+/// Lends the observer for one file.
+fn again<'a>(observer: &'a mut Option<&mut Observer<'_>>) -> Option<&'a mut Observer<'a>> {
+    match observer {
+        Some(observer) => Some(&mut **observer),
+        None => None,
+    }
+}
+
+fn load(mut source: Source<'_>, header_path: &Path, header: &Header) -> Result<Loaded, VolumeError> {
     let path = source.path.clone();
     let mut warnings = Vec::new();
     let dtype = VoxelType::from_code(header.datatype).map_err(|dtype| VolumeError::VoxelType {
@@ -108,6 +152,7 @@ fn load(mut source: Source, header_path: &Path, header: &Header) -> Result<Loade
         converter.push(&buffer[..wanted]);
     }
     source.check_tail(&mut warnings)?;
+    source.finish()?;
 
     let shape = header.shape.map(|n| n as usize);
     let converted = converter.finish();

@@ -16,10 +16,13 @@ const DEFLATE_LIMIT: u64 = 1032;
 /// Bytes looked at after the last voxel, to reach the gzip checksum.
 const TAIL: u64 = 1 << 16;
 
-/// An open file, decompressed where its first bytes say gzip.
-pub(super) struct Source {
+/// Receives the raw bytes of a file, in order, with the file's path.
+pub(super) type Observer<'a> = dyn FnMut(&Path, &[u8]) + 'a;
+
+/// An open file, decompressed if its first bytes are those of gzip.
+pub(super) struct Source<'a> {
     pub(super) path: PathBuf,
-    reader: Box<dyn Read>,
+    stream: Stream<'a>,
     pub(super) compressed: bool,
     /// Bytes on the disk.
     pub(super) len: u64,
@@ -27,18 +30,21 @@ pub(super) struct Source {
     at: u64,
 }
 
-impl Source {
-    pub(super) fn open(path: &Path) -> Result<Self, VolumeError> {
+impl<'a> Source<'a> {
+    pub(super) fn open(path: &Path, observer: Option<&'a mut Observer<'a>>) -> Result<Self, VolumeError> {
         let failed = |source| VolumeError::Io { path: path.into(), action: "read", source };
         let mut file = File::open(path).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
         let mut magic = Vec::with_capacity(2);
         file.by_ref().take(2).read_to_end(&mut magic).map_err(failed)?;
         let compressed = magic == [0x1f, 0x8b];
-        let whole = BufReader::with_capacity(PORTION, io::Cursor::new(magic).chain(file));
-        let reader: Box<dyn Read> =
-            if compressed { Box::new(MultiGzDecoder::new(whole)) } else { Box::new(whole) };
-        Ok(Self { path: path.into(), reader, compressed, len, at: 0 })
+        let observed = Observed { path: path.into(), file: io::Cursor::new(magic).chain(file), observer };
+        let buffered = BufReader::with_capacity(PORTION, observed);
+        let stream = match compressed {
+            true => Stream::Gzip(MultiGzDecoder::new(buffered)),
+            false => Stream::Plain(buffered),
+        };
+        Ok(Self { path: path.into(), stream, compressed, len, at: 0 })
     }
 
     pub(super) fn header(&mut self) -> Result<Header, VolumeError> {
@@ -88,7 +94,7 @@ impl Source {
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, VolumeError> {
         let mut filled = 0;
         while filled < buffer.len() {
-            match self.reader.read(&mut buffer[filled..]) {
+            match self.stream.read(&mut buffer[filled..]) {
                 Ok(0) => break,
                 Ok(n) => filled += n,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -106,11 +112,58 @@ impl Source {
     /// Reads on to the end, where gzip holds its checksum, unless much more follows.
     pub(super) fn check_tail(&mut self, warnings: &mut Vec<String>) -> Result<(), VolumeError> {
         let mut tail = Vec::new();
-        match self.reader.by_ref().take(TAIL).read_to_end(&mut tail) {
+        match self.stream.by_ref().take(TAIL).read_to_end(&mut tail) {
             Ok(0) => {}
             Ok(_) => warnings.push("there are bytes after the last voxel: ignored".into()),
             Err(source) => return Err(VolumeError::Io { path: self.path.clone(), action: "read", source }),
         }
         Ok(())
+    }
+
+    /// Shows the observer the raw bytes that were not read yet; without an observer, does nothing.
+    pub(super) fn finish(self) -> Result<(), VolumeError> {
+        let mut raw = match self.stream {
+            Stream::Plain(raw) => raw,
+            Stream::Gzip(decoder) => decoder.into_inner(),
+        };
+        if raw.get_ref().observer.is_some() {
+            io::copy(&mut raw, &mut io::sink()).map_err(|source| VolumeError::Io {
+                path: self.path,
+                action: "read",
+                source,
+            })?;
+        }
+        Ok(())
+    }
+}
+
+enum Stream<'a> {
+    Plain(BufReader<Observed<'a>>),
+    Gzip(MultiGzDecoder<BufReader<Observed<'a>>>),
+}
+
+impl Read for Stream<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Plain(raw) => raw.read(buffer),
+            Self::Gzip(decoder) => decoder.read(buffer),
+        }
+    }
+}
+
+/// The raw bytes of a file, shown to the observer as they are read.
+struct Observed<'a> {
+    path: PathBuf,
+    file: io::Chain<io::Cursor<Vec<u8>>, File>,
+    observer: Option<&'a mut Observer<'a>>,
+}
+
+impl Read for Observed<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        if let Some(observer) = &mut self.observer {
+            observer(&self.path, &buffer[..count]);
+        }
+        Ok(count)
     }
 }
