@@ -98,11 +98,14 @@ impl Lattice {
     }
 
     /// HU at each point, in the order of the numbering; filtered as [`sample::to_grid`] and [`sample::to_planes`] say.
-    pub fn sample(&self, volume: &Volume) -> Vec<f32> {
-        match &self.planes {
-            None => sample::to_grid(volume, &self.grid),
-            Some(planes) => sample::to_planes(volume, &self.grid, planes.axes()),
-        }
+    ///
+    /// # Errors
+    /// [`MeshError::File`] if the axes of the lattice are not those of the volume.
+    pub fn sample(&self, volume: &Volume) -> Result<Vec<f32>, MeshError> {
+        Ok(match &self.planes {
+            None => sample::to_grid(volume, &self.grid)?,
+            Some(planes) => sample::to_planes(volume, &self.grid, planes.axes())?,
+        })
     }
 
     /// The split.

@@ -1,10 +1,10 @@
-//! Voxel index → world millimeters, in the RAS+ frame.
+//! The affine map from voxel index to RAS+ world millimeters.
 
 use nalgebra::{Matrix4, Point3, Vector3};
 
 use crate::VolumeError;
 
-/// Invertible affine map from continuous voxel index `(i, j, k)` to RAS+ world millimeters.
+/// An invertible affine map from continuous voxel index `(i, j, k)` to RAS+ world millimeters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
     to_mm: Matrix4<f64>,
@@ -12,10 +12,11 @@ pub struct Affine {
 }
 
 impl Affine {
-    /// From the four rows of the homogeneous matrix, as NIfTI and nibabel write it.
+    /// Creates a map from the four rows of its homogeneous matrix, as NIfTI and nibabel write it.
     ///
     /// # Errors
-    /// [`VolumeError::SingularAffine`] if a value is not finite, the last row is not `0 0 0 1`, or the map is not invertible.
+    /// [`VolumeError::SingularAffine`] if a value is not finite, the last row is not `0 0 0 1`, or
+    /// the matrix is not invertible.
     pub fn from_rows(rows: [[f64; 4]; 4]) -> Result<Self, VolumeError> {
         let to_mm = Matrix4::from_fn(|r, c| rows[r][c]);
         let finite = to_mm.iter().all(|v| v.is_finite()) && rows[3] == [0.0, 0.0, 0.0, 1.0];
@@ -25,64 +26,67 @@ impl Affine {
         }
     }
 
-    /// Axis-aligned: `spacing_mm` along +R, +A, +S and the center of voxel (0, 0, 0) at `origin_mm`.
+    /// Creates an axis-aligned map: index axes along +R, +A and +S with steps of `spacing_mm`, and
+    /// voxel (0, 0, 0) centered at `origin_mm`.
     ///
     /// # Errors
-    /// As [`Affine::from_rows`], for a spacing of zero or a value that is not finite.
+    /// [`VolumeError::SingularAffine`] if a spacing is zero or a value is not finite.
     pub fn from_spacing(spacing_mm: [f64; 3], origin_mm: [f64; 3]) -> Result<Self, VolumeError> {
         let [sx, sy, sz] = spacing_mm;
         let [ox, oy, oz] = origin_mm;
         Self::from_rows([[sx, 0.0, 0.0, ox], [0.0, sy, 0.0, oy], [0.0, 0.0, sz, oz], [0.0, 0.0, 0.0, 1.0]])
     }
 
-    /// The four rows of index → mm.
+    /// The four rows of the homogeneous matrix that maps index to mm.
     pub fn rows(&self) -> [[f64; 4]; 4] {
         std::array::from_fn(|r| std::array::from_fn(|c| self.to_mm[(r, c)]))
     }
 
-    /// World position of a continuous index, mm.
+    /// World position of a continuous index in mm.
     pub fn to_mm(&self, index: Point3<f64>) -> Point3<f64> {
         self.to_mm.transform_point(&index)
     }
 
-    /// Continuous index of a world position given in mm.
+    /// Continuous index of a world position in mm.
     pub fn to_index(&self, mm: Point3<f64>) -> Point3<f64> {
         self.to_index.transform_point(&mm)
     }
 
-    /// Column `axis`: the step in mm from one voxel to the next along that index axis.
+    /// The step in mm from one voxel to the next along an index axis (column `axis` of the matrix).
     pub fn step_mm(&self, axis: usize) -> Vector3<f64> {
         self.to_mm.fixed_view::<3, 1>(0, axis).into_owned()
     }
 
-    /// Lengths of the three index steps, mm.
+    /// Lengths of the three index steps in mm.
     pub fn spacing_mm(&self) -> [f64; 3] {
         std::array::from_fn(|axis| self.step_mm(axis).norm())
     }
 
-    /// Signed volume of one voxel, mm³; negative for a left-handed index frame.
+    /// Signed volume of one voxel in mm³. It is negative if the index axes are left-handed.
     pub fn voxel_volume_mm3(&self) -> f64 {
         self.to_mm.fixed_view::<3, 3>(0, 0).determinant()
     }
 
-    /// Largest |cosine| between two of the index axes: 0 where they are perpendicular.
+    /// Largest |cosine| between two index axes: 0 if all are perpendicular.
     pub fn shear(&self) -> f64 {
         let axes: [Vector3<f64>; 3] = std::array::from_fn(|axis| self.step_mm(axis).normalize());
         [(0, 1), (0, 2), (1, 2)].map(|(a, b)| axes[a].dot(&axes[b]).abs()).into_iter().fold(0.0, f64::max)
     }
 
-    /// True if the axes are not perpendicular beyond the rounding of a header written in f32 or in decimals
-    /// (a gantry tilt of 0.01° is more): such a map is no rotation with spacings, and a NIfTI qform cannot hold it.
+    /// True if the axes are not perpendicular, with a tolerance for headers that hold f32 or
+    /// rounded decimals. A NIfTI qform cannot represent such a map. A gantry tilt of 0.01° exceeds
+    /// the tolerance.
     pub fn is_sheared(&self) -> bool {
         self.shear() > 1e-4
     }
 
-    /// Where each index axis points, to the nearest: `R`/`L`, `A`/`P`, `S`/`I`, as in `RAS`.
+    /// The anatomical direction nearest to each index axis, such as `RAS`: `R`/`L`, `A`/`P` and
+    /// `S`/`I`.
     pub fn orientation(&self) -> [char; 3] {
         let cosine = |world: usize, axis: usize| self.step_mm(axis)[world] / self.spacing_mm()[axis];
         let permutations = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         let score = |worlds: &[usize; 3]| (0..3).map(|axis| cosine(worlds[axis], axis).abs()).sum::<f64>();
-        // The first of equals, so that a tie at 45° has one answer.
+        // The first of equal scores wins, so that a tie at 45° has one answer.
         let best = permutations.into_iter().reduce(|a, b| if score(&b) > score(&a) { b } else { a });
         let worlds = best.unwrap_or([0, 1, 2]);
         std::array::from_fn(|axis| {
@@ -115,7 +119,7 @@ mod tests {
             linear([[0.1, -9.0, 0.3], [0.2, 0.1, -1.0], [3.0, 0.5, 1.0]]).orientation(),
             ['P', 'I', 'R']
         );
-        // Two axes lean the same way: each direction is named once all the same.
+        // Two axes are nearest to the same direction, but each direction is named once.
         assert_eq!(
             linear([[1.0, 0.9, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).orientation(),
             ['A', 'R', 'S']
@@ -123,19 +127,19 @@ mod tests {
     }
 
     #[test]
-    fn shear_is_the_cosine_between_axes_whatever_the_spacing() {
+    fn shear_is_the_cosine_between_axes_for_any_spacing() {
         for scale in [1e-3, 1.0, 1e3] {
             let axes =
                 |lean: f64| linear([[scale, 0.0, 0.0], [0.0, scale, 0.0], [0.0, lean * scale, 5.0 * scale]]);
             assert!((axes(0.5).shear() - 0.5 / 25.25f64.sqrt()).abs() < 1e-12);
             assert!(axes(0.5).is_sheared() && axes(-0.001).is_sheared() && !axes(1e-6).is_sheared());
         }
-        let turned = linear([[0.8, 0.6, 0.0], [-1.2, 1.6, 0.0], [0.0, 0.0, -7.0]]);
-        assert!(turned.shear() < 1e-15 && turned.voxel_volume_mm3() < 0.0);
+        let rotated = linear([[0.8, 0.6, 0.0], [-1.2, 1.6, 0.0], [0.0, 0.0, -7.0]]);
+        assert!(rotated.shear() < 1e-15 && rotated.voxel_volume_mm3() < 0.0);
     }
 
     #[test]
-    fn a_map_without_an_inverse_is_refused() {
+    fn maps_without_an_inverse_are_refused() {
         for spacing in [[1.0, 0.0, 1.0], [1.0, f64::NAN, 1.0], [1.0, f64::INFINITY, 1.0]] {
             assert!(matches!(
                 Affine::from_spacing(spacing, [0.0; 3]),

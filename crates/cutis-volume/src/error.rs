@@ -2,107 +2,107 @@
 
 use std::path::PathBuf;
 
-/// Everything that can be wrong with a volume, its file, a table or a lattice.
+/// Errors of volumes, their files, HU tables, lattices and phantoms.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
-    /// The number of voxels does not match the shape.
-    #[error("shape {shape:?} needs {expected} voxels, but {found} were given")]
+    /// The number of values does not match the shape.
+    #[error("shape {shape:?} needs {expected} values, but {found} were given")]
     VoxelCount {
-        /// Voxels per axis.
+        /// Voxels or lattice points per axis.
         shape: [usize; 3],
-        /// Product of the shape, saturated.
+        /// Product of the shape.
         expected: usize,
-        /// Length of the data.
+        /// Number of values given.
         found: usize,
     },
-    /// A matrix that maps indices to millimeters must be finite and invertible.
+    /// The matrix of an affine map is not finite or not invertible.
     #[error("affine {rows:?} is not invertible: it must map voxel indices to distinct millimeter positions")]
     SingularAffine {
-        /// The four rows.
+        /// The four rows of the matrix.
         rows: Box<[[f64; 4]; 4]>,
     },
-    /// The operating system refused: missing file, no permission, disk full, damaged gzip stream.
+    /// The operating system reported an error, or a gzip stream is damaged.
     #[error("cannot {action} {path}: {source}")]
     Io {
-        /// The file the user named.
+        /// The file that the user named.
         path: PathBuf,
-        /// What was tried: `read`, `write`, `create`, …
+        /// The failed action: `read`, `write` or `create`.
         action: &'static str,
-        /// The system's reason.
+        /// The error of the operating system or the decoder.
         source: std::io::Error,
     },
-    /// The name does not end in a NIfTI extension.
+    /// The file name does not end in a NIfTI extension.
     #[error("{path}: expected a file name that ends in {expected}")]
     Extension {
-        /// The file the user named.
+        /// The file that the user named.
         path: PathBuf,
-        /// The extensions that would do.
+        /// The accepted extensions.
         expected: &'static str,
     },
-    /// A `.hdr` without its `.img`, or the other way round.
-    #[error("{path} is one half of a NIfTI pair, and the other half {partner} is not beside it")]
+    /// A `.hdr` file has no `.img` file next to it, or the other way round.
+    #[error("{path} is one half of a NIfTI pair, but the other half {partner} is missing")]
     MissingPartner {
-        /// The file the user named.
+        /// The file that the user named.
         path: PathBuf,
-        /// The file that should be there.
+        /// The missing file.
         partner: PathBuf,
     },
-    /// The first bytes are no NIfTI header.
+    /// The file does not begin with a NIfTI header.
     #[error("{path} is not a NIfTI file: {reason}")]
     NotNifti {
         /// The file.
         path: PathBuf,
-        /// What is missing.
+        /// Why the file is not NIfTI.
         reason: &'static str,
     },
-    /// A header field holds a value that cannot be right.
+    /// A header field holds an invalid value.
     #[error("{path}: header field {field} is {value}, expected {expected}")]
     Header {
         /// The file.
         path: PathBuf,
         /// Name of the field in the NIfTI standard.
         field: &'static str,
-        /// What it holds.
+        /// Value of the field.
         value: String,
-        /// What would be right.
+        /// The values that are valid.
         expected: &'static str,
     },
-    /// Color, complex or other voxels that are not one real number.
+    /// A voxel is not one real number: color, complex or an unknown type.
     #[error(
         "{path}: voxel type {dtype} (code {code}) is not a CT: expected one integer or real number per voxel"
     )]
     VoxelType {
         /// The file.
         path: PathBuf,
-        /// Name of the type.
+        /// Name of the voxel type.
         dtype: &'static str,
-        /// `datatype` in the header.
+        /// Value of `datatype` in the header.
         code: i16,
     },
-    /// A time series or several channels.
+    /// The file holds a time series or several channels.
     #[error("{path} holds {count} volumes (dim {dim:?}): expected one; extract the one to use first")]
     SeveralVolumes {
         /// The file.
         path: PathBuf,
-        /// How many.
+        /// Number of volumes.
         count: u64,
-        /// Sizes of all axes.
+        /// Sizes of all axes of the file.
         dim: Vec<u64>,
     },
     /// The file ends before its last voxel.
     #[error(
-        "{path} is truncated: the header promises {expected_bytes} bytes of voxels, {found_bytes} are there"
+        "{path} is truncated: the header promises {expected_bytes} bytes of voxels, but the file has {found_bytes}"
     )]
     Truncated {
         /// The file.
         path: PathBuf,
-        /// Voxels × bytes per voxel.
+        /// Number of voxels times bytes per voxel.
         expected_bytes: u64,
-        /// Bytes found after the header.
+        /// Bytes found after the header, or an upper bound of them for a compressed file.
         found_bytes: u64,
     },
-    /// More voxels than this program, or this machine, can address.
+    /// The volume does not fit into the memory of this machine.
     #[error("{path}: {shape:?} voxels are more than this machine can hold")]
     TooLarge {
         /// The file.
@@ -110,7 +110,7 @@ pub enum VolumeError {
         /// Voxels per axis.
         shape: [u64; 3],
     },
-    /// HU that do not fit into int16.
+    /// The HU do not fit into int16.
     #[error(
         "{path}: values from {min} to {max} HU do not fit into int16 (-32768 to 32767 HU); is this a CT in Hounsfield units?"
     )]
@@ -127,78 +127,78 @@ pub enum VolumeError {
     Infinite {
         /// The file.
         path: PathBuf,
-        /// Index of the first such voxel.
+        /// Index of the first infinite voxel.
         index: [usize; 3],
-        /// Infinity or minus infinity.
+        /// Plus or minus infinity.
         value: f64,
     },
     /// NIfTI-1 cannot hold this shape.
     #[error("{path}: shape {shape:?} cannot be written: NIfTI-1 holds 1 to 32767 voxels per axis")]
     WriteShape {
-        /// The target.
+        /// The file to write.
         path: PathBuf,
         /// Voxels per axis.
         shape: [usize; 3],
     },
-    /// The affine has a shear, which a qform cannot represent and ITK refuses.
+    /// The affine has a shear. A qform cannot represent it, and ITK refuses it.
     #[error(
-        "{path}: the voxel axes are not perpendicular (largest cosine between two {cosine:.6}), which a NIfTI qform cannot hold; \
+        "{path}: the voxel axes are not perpendicular (the largest cosine between two of them is {cosine:.6}). A NIfTI qform cannot hold that; \
          resample to an orthogonal grid first"
     )]
     Sheared {
-        /// The target.
+        /// The file to write.
         path: PathBuf,
         /// Largest |cosine| between two index axes.
         cosine: f64,
     },
-    /// A streaming writer got more or fewer voxels than its grid has.
-    #[error("{path}: {found} voxels were pushed, the grid has {expected}")]
+    /// A [`nifti::Writer`](crate::nifti::Writer) received more or fewer voxels than its grid has.
+    #[error("{path}: the grid has {expected} voxels, but {found} were written")]
     Pushed {
-        /// The target.
+        /// The file to write.
         path: PathBuf,
         /// Voxels of the grid.
         expected: usize,
-        /// Voxels pushed.
+        /// Voxels received.
         found: usize,
     },
-    /// A phantom with no voxels along an axis, or with too many for the axis or for memory.
+    /// A phantom has no voxels along an axis, too many along an axis, or too many for the memory.
     #[error(
-        "a phantom of shape {shape:?} cannot be made: expected 1 to {most} voxels per axis, and memory for all of them"
+        "a phantom of shape {shape:?} is not possible: expected 1 to {most} voxels per axis, and memory for all of them"
     )]
     PhantomShape {
         /// Voxels per axis.
         shape: [usize; 3],
-        /// The most that an axis may have.
+        /// Largest number of voxels per axis.
         most: usize,
     },
-    /// Slices that a volume does not have.
-    #[error("slices {start}..{end} were asked for, the volume has {count}")]
+    /// A range of slices is not within the volume.
+    #[error("slices {start}..{end} do not exist: the volume has {count}")]
     SliceRange {
         /// First slice.
         start: usize,
         /// One past the last slice.
         end: usize,
-        /// Slices of the volume.
+        /// Number of slices of the volume.
         count: usize,
     },
-    /// Concentric spheres need radii that are finite, positive and decrease from the outermost inwards.
+    /// The radii of concentric spheres are not finite, not positive, or do not decrease inwards.
     #[error(
-        "sphere radii {radii_mm:?} mm: expected finite positive values, the outermost first and each one smaller"
+        "sphere radii {radii_mm:?} mm: expected finite positive values that decrease from the outermost inwards"
     )]
     SphereRadii {
-        /// The radii, mm.
+        /// The radii in mm.
         radii_mm: Vec<f64>,
     },
-    /// A volume needs at least one voxel, and no more than memory can address.
+    /// A shape has no points, or more than memory can address.
     #[error(
-        "shape {shape:?} is not possible: expected at least 1 voxel per axis, and fewer than {} in all",
+        "shape {shape:?} is not possible: expected at least 1 point per axis, and fewer than {} in total",
         usize::MAX
     )]
     Shape {
-        /// Voxels per axis.
+        /// Points per axis.
         shape: [usize; 3],
     },
-    /// The map from stored values to HU must be invertible.
+    /// The map from stored values to HU is not finite or not invertible.
     #[error("HU = {slope} × stored + {intercept}: expected finite numbers and a slope that is not 0")]
     Scaling {
         /// HU per stored unit.
@@ -206,65 +206,68 @@ pub enum VolumeError {
         /// HU of the stored value 0.
         intercept: f32,
     },
-    /// A table needs finite points in ascending order of HU.
+    /// A table has no points, a value that is not finite, or HU that do not increase.
     #[error(
         "table in {unit}: {count} points, point {point} is {value:?}: expected finite numbers and HU that increase from point to point"
     )]
     Table {
-        /// Unit of the table.
+        /// Unit of the values.
         unit: String,
-        /// How many points were given; at least one is needed.
+        /// Number of points given; at least one is needed.
         count: usize,
-        /// The first that is wrong.
+        /// Position of the first wrong point.
         point: usize,
-        /// Its HU and value.
+        /// HU and value of that point, if there is one.
         value: Option<(f32, f32)>,
     },
-    /// The text is no table.
-    #[error(
-        "{origin}: {message}; expected for example: unit = \"kg/m3\", points = [[-1000, 1.2], [0, 1000]]"
-    )]
-    TableText {
-        /// File name, or what else the text came from.
-        origin: String,
-        /// What the parser found.
-        message: String,
-    },
-    /// No preset of that name.
+    /// No table has this name.
     #[error("no {kind} table is called {name:?}: expected {expected}")]
     Preset {
-        /// What the table is for.
+        /// The property that the table gives.
         kind: &'static str,
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The existing names.
         expected: String,
     },
-    /// The text is no lattice size.
+    /// A text is not a lattice size.
     #[error(
         "lattice {text:?}: expected native, a spacing in mm (4.0) or vertices along the axes (129,107,118)"
     )]
     LatticeText {
-        /// What was given.
+        /// The given text.
         text: String,
     },
-    /// A lattice needs two vertices along each axis, and a number of vertices that fits into 32 bits.
+    /// A lattice has fewer than two vertices along an axis, or too many for 32-bit indices.
     #[error(
-        "a lattice of {vertices:?} vertices cannot be laid over {shape:?} voxels: expected at least 2 along each axis of both, \
-         and at most {most} in all"
+        "a lattice of {vertices:?} vertices over {shape:?} voxels is not possible: expected at least 2 vertices and 2 voxels \
+         along each axis, and at most {most} vertices in total"
     )]
     LatticeSize {
-        /// Vertices along the axes, rounded; infinite for a spacing of 0.
+        /// Vertices along each axis, rounded. Very small spacings give very large numbers.
         vertices: [f64; 3],
-        /// Voxels along the axes.
+        /// Voxels along each axis.
         shape: [usize; 3],
-        /// The most a lattice can have.
+        /// Largest number of vertices of a lattice.
         most: u64,
     },
-    /// A spacing must be a positive length.
+    /// A lattice spacing is not a positive length.
     #[error("lattice spacing {spacing_mm} mm: expected a positive number")]
     LatticeSpacing {
-        /// What was given.
+        /// The given spacing in mm.
         spacing_mm: f64,
+    },
+    /// The axes of a grid to sample are not those of the volume.
+    #[error(
+        "axis {axis} of the grid drifts by {drift_voxels:.3} voxels along axis {other} of the volume: the axes must be the \
+         same, as in a grid from sample::lattice_grid"
+    )]
+    NotAligned {
+        /// Axis of the grid.
+        axis: usize,
+        /// Axis of the volume.
+        other: usize,
+        /// Largest drift along that axis, in voxels.
+        drift_voxels: f64,
     },
 }

@@ -1,4 +1,5 @@
-//! CT volumes: geometry, NIfTI in and out, Hounsfield-unit tables, resampling to lattice points, a synthetic phantom.
+//! CT volumes: NIfTI files, geometry, Hounsfield-unit tables, sampling at lattice points, and a
+//! synthetic phantom.
 #![doc = ""]
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! A file that appears under its name only when it is complete.
+//! Files that appear under their name only when they are complete.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -9,54 +9,58 @@ use crate::VolumeError;
 
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
-/// Written beside its target under a hidden name, and renamed by [`PartialFile::commit`].
-/// Dropped before that, it is removed and the target is as it was.
+/// A file that appears under its name only when it is complete.
+///
+/// The bytes go to a hidden file in the same folder, which [`PartialFile::commit`] renames to the
+/// target. If the `PartialFile` is dropped before that, the hidden file is removed and the target
+/// does not change.
 #[derive(Debug)]
 pub struct PartialFile {
     file: Option<File>,
-    beside: PathBuf,
+    hidden: PathBuf,
     target: PathBuf,
 }
 
 impl PartialFile {
-    /// Opens a new file in the folder of `target`.
+    /// Creates the hidden file in the folder of `target`.
     ///
     /// # Errors
-    /// [`VolumeError::Io`] with the target's path if the folder is missing or read-only.
+    /// [`VolumeError::Io`] with the path of the target if the folder is missing or read-only.
     pub fn create(target: impl AsRef<Path>) -> Result<Self, VolumeError> {
         let target = target.as_ref().to_path_buf();
         loop {
             let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-            let beside = target.with_file_name(format!(".cutis-{}-{number}.part", std::process::id()));
-            match OpenOptions::new().write(true).create_new(true).open(&beside) {
-                Ok(file) => return Ok(Self { file: Some(file), beside, target }),
-                // Left by a process of the same number that was killed.
+            let hidden = target.with_file_name(format!(".cutis-{}-{number}.part", std::process::id()));
+            match OpenOptions::new().write(true).create_new(true).open(&hidden) {
+                Ok(file) => return Ok(Self { file: Some(file), hidden, target }),
+                // A killed process with the same id left this file.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(source) => return Err(VolumeError::Io { path: target, action: "create", source }),
             }
         }
     }
 
-    /// The name the file will have.
+    /// The path that the file will have.
     pub fn target(&self) -> &Path {
         &self.target
     }
 
-    /// Flushes to the disk and renames to the target, replacing what was there.
+    /// Flushes the file to the disk and renames it to the target, replacing any old file.
     ///
     /// # Errors
-    /// [`VolumeError::Io`] if the disk is full or the target cannot be replaced; the partial file is removed.
+    /// [`VolumeError::Io`] if the disk is full or the target cannot be replaced. The hidden file is
+    /// then removed.
     pub fn commit(mut self) -> Result<(), VolumeError> {
         let done = match self.file.take() {
             Some(file) => file.sync_all().and_then(|()| {
                 drop(file);
-                fs::rename(&self.beside, &self.target)
+                fs::rename(&self.hidden, &self.target)
             }),
             None => Ok(()),
         };
         done.map_err(|source| {
-            // The rename did not happen: what is left is ours to remove, and the first error is the one to report.
-            let _ = fs::remove_file(&self.beside);
+            // The first error is the one to report, so an error of this removal is ignored.
+            let _ = fs::remove_file(&self.hidden);
             VolumeError::Io { path: self.target.clone(), action: "write", source }
         })
     }
@@ -78,8 +82,8 @@ impl Write for PartialFile {
 impl Drop for PartialFile {
     fn drop(&mut self) {
         if self.file.take().is_some() {
-            // Nobody is left to tell.
-            let _ = fs::remove_file(&self.beside);
+            // A destructor cannot report an error.
+            let _ = fs::remove_file(&self.hidden);
         }
     }
 }
@@ -89,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn target_appears_at_commit_and_nothing_else_remains() {
+    fn commit_creates_the_target_and_leaves_no_other_file() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("a.txt");
         let mut file = PartialFile::create(&target).unwrap();
@@ -101,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn dropped_leaves_the_old_file() {
+    fn drop_keeps_the_old_file() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("a.txt");
         fs::write(&target, b"old").unwrap();
@@ -111,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_target_that_cannot_be_replaced_is_an_error_and_leaves_nothing() {
+    fn failed_commit_is_an_error_and_leaves_no_file() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("folder");
         fs::create_dir(&target).unwrap();

@@ -1,14 +1,14 @@
-//! A CT volume: int16 voxels with slope and intercept, on a [`Grid`].
+//! CT volumes: int16 voxels with slope and intercept, on a [`Grid`].
 
 use nalgebra::Point3;
-use ndarray::{ArrayView3, ShapeBuilder};
+use ndarray::ArrayView3;
 
 use crate::{Grid, VolumeError};
 
-/// Hounsfield value of air; padding below it is air too.
+/// Hounsfield value of air. Lower values are padding and count as air.
 pub const AIR_HU: f32 = -1024.0;
 
-/// A CT volume. Voxels stay int16; `HU = slope · stored + intercept`.
+/// A CT volume. Voxels are stored as int16, with `HU = slope · stored + intercept`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     grid: Grid,
@@ -18,11 +18,12 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// From voxels with index `i` fastest.
+    /// Creates a volume from voxels in flat order, index `i` fastest.
     ///
     /// # Errors
-    /// [`VolumeError::VoxelCount`] if the number of voxels is not the product of the shape, [`VolumeError::Shape`] if that is 0
-    /// or too large, [`VolumeError::Scaling`] if slope or intercept are not finite or the slope is 0.
+    /// [`VolumeError::VoxelCount`] if the number of voxels is not the product of the shape.
+    /// [`VolumeError::Shape`] if that product is 0 or overflows. [`VolumeError::Scaling`] if slope
+    /// or intercept is not finite, or the slope is 0.
     pub fn new(grid: Grid, voxels: Vec<i16>, slope: f32, intercept: f32) -> Result<Self, VolumeError> {
         let expected = grid.checked_len().ok_or(VolumeError::Shape { shape: grid.shape })?;
         if voxels.len() != expected {
@@ -34,17 +35,17 @@ impl Volume {
         Ok(Self { grid, voxels, slope, intercept })
     }
 
-    /// Where the voxel centers lie.
+    /// The grid of the voxel centers.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Stored values, index `i` fastest.
+    /// Stored values in flat order, index `i` fastest.
     pub fn voxels(&self) -> &[i16] {
         &self.voxels
     }
 
-    /// Stored value → HU: `slope · stored + intercept`.
+    /// Converts a stored value to HU: `slope · stored + intercept`.
     pub fn hu(&self, stored: i16) -> f32 {
         self.slope * f32::from(stored) + self.intercept
     }
@@ -59,17 +60,34 @@ impl Volume {
         self.intercept
     }
 
-    /// Stored values as an array `[i, j, k]`, without a copy.
+    /// Views the stored values as an `ndarray` array, without a copy.
+    ///
+    /// The view has the shape of the grid and is indexed `[i, j, k]`: axis 0 is `i`, which varies
+    /// fastest in memory, axis 2 is `k`. [`Volume::hu`] converts a stored value to HU.
+    ///
+    /// ```
+    /// use cutis_volume::phantom;
+    /// let ball = phantom::sphere([21, 25, 31], [1.0; 3], 8.0, 40)?;
+    /// let view = ball.view();
+    /// assert_eq!(view.dim(), (21, 25, 31));
+    /// assert_eq!(view[[10, 12, 15]], 40);
+    /// // Voxels above −449 HU in the middle axial slice.
+    /// let slice = view.index_axis(ndarray::Axis(2), 15);
+    /// let tissue = slice.iter().filter(|&&stored| ball.hu(stored) > -449.0).count();
+    /// let circle = std::f64::consts::PI * 8.0 * 8.0;
+    /// assert!((tissue as f64 / circle - 1.0).abs() < 0.05);
+    /// # Ok::<(), cutis_volume::VolumeError>(())
+    /// ```
     pub fn view(&self) -> ArrayView3<'_, i16> {
-        let [nx, ny, nz] = self.grid.shape;
-        ArrayView3::from_shape((nx, ny, nz).f(), &self.voxels)
-            .expect("the constructor has compared shape and length")
+        self.grid.view(&self.voxels).expect("the constructor has compared shape and length")
     }
 
-    /// HU at a continuous index, interpolated linearly along each axis.
+    /// HU at a continuous voxel index, by trilinear interpolation.
     ///
-    /// On a voxel center it is that voxel's value, exactly. Indices outside are moved to the nearest voxel; the value at an index
-    /// that is not finite is air. Where padding (below −1024 HU) meets anything else, it counts as −1024.
+    /// The value at a voxel center is exactly that of the voxel. An index outside the volume is
+    /// moved to the nearest point of it. The value at an index that is not finite is air. If some
+    /// of the eight voxels are padding (below −1024 HU) and others are not, the padding counts as
+    /// −1024.
     pub fn trilinear(&self, index: Point3<f64>) -> f32 {
         if !index.iter().all(|x| x.is_finite()) {
             return AIR_HU;
@@ -83,7 +101,7 @@ impl Volume {
             low[axis] = at as usize;
             fraction[axis] = at - low[axis] as f64;
         }
-        // A step only where there is a way to go: the last voxel has no next one.
+        // The last voxel along an axis has no next one.
         let step = |axis: usize, stride: usize| if fraction[axis] > 0.0 { stride } else { 0 };
         let steps = [step(0, 1), step(1, nx), step(2, nx * ny)];
         let base = self.grid.index(low);
@@ -122,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn padding_does_not_bleed_into_tissue() {
+    fn padding_does_not_lower_the_value_of_tissue() {
         let padded = volume([3, 1, 1], |[i, ..]| [-3024, -3024, 40][i]);
         assert_eq!(padded.trilinear(Point3::new(1.0, 0.0, 0.0)), -3024.0);
         assert_eq!(padded.trilinear(Point3::new(0.5, 0.0, 0.0)), -3024.0);

@@ -40,7 +40,7 @@ impl Body {
     pub(crate) fn build(loaded: &LoadedScene, volume: &Volume) -> Result<Self, Error> {
         let scene = &loaded.scene;
         let lattice = region::lattice(loaded, volume)?;
-        let hu = lattice.sample(volume);
+        let hu = lattice.sample(volume)?;
         let air: Vec<bool> = hu.iter().map(|&hu| hu < scene.tissue.air_below_hu).collect();
         let cut_away: Vec<HalfSpace> = scene.tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = scene.tissue.keep == Keep::Largest;

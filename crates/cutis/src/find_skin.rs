@@ -40,8 +40,8 @@ pub fn find_skin(
     progress.begin("detect the skin", 0);
     let lattice = Lattice::new(sample::lattice_grid(volume.grid(), request.lattice)?, request.split)?;
     let alpha = Table::preset(TableKind::Alpha, "paper")?;
-    let air: Vec<bool> =
-        sample::to_grid(&volume, lattice.grid()).iter().map(|&hu| alpha.is_air(hu)).collect();
+    let hu = sample::to_grid(&volume, lattice.grid())?;
+    let air: Vec<bool> = hu.iter().map(|&hu| alpha.is_air(hu)).collect();
     let found = skin::detect(&lattice, &air, request.mode, &SkinOptions::default())?;
     progress.end();
     if let Some(path) = out {

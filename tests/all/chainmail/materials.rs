@@ -44,7 +44,7 @@ fn hu(twin: &Twin) -> Vec<f32> {
     let volume = Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap();
     let grid = lattice_grid(volume.grid(), LatticeSize::SpacingMm(12.0)).unwrap();
     assert_eq!(grid.shape, POINTS);
-    let hu = Lattice::new(grid, Split::Kuhn6).unwrap().sample(&volume);
+    let hu = Lattice::new(grid, Split::Kuhn6).unwrap().sample(&volume).unwrap();
     let at = |place: &Point3<f32>| {
         let middle = |axis: usize| (POINTS[axis] - 1) as f64 / 2.0;
         let index =

@@ -1,13 +1,15 @@
-//! Stored voxels of any real type → int16 with slope and intercept, one portion at a time.
+//! Converts stored voxels of any real type to int16 with slope and intercept, one portion at a
+//! time.
 //!
-//! Types of 8 and 16 bits keep their slope and intercept; uint16 above 32767 is stored shifted by 32768, with the intercept
-//! moved along. Wider types are stored as HU rounded to whole numbers (slope 1), which CT reconstructions are anyway; the largest
-//! rounding error is kept.
+//! Types of 8 and 16 bits keep their slope and intercept. If a uint16 volume has values above
+//! 32767, it is stored shifted by 32768, and the intercept changes accordingly. Wider types are
+//! stored as HU rounded to whole numbers, with slope 1. CT reconstructions usually hold whole HU
+//! already. The largest rounding error is recorded.
 
 use super::read::HuStats;
 use crate::AIR_HU;
 
-/// Voxel types that hold one real number.
+/// A voxel type that holds one real number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum VoxelType {
     U8,
@@ -23,7 +25,7 @@ pub(super) enum VoxelType {
 }
 
 impl VoxelType {
-    /// From the header's `datatype`; the name of the type where it is none of ours.
+    /// The type with this `datatype` in the header, or the name of an unsupported type.
     pub(super) fn from_code(code: i16) -> Result<Self, &'static str> {
         Ok(match code {
             2 => Self::U8,
@@ -56,7 +58,7 @@ impl VoxelType {
         }
     }
 
-    /// Numpy's name.
+    /// The name of the type in NumPy.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::U8 => "uint8",
@@ -73,85 +75,91 @@ impl VoxelType {
     }
 }
 
-/// Takes voxels as bytes, gives int16.
+/// Converts voxel bytes to int16.
 pub(super) struct Converter {
     dtype: VoxelType,
     big_endian: bool,
     scaling: [f64; 2],
     voxels: Vec<i16>,
-    /// Stored values of the narrow types; HU of the wide ones.
-    narrow: Extent<i32, i128>,
-    wide: Extent<f64, f64>,
+    /// Range of the stored values, for types of 8 and 16 bits.
+    stored: Range<i32, i128>,
+    /// Range of the HU, for wider types.
+    hu: Range<f64, f64>,
     nan_count: u64,
     rounding: f64,
     infinite: Option<(usize, f64)>,
 }
 
-/// What [`Converter::finish`] gives.
+/// Result of a [`Converter`].
 pub(super) struct Converted {
     pub voxels: Vec<i16>,
     pub slope: f64,
     pub intercept: f64,
     pub stats: HuStats,
-    /// Largest distance of an HU value from the whole number that stands for it.
+    /// Largest difference between an HU value and the whole number stored for it.
     pub rounding: f64,
     /// Flat index and value of the first infinity.
     pub infinite: Option<(usize, f64)>,
-    /// True if all HU fit into int16, or the narrow type keeps its scaling.
+    /// True if all HU fit into int16, or the type keeps its slope and intercept.
     pub fits: bool,
 }
 
 #[derive(Clone, Copy)]
-struct Extent<T, S> {
+struct Range<T, S> {
     min: T,
     max: T,
     sum: S,
 }
 
 impl Converter {
-    /// Nothing is allocated here; `scaling` is slope and intercept.
+    /// Creates a converter without allocating. `scaling` is slope and intercept.
     pub(super) fn new(dtype: VoxelType, big_endian: bool, scaling: [f64; 2]) -> Self {
         Self {
             dtype,
             big_endian,
             scaling,
             voxels: Vec::new(),
-            narrow: Extent { min: i32::MAX, max: i32::MIN, sum: 0 },
-            wide: Extent { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0 },
+            stored: Range { min: i32::MAX, max: i32::MIN, sum: 0 },
+            hu: Range { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0 },
             nan_count: 0,
             rounding: 0.0,
             infinite: None,
         }
     }
 
-    /// Makes room for `total` voxels; false if the machine has none.
+    /// Reserves memory for `total` voxels. Returns false if there is not enough.
     pub(super) fn reserve(&mut self, total: usize) -> bool {
         self.voxels.try_reserve_exact(total.saturating_sub(self.voxels.len())).is_ok()
     }
 
-    /// Takes whole voxels.
+    /// Converts and appends whole voxels.
     pub(super) fn push(&mut self, bytes: &[u8]) {
         match self.dtype {
-            VoxelType::U8 => self.narrow(bytes, u8::from_le_bytes, 0),
-            VoxelType::I8 => self.narrow(bytes, i8::from_le_bytes, 0),
-            VoxelType::I16 => self.narrow(bytes, i16::from_le_bytes, 0),
-            VoxelType::U16 => self.narrow(bytes, u16::from_le_bytes, UINT16_SHIFT),
-            VoxelType::I32 => self.wide(bytes, |b| f64::from(i32::from_le_bytes(b))),
-            VoxelType::U32 => self.wide(bytes, |b| f64::from(u32::from_le_bytes(b))),
-            VoxelType::I64 => self.wide(bytes, |b| i64::from_le_bytes(b) as f64),
-            VoxelType::U64 => self.wide(bytes, |b| u64::from_le_bytes(b) as f64),
-            VoxelType::F32 => self.wide(bytes, |b| f64::from(f32::from_le_bytes(b))),
-            VoxelType::F64 => self.wide(bytes, f64::from_le_bytes),
+            VoxelType::U8 => self.push_stored(bytes, u8::from_le_bytes, 0),
+            VoxelType::I8 => self.push_stored(bytes, i8::from_le_bytes, 0),
+            VoxelType::I16 => self.push_stored(bytes, i16::from_le_bytes, 0),
+            VoxelType::U16 => self.push_stored(bytes, u16::from_le_bytes, UINT16_SHIFT),
+            VoxelType::I32 => self.push_hu(bytes, |b| f64::from(i32::from_le_bytes(b))),
+            VoxelType::U32 => self.push_hu(bytes, |b| f64::from(u32::from_le_bytes(b))),
+            VoxelType::I64 => self.push_hu(bytes, |b| i64::from_le_bytes(b) as f64),
+            VoxelType::U64 => self.push_hu(bytes, |b| u64::from_le_bytes(b) as f64),
+            VoxelType::F32 => self.push_hu(bytes, |b| f64::from(f32::from_le_bytes(b))),
+            VoxelType::F64 => self.push_hu(bytes, f64::from_le_bytes),
         }
     }
 
-    fn narrow<const N: usize, T: Into<i32>>(&mut self, bytes: &[u8], decode: fn([u8; N]) -> T, shift: i32) {
-        let mut extent = self.narrow;
+    fn push_stored<const N: usize, T: Into<i32>>(
+        &mut self,
+        bytes: &[u8],
+        decode: fn([u8; N]) -> T,
+        shift: i32,
+    ) {
+        let mut range = self.stored;
         let mut sum = 0i64;
-        let mut take = |value: T| {
+        let mut convert = |value: T| {
             let value = value.into();
-            extent.min = extent.min.min(value);
-            extent.max = extent.max.max(value);
+            range.min = range.min.min(value);
+            range.max = range.max.max(value);
             sum += i64::from(value);
             (value - shift) as i16
         };
@@ -159,16 +167,16 @@ impl Converter {
         if self.big_endian {
             self.voxels.extend(chunks.iter().map(|&(mut chunk)| {
                 chunk.reverse();
-                take(decode(chunk))
+                convert(decode(chunk))
             }));
         } else {
-            self.voxels.extend(chunks.iter().map(|&chunk| take(decode(chunk))));
+            self.voxels.extend(chunks.iter().map(|&chunk| convert(decode(chunk))));
         }
-        extent.sum += i128::from(sum);
-        self.narrow = extent;
+        range.sum += i128::from(sum);
+        self.stored = range;
     }
 
-    fn wide<const N: usize>(&mut self, bytes: &[u8], decode: impl Fn([u8; N]) -> f64) {
+    fn push_hu<const N: usize>(&mut self, bytes: &[u8], decode: impl Fn([u8; N]) -> f64) {
         let [slope, intercept] = self.scaling;
         for &(mut chunk) in bytes.as_chunks::<N>().0 {
             if self.big_endian {
@@ -182,9 +190,9 @@ impl Converter {
                 if hu.is_infinite() && self.infinite.is_none() {
                     self.infinite = Some((self.voxels.len(), hu));
                 }
-                self.wide.min = self.wide.min.min(hu);
-                self.wide.max = self.wide.max.max(hu);
-                self.wide.sum += hu;
+                self.hu.min = self.hu.min.min(hu);
+                self.hu.max = self.hu.max.max(hu);
+                self.hu.sum += hu;
                 self.rounding = self.rounding.max((hu - hu.round()).abs());
                 hu.round() as i16
             };
@@ -195,9 +203,9 @@ impl Converter {
     pub(super) fn finish(mut self) -> Converted {
         let [slope, intercept] = self.scaling;
         if self.dtype.bytes() > 2 {
-            let Extent { min, max, sum } = self.wide;
+            let Range { min, max, sum } = self.hu;
             let empty = min > max;
-            let range = f64::from(i16::MIN)..=f64::from(i16::MAX);
+            let int16 = f64::from(i16::MIN)..=f64::from(i16::MAX);
             return Converted {
                 slope: 1.0,
                 intercept: 0.0,
@@ -209,11 +217,11 @@ impl Converter {
                 },
                 rounding: self.rounding,
                 infinite: self.infinite,
-                fits: empty || (range.contains(&min.round()) && range.contains(&max.round())),
+                fits: empty || (int16.contains(&min.round()) && int16.contains(&max.round())),
                 voxels: self.voxels,
             };
         }
-        let Extent { min, max, sum } = self.narrow;
+        let Range { min, max, sum } = self.stored;
         let [a, b] = [min, max].map(|stored| slope * f64::from(stored) + intercept);
         let stats = HuStats {
             min: a.min(b),
@@ -221,10 +229,10 @@ impl Converter {
             sum: slope * sum as f64 + intercept * self.voxels.len() as f64,
             nan_count: 0,
         };
-        let mut moved = 0.0;
+        let mut shift = 0.0;
         if self.dtype == VoxelType::U16 {
             if max > i32::from(i16::MAX) {
-                moved = slope * f64::from(UINT16_SHIFT);
+                shift = slope * f64::from(UINT16_SHIFT);
             } else {
                 self.voxels
                     .iter_mut()
@@ -234,7 +242,7 @@ impl Converter {
         Converted {
             voxels: self.voxels,
             slope,
-            intercept: intercept + moved,
+            intercept: intercept + shift,
             stats,
             rounding: 0.0,
             infinite: None,
@@ -243,5 +251,5 @@ impl Converter {
     }
 }
 
-/// uint16 − 32768 lies within int16.
+/// A uint16 value minus this number fits into int16.
 const UINT16_SHIFT: i32 = 32768;

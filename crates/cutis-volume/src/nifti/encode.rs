@@ -1,4 +1,4 @@
-//! The 348 bytes of a NIfTI-1 header, and the four after it, from a grid.
+//! Encodes the 348 bytes of a NIfTI-1 header and the four bytes after it.
 
 use std::path::Path;
 
@@ -6,14 +6,14 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use crate::{Affine, Grid, VolumeError};
 
-/// Where the voxels start: the header and an empty list of extensions.
+/// Offset of the first voxel: after the header and an empty list of extensions.
 const VOXEL_OFFSET: usize = 352;
 const INT16: i16 = 4;
 const MILLIMETER: u8 = 2;
-/// `NIFTI_XFORM_SCANNER_ANAT`.
+/// The code `NIFTI_XFORM_SCANNER_ANAT`.
 const SCANNER: i16 = 1;
 
-/// Header for int16 voxels on `grid`; `path` is for the messages.
+/// Encodes the header for int16 voxels on `grid`. `path` appears in error messages.
 pub(super) fn encode(path: &Path, grid: &Grid, slope: f32, intercept: f32) -> Result<Vec<u8>, VolumeError> {
     let shape = grid.shape;
     if shape.iter().any(|&n| n == 0 || n > i16::MAX as usize) {
@@ -43,7 +43,8 @@ pub(super) fn encode(path: &Path, grid: &Grid, slope: f32, intercept: f32) -> Re
     Ok(header.0)
 }
 
-/// Quaternion (b, c, d) with a ≥ 0, and −1 where the third axis is mirrored (`qfac`), of the rotation nearest to the affine.
+/// The quaternion (b, c, d), with a ≥ 0, of the rotation nearest to the affine, and `qfac`: −1 if
+/// the third axis is mirrored, else 1.
 fn rotation(affine: &Affine) -> ([f64; 3], f64) {
     let mut axes = Matrix3::from_fn(|r, c| affine.step_mm(c)[r] / affine.spacing_mm()[c]);
     let handedness = axes.determinant().signum();
@@ -57,7 +58,7 @@ fn rotation(affine: &Affine) -> ([f64; 3], f64) {
     ([q.i * sign, q.j * sign, q.k * sign], handedness)
 }
 
-/// Little-endian fields at byte offsets.
+/// Header bytes with little-endian fields.
 struct Fields(Vec<u8>);
 
 impl Fields {

@@ -1,25 +1,27 @@
-//! Parallel gzip: one member, the same bytes for any number of threads.
+//! Parallel gzip compression into one member, with the same bytes for any number of threads.
 //!
-//! The stream is cut into blocks of fixed size. Each is deflated on its own, ended by a sync flush (RFC 1951: an empty stored
-//! block, which brings it to a byte boundary), so the results can be concatenated; the checksums are combined (RFC 1952).
+//! The stream is divided into blocks of fixed size, which are deflated independently. Each ends
+//! with a sync flush: an empty stored block that completes the last byte (RFC 1951). Therefore the
+//! compressed blocks can be concatenated. Their checksums are combined (RFC 1952).
 
 use std::io::{self, Write};
 
 use flate2::{Compress, Compression, Crc, FlushCompress, Status};
 use rayon::prelude::*;
 
-/// Uncompressed bytes per deflate block. Large enough that the lost history does not show in the size.
+/// Uncompressed bytes per block. Blocks of this size compress about as well as one long stream.
 const BLOCK: usize = 1 << 20;
-/// Blocks compressed at a time: bounds the memory, and feeds this many threads.
+/// Number of blocks compressed at a time. It limits the memory and the number of busy threads.
 const BATCH: usize = 16;
-/// A fast level: CT noise leaves the higher ones little to find.
+/// A fast level. Higher levels gain little on CT noise.
 const LEVEL: u32 = 2;
-/// Magic, deflate, no flags, no time (the bytes depend on the data alone), no extra flags, unknown system.
+/// Magic bytes, method deflate, no flags, no time stamp, no extra flags, unknown system. Without a
+/// time stamp the bytes depend on the data only.
 const MEMBER_HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
-/// A last, empty block with fixed codes.
+/// An empty last block with fixed codes.
 const LAST_BLOCK: [u8; 2] = [3, 0];
 
-/// Compresses what is written to it, and passes it on.
+/// A writer that compresses its input and writes it to `inner`.
 pub(super) struct GzipWriter<W: Write> {
     inner: W,
     pending: Vec<u8>,
@@ -32,7 +34,7 @@ impl<W: Write> GzipWriter<W> {
         Ok(Self { inner, pending: Vec::new(), crc: Crc::new() })
     }
 
-    /// Writes the rest and the trailer.
+    /// Writes the remaining blocks and the trailer.
     pub(super) fn finish(mut self) -> io::Result<W> {
         self.compress(self.pending.len())?;
         self.inner.write_all(&LAST_BLOCK)?;
@@ -61,7 +63,7 @@ impl<W: Write> GzipWriter<W> {
 
 impl<W: Write> Write for GzipWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // Cuts lie at multiples of BLOCK from the start of the stream, however the caller portions it.
+        // Blocks start at multiples of BLOCK in the stream, however the caller divides its writes.
         let taken = bytes.len().min(BLOCK * BATCH - self.pending.len());
         self.pending.extend_from_slice(&bytes[..taken]);
         if self.pending.len() == BLOCK * BATCH {
@@ -82,7 +84,7 @@ fn deflate(block: &[u8]) -> io::Result<Vec<u8>> {
         let done = state.total_in() as usize;
         let status =
             state.compress_vec(&block[done..], &mut out, FlushCompress::Sync).map_err(io::Error::from)?;
-        // The flush is complete once all input is taken and room is left in the output.
+        // The flush is complete when all input is consumed and the output still has space.
         if state.total_in() as usize == block.len() && out.len() < out.capacity() {
             return Ok(out);
         }
@@ -119,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn one_member_that_a_plain_decoder_reads_back() {
+    fn output_is_one_member_that_a_plain_decoder_reads() {
         for len in [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, BLOCK * (BATCH + 2) + 77] {
             let bytes = noise(len);
             let packed = gzip(&bytes, 300_001, 2);
@@ -127,7 +129,7 @@ mod tests {
             let mut back = Vec::new();
             decoder.read_to_end(&mut back).unwrap();
             assert!(back == bytes, "{len} bytes");
-            assert!(decoder.into_inner().is_empty(), "one member holds all");
+            assert!(decoder.into_inner().is_empty(), "there is more than one member");
         }
     }
 
@@ -141,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn random_bytes_that_do_not_shrink_survive() {
+    fn incompressible_bytes_survive() {
         let bytes: Vec<u8> =
             noise(BLOCK + 9).iter().zip(noise(2 * BLOCK)).map(|(a, b)| a << 4 ^ b.wrapping_mul(23)).collect();
         let mut back = Vec::new();

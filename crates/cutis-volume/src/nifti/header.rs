@@ -1,26 +1,26 @@
-//! The fields of a NIfTI-1 or NIfTI-2 header that concern a CT, checked one by one.
+//! Decodes and checks the fields of a NIfTI-1 or NIfTI-2 header that matter for a CT.
 
 use std::path::Path;
 
 use crate::VolumeError;
 
-/// Bytes of a NIfTI-1 header.
+/// Length of a NIfTI-1 header in bytes.
 pub(super) const NIFTI1: usize = 348;
-/// Bytes of a NIfTI-2 header.
+/// Length of a NIfTI-2 header in bytes.
 pub(super) const NIFTI2: usize = 540;
 
-/// Header fields in one form for both versions and byte orders.
+/// Header fields, in one form for both versions and byte orders.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Header {
     pub big_endian: bool,
-    /// False where the voxels lie in a separate `.img` file.
+    /// False if the voxels are in a separate `.img` file.
     pub single_file: bool,
-    /// Voxels along the three axes of space, 1 where an axis is missing.
+    /// Voxels along the three spatial axes. A missing axis counts as 1.
     pub shape: [u64; 3],
     pub datatype: i16,
-    /// Offset of the first voxel in its file.
+    /// Byte offset of the first voxel in its file.
     pub voxel_offset: u64,
-    /// `scl_slope` and `scl_inter` as they stand.
+    /// `scl_slope` and `scl_inter`, unchecked.
     pub scaling: [f64; 2],
     /// `xyzt_units`.
     pub units: u8,
@@ -36,10 +36,10 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Length of the header that begins with these bytes.
+    /// Length of the header that begins with the bytes `first`.
     ///
     /// # Errors
-    /// [`VolumeError::NotNifti`] if they begin no NIfTI header.
+    /// [`VolumeError::NotNifti`] if no NIfTI header begins with them.
     pub(super) fn len(path: &Path, first: [u8; 4]) -> Result<usize, VolumeError> {
         match [u32::from_le_bytes(first), u32::from_be_bytes(first)] {
             [348, _] | [_, 348] => Ok(NIFTI1),
@@ -148,7 +148,7 @@ fn shape(path: &Path, dim: [i64; 8]) -> Result<[u64; 3], VolumeError> {
     Ok(std::array::from_fn(|axis| used.get(axis).copied().unwrap_or(1)))
 }
 
-/// Numbers at byte offsets; the offsets above lie inside the two header lengths.
+/// Reads numbers at byte offsets. All offsets used here are within the header.
 struct Fields<'a> {
     bytes: &'a [u8],
     big_endian: bool,

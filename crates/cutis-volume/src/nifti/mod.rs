@@ -1,4 +1,4 @@
-//! NIfTI files: NIfTI-1 and NIfTI-2 in, NIfTI-1 int16 out.
+//! NIfTI files. Reads NIfTI-1 and NIfTI-2, writes NIfTI-1 with int16 voxels.
 
 mod convert;
 mod encode;

@@ -1,4 +1,4 @@
-//! Where a NIfTI header puts its voxels: sform, else qform, else voxel sizes.
+//! Position and orientation of the voxels: from the sform, else the qform, else the voxel sizes.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use nalgebra::Point3;
 use super::header::Header;
 use crate::{Affine, VolumeError};
 
-/// Voxel index → RAS+ mm, with what the user should know about it.
+/// The map from voxel index to RAS+ mm. Appends warnings about ambiguous or unusual headers.
 ///
 /// # Errors
-/// [`VolumeError::Header`] if the chosen form maps to no volume.
+/// [`VolumeError::Header`] if the matrix of the form that applies is not invertible.
 pub(super) fn affine(
     path: &Path,
     header: &Header,
@@ -21,7 +21,7 @@ pub(super) fn affine(
         1 => 1000.0,
         3 => 0.001,
         code => {
-            warnings.push(format!("xyzt_units {code} is no unit of length: lengths taken as mm"));
+            warnings.push(format!("xyzt_units {code} is not a unit of length: lengths are read as mm"));
             1.0
         }
     };
@@ -54,8 +54,8 @@ pub(super) fn affine(
         (false, true) => qform(spacing(path, header, warnings)?)?,
         (false, false) => {
             warnings.push(
-                "neither sform nor qform is set, so position and orientation are unknown: voxel sizes alone are used, from the \
-                 first voxel to the right, anterior and superior (other programs may guess otherwise)"
+                "neither sform nor qform is set, so position and orientation are unknown: the axes are assumed to run to the \
+                 right, anterior and superior from the first voxel (other programs may assume otherwise)"
                     .into(),
             );
             let [dx, dy, dz] = spacing(path, header, warnings)?;
@@ -76,8 +76,8 @@ pub(super) fn affine(
     }
     if affine.is_sheared() {
         warnings.push(format!(
-            "the voxel axes are not perpendicular (a cosine of {:.5} between two of them): a deformed volume has to be resampled \
-             to an orthogonal grid",
+            "the voxel axes are not perpendicular (the cosine between two of them is {:.5}): a deformed volume cannot be \
+             written on this grid; resample the CT to an orthogonal grid first",
             affine.shear()
         ));
     }
@@ -94,14 +94,15 @@ fn build(path: &Path, field: &'static str, rows: [[f64; 4]; 3], scale: f64) -> R
     })
 }
 
-/// Voxel sizes in the header's unit: negative ones count by their amount, and 0 is 1 along an axis of one voxel.
+/// Voxel sizes in the unit of the header. Negative sizes become positive. A size of 0 becomes 1
+/// along an axis of one voxel.
 fn spacing(path: &Path, header: &Header, warnings: &mut Vec<String>) -> Result<[f64; 3], VolumeError> {
     const FIELDS: [&str; 3] = ["pixdim[1]", "pixdim[2]", "pixdim[3]"];
     let mut spacing = [0.0; 3];
     for axis in 0..3 {
         let size = header.pixdim[axis + 1];
         if size < 0.0 {
-            warnings.push(format!("{} is {size}: taken as {}", FIELDS[axis], -size));
+            warnings.push(format!("{} is {size}: it is read as {}", FIELDS[axis], -size));
         }
         spacing[axis] = if size == 0.0 && header.shape[axis] == 1 { 1.0 } else { size.abs() };
         if !(spacing[axis] > 0.0 && spacing[axis].is_finite()) {
@@ -116,12 +117,13 @@ fn spacing(path: &Path, header: &Header, warnings: &mut Vec<String>) -> Result<[
     Ok(spacing)
 }
 
-/// Rows of the qform: the rotation of the unit quaternion (a, b, c, d), times the voxel sizes, the third axis mirrored where
-/// `pixdim[0]` (`qfac`) is negative (NIfTI-1 standard, method 2).
+/// Rows of the qform: the rotation of the unit quaternion (a, b, c, d) times the voxel sizes. The
+/// third axis is mirrored if `pixdim[0]` (`qfac`) is negative (NIfTI-1 standard, method 2).
 fn quaternion_rows(header: &Header, spacing: [f64; 3]) -> [[f64; 4]; 3] {
     let [b, c, d] = header.quaternion;
     let square = b * b + c * c + d * d;
-    // A half turn has a = 0, which f32 can miss on either side: the standard's own library takes it from 1e-7 on.
+    // A rotation by 180° has a = 0, which f32 can only approximate. The standard's library uses the
+    // same limit of 1e-7.
     let (a, [b, c, d]) = if 1.0 - square < 1e-7 {
         (0.0, [b, c, d].map(|v| v / square.sqrt()))
     } else {
@@ -140,7 +142,8 @@ fn quaternion_rows(header: &Header, spacing: [f64; 3]) -> [[f64; 4]; 3] {
     })
 }
 
-/// Largest distance between the places that two affines give a corner of the volume: in mm and in the smallest voxel size.
+/// Largest distance between the positions that two affines give to a corner of the volume, in mm
+/// and in units of the smallest voxel size.
 fn disagreement(chosen: &Affine, other: &Affine, shape: [u64; 3]) -> (f64, f64) {
     let distance = (0..8).map(|corner| {
         let at: [f64; 3] =

@@ -1,4 +1,4 @@
-//! NIfTI in: one CT volume from a `.nii`, `.nii.gz` or `.hdr`/`.img` pair.
+//! Reads a CT volume from a `.nii` or `.nii.gz` file or a `.hdr`/`.img` pair.
 
 use std::path::{Path, PathBuf};
 
@@ -8,41 +8,45 @@ use super::placement;
 use super::source::{Observer, PORTION, Source};
 use crate::{Grid, Volume, VolumeError};
 
-/// A volume as read, and what its file said.
+/// A volume read from a file, with facts about the file.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// The voxels, where they lie, and their scaling to HU.
+    /// The voxels with their grid and their scaling to HU.
     pub volume: Volume,
-    /// Figures of the HU in the file, before any conversion.
+    /// Statistics of the HU in the file, before any conversion.
     pub stats: HuStats,
-    /// Type of the voxels in the file, by numpy's name: `int16`, `float32`, …
+    /// Voxel type in the file by its NumPy name, such as `int16` or `float32`.
     pub dtype: &'static str,
-    /// What was unusual and how it was taken.
+    /// Unusual properties of the file and how they were interpreted.
     pub warnings: Vec<String>,
 }
 
-/// Figures of all voxels that are not NaN.
+/// Statistics of all voxels that are not NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HuStats {
-    /// Lowest value, HU; NaN if every voxel is.
+    /// Lowest value in HU. NaN if every voxel is NaN.
     pub min: f64,
-    /// Highest value, HU; NaN if every voxel is.
+    /// Highest value in HU. NaN if every voxel is NaN.
     pub max: f64,
-    /// Sum, HU.
+    /// Sum of the values in HU.
     pub sum: f64,
-    /// Voxels that are NaN; they become air (−1024 HU).
+    /// Number of NaN voxels. They become air (−1024 HU).
     pub nan_count: u64,
 }
 
-/// Reads NIfTI-1 or NIfTI-2, either byte order, compressed or not, with any integer or real voxel type.
+/// Reads a NIfTI-1 or NIfTI-2 file in either byte order, compressed or not, with integer or real
+/// voxels.
 ///
-/// Position: sform if its code is above 0, else qform, else voxel sizes; meters and micrometers become millimeters. A slope of 0
-/// or NaN means unscaled. Memory: the int16 voxels and little else. Types above 16 bits are rounded to whole HU.
+/// The position comes from the sform if its code is above 0, else from the qform, else from the
+/// voxel sizes. Meters and micrometers become millimeters. With a slope of 0 or NaN the stored
+/// values are the HU. Voxel types above 16 bits are rounded to whole HU. The memory use is little
+/// more than the int16 voxels.
 ///
 /// # Errors
-/// Each names the file: [`VolumeError::Io`], [`VolumeError::MissingPartner`], [`VolumeError::NotNifti`],
-/// [`VolumeError::Header`], [`VolumeError::VoxelType`] for color and complex voxels, [`VolumeError::SeveralVolumes`],
-/// [`VolumeError::Truncated`], [`VolumeError::TooLarge`], [`VolumeError::Range`], [`VolumeError::Infinite`].
+/// [`VolumeError::Io`], [`VolumeError::MissingPartner`], [`VolumeError::NotNifti`],
+/// [`VolumeError::Header`], [`VolumeError::VoxelType`] for color and complex voxels,
+/// [`VolumeError::SeveralVolumes`], [`VolumeError::Truncated`], [`VolumeError::TooLarge`],
+/// [`VolumeError::Range`] or [`VolumeError::Infinite`]. Each names the file.
 pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
     read_files(path.as_ref(), None)
 }
@@ -51,9 +55,9 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
 ///
 /// This serves to hash a file without reading it twice. `observe` receives the path of the file and
 /// the next portion of its bytes as they are on the disk, before decompression. When the function
-/// succeeds, it has received every byte of the file, in order, including bytes after the last voxel.
-/// Of a pair it receives first the whole `.hdr` file and then the whole `.img` file. One of the two
-/// paths is exactly `path`.
+/// succeeds, it has received every byte of the file, in order, including bytes after the last
+/// voxel. Of a pair it receives first the whole `.hdr` file and then the whole `.img` file. One of
+/// the two paths is exactly `path`.
 ///
 /// ```
 /// # use cutis_volume::{nifti, phantom};
@@ -79,7 +83,7 @@ pub fn read_observed(
 
 fn read_files(path: &Path, mut observer: Option<&mut Observer<'_>>) -> Result<Loaded, VolumeError> {
     if path.is_dir() {
-        let reason = "it is a folder; DICOM is not read yet, dcm2niix converts a series to one file";
+        let reason = "it is a folder; Cutis does not read DICOM, but dcm2niix converts a series to one file";
         return Err(VolumeError::NotNifti { path: path.into(), reason });
     }
     let pair = pair(path)?;
@@ -102,7 +106,7 @@ fn read_files(path: &Path, mut observer: Option<&mut Observer<'_>>) -> Result<Lo
     load(source, header_path, &header)
 }
 
-/// Lends the observer for one file.
+/// Borrows the observer again, for one file.
 fn again<'a>(observer: &'a mut Option<&mut Observer<'_>>) -> Option<&'a mut Observer<'a>> {
     match observer {
         Some(observer) => Some(&mut **observer),
@@ -139,15 +143,17 @@ fn load(mut source: Source<'_>, header_path: &Path, header: &Header) -> Result<L
         if got < wanted {
             return Err(VolumeError::Truncated { path, expected_bytes: bytes, found_bytes: done });
         }
-        let taken = (done / dtype.bytes() as u64) as usize;
-        if taken > reserved {
-            // An uncompressed file has shown its length; a compressed one earns room as it delivers.
-            let room =
-                if source.compressed { (4 * taken).max(source.len as usize).min(voxels) } else { voxels };
-            if !converter.reserve(room) {
+        let received = (done / dtype.bytes() as u64) as usize;
+        if received > reserved {
+            // The size of an uncompressed file is known to suffice. For a compressed file, the
+            // reserved memory grows with the voxels received, so that a false header cannot make
+            // the program allocate too much.
+            let capacity =
+                if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
+            if !converter.reserve(capacity) {
                 return Err(too_large());
             }
-            reserved = room;
+            reserved = capacity;
         }
         converter.push(&buffer[..wanted]);
     }
@@ -172,7 +178,7 @@ fn load(mut source: Source<'_>, header_path: &Path, header: &Header) -> Result<L
         ));
     }
     if stats.nan_count > 0 {
-        warnings.push(format!("{} voxels are NaN: taken as air (-1024 HU)", stats.nan_count));
+        warnings.push(format!("{} voxels are NaN: they become air (-1024 HU)", stats.nan_count));
     }
     let volume = Volume::new(
         Grid { shape, affine },
@@ -183,7 +189,7 @@ fn load(mut source: Source<'_>, header_path: &Path, header: &Header) -> Result<L
     Ok(Loaded { volume, stats, dtype: dtype.name(), warnings })
 }
 
-/// Header and image of a pair, from the name of either; none for a single file.
+/// Paths of the header and image file of a pair, given either of them. `None` for a single file.
 fn pair(path: &Path) -> Result<Option<(PathBuf, PathBuf)>, VolumeError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let lower = name.to_ascii_lowercase();
@@ -203,7 +209,7 @@ fn pair(path: &Path) -> Result<Option<(PathBuf, PathBuf)>, VolumeError> {
     match candidates.iter().find(|candidate| candidate.is_file()) {
         Some(partner) if is_header => Ok(Some((path.into(), partner.clone()))),
         Some(partner) => Ok(Some((partner.clone(), path.into()))),
-        // A file that is not there at all is reported as such by the attempt to open it.
+        // If the given file itself is missing, opening it reports that.
         None if !path.exists() => Ok(None),
         None => Err(VolumeError::MissingPartner { path: path.into(), partner: candidates[0].clone() }),
     }
@@ -218,19 +224,19 @@ fn wrong_magic(path: &Path, expected: &'static str) -> VolumeError {
     }
 }
 
-/// Slope and intercept, 1 and 0 where the header does not scale.
+/// Slope and intercept. They are 1 and 0 if the header has no scaling.
 fn scaling(path: &Path, header: &Header, warnings: &mut Vec<String>) -> Result<[f64; 2], VolumeError> {
     let [slope, intercept] = header.scaling;
     if slope == 0.0 || !slope.is_finite() {
         if intercept != 0.0 && intercept.is_finite() {
             warnings.push(format!(
-                "scl_slope is {slope}: voxels are taken unscaled, scl_inter {intercept} is ignored"
+                "scl_slope is {slope}: voxels are not scaled, and scl_inter {intercept} is ignored"
             ));
         }
         return Ok([1.0, 0.0]);
     }
     for (field, value) in [("scl_slope", slope), ("scl_inter", intercept)] {
-        // A volume keeps them in f32; NIfTI-2 could hold more.
+        // A volume holds them as f32, but NIfTI-2 as f64.
         if !(value as f32).is_finite() || (value != 0.0 && value as f32 == 0.0) {
             let expected = "a number within the range of f32";
             return Err(VolumeError::Header { path: path.into(), field, value: value.to_string(), expected });

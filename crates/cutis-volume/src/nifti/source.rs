@@ -1,4 +1,5 @@
-//! The bytes of a NIfTI file: decompressed, counted, and never more than the header promises.
+//! Reads the bytes of a NIfTI file, decompresses them, and limits the work to the size given in the
+//! header.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -9,11 +10,11 @@ use flate2::bufread::MultiGzDecoder;
 use super::header::Header;
 use crate::VolumeError;
 
-/// Bytes decoded at a time; a multiple of every voxel size.
+/// Number of bytes decoded at a time. It is a multiple of every voxel size.
 pub(super) const PORTION: usize = 1 << 18;
-/// Deflate cannot expand a byte to more than this (a match of 258 bytes takes at least two bits).
+/// Largest expansion by deflate: a match of 258 bytes takes at least two bits.
 const DEFLATE_LIMIT: u64 = 1032;
-/// Bytes looked at after the last voxel, to reach the gzip checksum.
+/// Number of bytes read after the last voxel, to reach the gzip checksum.
 const TAIL: u64 = 1 << 16;
 
 /// Receives the raw bytes of a file, in order, with the file's path.
@@ -62,7 +63,7 @@ impl<'a> Source<'a> {
         Header::decode(&self.path, &bytes)
     }
 
-    /// Refuses at once what the length on the disk cannot hold.
+    /// Returns an error if a file of this length cannot hold the voxels.
     pub(super) fn expect(&self, voxel_offset: u64, bytes: u64) -> Result<(), VolumeError> {
         let most = if self.compressed { self.len.saturating_mul(DEFLATE_LIMIT) } else { self.len };
         match voxel_offset.checked_add(bytes) {
@@ -76,10 +77,10 @@ impl<'a> Source<'a> {
     }
 
     pub(super) fn skip_to(&mut self, voxel_offset: u64, bytes: u64) -> Result<(), VolumeError> {
-        let mut rest = vec![0; PORTION];
+        let mut skipped = vec![0; PORTION];
         while self.at < voxel_offset {
             let wanted = PORTION.min((voxel_offset - self.at) as usize);
-            if self.fill(&mut rest[..wanted])? < wanted {
+            if self.fill(&mut skipped[..wanted])? < wanted {
                 return Err(VolumeError::Truncated {
                     path: self.path.clone(),
                     expected_bytes: bytes,
@@ -90,7 +91,7 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// Fills the buffer, or as much of it as the file still has.
+    /// Reads until the buffer is full or the file ends. Returns the number of bytes read.
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, VolumeError> {
         let mut filled = 0;
         while filled < buffer.len() {
@@ -98,7 +99,7 @@ impl<'a> Source<'a> {
                 Ok(0) => break,
                 Ok(n) => filled += n,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                // A gzip stream that stops before its end.
+                // The gzip stream is truncated.
                 Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => break,
                 Err(source) => {
                     return Err(VolumeError::Io { path: self.path.clone(), action: "read", source });
@@ -109,12 +110,13 @@ impl<'a> Source<'a> {
         Ok(filled)
     }
 
-    /// Reads on to the end, where gzip holds its checksum, unless much more follows.
+    /// Reads a limited number of bytes after the last voxel. The decoder verifies the gzip checksum
+    /// if the file ends within them.
     pub(super) fn check_tail(&mut self, warnings: &mut Vec<String>) -> Result<(), VolumeError> {
         let mut tail = Vec::new();
         match self.stream.by_ref().take(TAIL).read_to_end(&mut tail) {
             Ok(0) => {}
-            Ok(_) => warnings.push("there are bytes after the last voxel: ignored".into()),
+            Ok(_) => warnings.push("there are bytes after the last voxel: they are ignored".into()),
             Err(source) => return Err(VolumeError::Io { path: self.path.clone(), action: "read", source }),
         }
         Ok(())

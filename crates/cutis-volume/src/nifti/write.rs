@@ -1,4 +1,4 @@
-//! NIfTI-1 out: int16, millimeters, qform and sform the same with code 1.
+//! Writes NIfTI-1 files: int16 voxels, millimeters, equal qform and sform with code 1.
 
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -7,13 +7,14 @@ use super::encode::encode;
 use super::gzip::GzipWriter;
 use crate::{Grid, PartialFile, Volume, VolumeError};
 
-/// Voxels converted to bytes at a time.
+/// Number of voxels converted to bytes at a time.
 const PORTION: usize = 1 << 16;
 
 /// Writes `volume` to a `.nii` or `.nii.gz` file.
 ///
-/// HU are written as they are (slope 1, intercept 0) where all of them are whole numbers within int16; otherwise the stored
-/// values are written, with the volume's slope and intercept in the header. The file appears under its name when it is complete.
+/// If all HU are whole numbers within int16, the file holds the HU with slope 1 and intercept 0.
+/// Otherwise it holds the stored values with the slope and intercept of the volume. The file
+/// appears under its name when it is complete.
 ///
 /// # Errors
 /// As [`Writer::create`] and [`Writer::push_slices`].
@@ -38,10 +39,11 @@ pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), VolumeError>
     }
 }
 
-/// Writes a volume slice by slice, so that it never has to be in memory as a whole.
+/// Writes a volume slice by slice, so that the whole volume need not be in memory.
 ///
-/// `.nii.gz` is compressed in parallel into one gzip member whose bytes do not depend on the number of threads.
-/// The file appears under its name at [`Writer::finish`]; a writer dropped before that leaves nothing behind.
+/// A `.nii.gz` file is compressed in parallel into one gzip member. Its bytes do not depend on the
+/// number of threads. The file appears under its name at [`Writer::finish`]. A writer that is
+/// dropped before that leaves no file.
 ///
 /// ```
 /// use cutis_volume::{Affine, Grid, nifti};
@@ -77,16 +79,17 @@ impl Sink {
 }
 
 impl Writer {
-    /// Opens the file and writes the header for HU as they are (slope 1, intercept 0).
+    /// Opens the file and writes a header with slope 1 and intercept 0.
     ///
     /// # Errors
-    /// [`VolumeError::Extension`], [`VolumeError::WriteShape`], [`VolumeError::Sheared`] for a grid whose axes are not
-    /// perpendicular, [`VolumeError::Io`].
+    /// [`VolumeError::Extension`] if the name does not end in `.nii` or `.nii.gz`.
+    /// [`VolumeError::WriteShape`] if NIfTI-1 cannot hold the shape. [`VolumeError::Sheared`] if
+    /// the axes are not perpendicular. [`VolumeError::Io`].
     pub fn create(path: impl AsRef<Path>, grid: Grid) -> Result<Self, VolumeError> {
         Self::create_scaled(path, grid, 1.0, 0.0)
     }
 
-    /// As [`Writer::create`], for stored values with `HU = slope · stored + intercept`.
+    /// Opens the file and writes a header for stored values with `HU = slope · stored + intercept`.
     ///
     /// # Errors
     /// As [`Writer::create`].
@@ -113,10 +116,11 @@ impl Writer {
         Ok(Self { sink, path: path.into(), expected: grid.len(), pushed: 0 })
     }
 
-    /// Appends voxels, index `i` fastest: whole slices or any other portion.
+    /// Appends voxels in flat order, index `i` fastest: whole slices or any other portion.
     ///
     /// # Errors
-    /// [`VolumeError::Pushed`] if these are more voxels than the grid has left, [`VolumeError::Io`].
+    /// [`VolumeError::Pushed`] if the file would have more voxels than the grid, or
+    /// [`VolumeError::Io`].
     pub fn push_slices(&mut self, voxels: &[i16]) -> Result<(), VolumeError> {
         self.pushed = self.pushed.saturating_add(voxels.len());
         if self.pushed > self.expected {
@@ -131,10 +135,10 @@ impl Writer {
         Ok(())
     }
 
-    /// Completes the file and gives it its name.
+    /// Completes the file and moves it to its path.
     ///
     /// # Errors
-    /// [`VolumeError::Pushed`] if voxels are missing, [`VolumeError::Io`].
+    /// [`VolumeError::Pushed`] if voxels are missing, or [`VolumeError::Io`].
     pub fn finish(self) -> Result<(), VolumeError> {
         if self.pushed != self.expected {
             return Err(self.wrong_count());

@@ -1,34 +1,34 @@
-//! The whole scene of one person: every part in painting order.
+//! The anatomy of one person: all solids in painting order.
 
 use super::habitus::{self, Habitus};
-use super::part::{Part, Surroundings};
+use super::layered_solid::{LayeredSolid, Surroundings};
 use super::random::{Field, Random};
 use super::{bowel, chest, organs, skeleton};
 
-/// One person on the table.
+/// One person on the scanner table.
 pub(super) struct Anatomy {
     pub(super) person: Habitus,
-    pub(super) parts: Vec<Part>,
+    pub(super) solids: Vec<LayeredSolid>,
     pub(super) surroundings: Surroundings,
 }
 
 impl Anatomy {
-    /// The person `seed`; each region has its own stream of random numbers.
+    /// Creates the person with number `seed`. Each region has its own stream of random numbers.
     pub(super) fn new(seed: u64) -> Self {
         let person = Habitus::new(&mut Random::new(seed, 0));
-        let mut parts = vec![habitus::table()];
-        parts.extend(person.walls());
-        parts.extend(chest::parts(&person, &mut Random::new(seed, 1)));
-        parts.extend(organs::parts(&person, &mut Random::new(seed, 2)));
-        parts.extend(bowel::parts(&person, &mut Random::new(seed, 3)));
-        parts.extend(organs::rear_parts(&person));
-        parts.extend(skeleton::parts(&person, &mut Random::new(seed, 4)));
+        let mut solids = vec![habitus::table()];
+        solids.extend(person.walls());
+        solids.extend(chest::solids(&person, &mut Random::new(seed, 1)));
+        solids.extend(organs::solids(&person, &mut Random::new(seed, 2)));
+        solids.extend(bowel::solids(&person, &mut Random::new(seed, 3)));
+        solids.extend(organs::rear_solids(&person));
+        solids.extend(skeleton::solids(&person, &mut Random::new(seed, 4)));
         let surroundings = Surroundings {
             cavity: person.cavity,
             wobble: Field::new(seed, 5, 22.0),
             grain: Field::new(seed, 6, 6.0),
         };
-        Self { person, parts, surroundings }
+        Self { person, solids, surroundings }
     }
 }
 
@@ -38,22 +38,23 @@ mod tests {
     use crate::phantom::Phantom;
 
     #[test]
-    fn nothing_sticks_out_of_the_skin() -> Result<(), VolumeError> {
+    fn no_tissue_lies_outside_the_skin() -> Result<(), VolumeError> {
         for seed in 0..8 {
             let phantom = Phantom::new([32, 32, 48], seed)?;
             let volume = phantom.volume()?;
-            let mut met = 0;
+            let mut checked = 0;
             for (index, &hu) in volume.voxels().iter().enumerate() {
                 let at = volume.grid().mm(volume.grid().point(index)).map(|c| c as f32);
                 let mut distance = [f32::INFINITY];
                 phantom.anatomy.person.skin.lower_row(&[at.x], at.y, at.z, &mut distance);
-                // Farther out than half the diagonal of a voxel, and above the edges of the table.
+                // Outside by more than half the diagonal of a voxel, and above the edges of the
+                // table.
                 if distance[0] > 12.0 && at.y > -70.0 {
-                    met += 1;
+                    checked += 1;
                     assert!(hu < -900, "seed {seed}: {hu} HU at {at}");
                 }
             }
-            assert!(met > 5000, "only {met} voxels are outside");
+            assert!(checked > 5000, "only {checked} voxels are outside");
         }
         Ok(())
     }

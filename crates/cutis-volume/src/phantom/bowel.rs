@@ -1,25 +1,25 @@
-//! Stomach and bowel: walls with contents, and gas that collects at the front above a level surface of fluid.
+//! Stomach and bowel: walls, contents, and gas at the front above a level surface of fluid.
 
 use super::habitus::Habitus;
-use super::part::{Part, grainy, layer};
+use super::layered_solid::{LayeredSolid, grainy, layer};
 use super::profile::smooth_path;
 use super::random::Random;
 use super::solid::{Blob, Solid, norm, subtract};
 use super::tube;
 
 const GAS_HU: f32 = -955.0;
-/// Distance between neighboring loops of small bowel, mm.
+/// Distance between neighboring loops of the small bowel in mm.
 const LOOP_MM: f32 = 26.0;
 
 /// Stomach, small bowel and colon, in painting order.
-pub(super) fn parts(person: &Habitus, random: &mut Random) -> Vec<Part> {
-    let mut parts = small_bowel(person, random);
-    parts.extend(colon(person, random));
-    parts.extend(stomach(person, random));
-    parts
+pub(super) fn solids(person: &Habitus, random: &mut Random) -> Vec<LayeredSolid> {
+    let mut solids = small_bowel(person, random);
+    solids.extend(colon(person, random));
+    solids.extend(stomach(person, random));
+    solids
 }
 
-fn stomach(person: &Habitus, random: &mut Random) -> Vec<Part> {
+fn stomach(person: &Habitus, random: &mut Random) -> Vec<LayeredSolid> {
     let size = random.between(0.9, 1.1);
     let fundus =
         Blob::new(person.place([-62.0, 4.0, 52.0]), [38.0, 46.0, 34.0].map(|r| r * size)).turned(1, 0.2);
@@ -28,19 +28,19 @@ fn stomach(person: &Habitus, random: &mut Random) -> Vec<Part> {
     let blobs = [fundus, antrum];
     let level = fundus.center[1] + random.between(14.0, 30.0);
     vec![
-        Part::new(blobs.map(Solid::Blob), [layer(0.0, 45.0), grainy(4.5, 22.0, 22.0)])
+        LayeredSolid::new(blobs.map(Solid::Blob), [layer(0.0, 45.0), grainy(4.5, 22.0, 22.0)])
             .wobbly(3.0)
             .in_cavity(5.0),
-        Part::new(blobs.map(|blob| Solid::Blob(blob.shrunk(6.0))), [layer(0.0, GAS_HU)])
+        LayeredSolid::new(blobs.map(|blob| Solid::Blob(blob.shrunk(6.0))), [layer(0.0, GAS_HU)])
             .wobbly(3.0)
             .in_cavity(10.0)
             .above(1, level),
     ]
 }
 
-/// The colon frames the small bowel: up on the right, across at the front, down on the left, then to the rectum.
-fn colon(person: &Habitus, random: &mut Random) -> Vec<Part> {
-    let course = [
+/// The colon. It runs up on the right, across at the front, down on the left, and to the rectum.
+fn colon(person: &Habitus, random: &mut Random) -> Vec<LayeredSolid> {
+    let points = [
         [88.0, 18.0, -138.0, 24.0],
         [98.0, 2.0, -95.0, 25.0],
         [100.0, -2.0, -55.0, 23.0],
@@ -59,23 +59,25 @@ fn colon(person: &Habitus, random: &mut Random) -> Vec<Part> {
         [0.0, -36.0, -262.0, 20.0],
         [0.0, -42.0, -310.0, 14.0],
     ];
-    let course = course.map(|[x, y, z, r]| {
+    let points = points.map(|[x, y, z, r]| {
         let [x, y, z] = person.place(random.near([x, y, z], 6.0));
         [x, y, z, r]
     });
-    let mut path = smooth_path(&course, 6);
-    // Haustra: every other stretch of the wall is drawn in.
+    let mut path = smooth_path(&points, 6);
+    // Haustra: every other piece of the wall is constricted.
     for point in path.iter_mut().skip(1).step_by(2) {
         point[3] *= 0.84;
     }
-    let wall = Part::new(tube(&path), [layer(0.0, 42.0), grainy(3.0, 5.0, 75.0)]).wobbly(2.0).in_cavity(3.0);
-    let mut parts = vec![wall];
-    parts.extend(gas(&path, 4.5, 15, random));
-    parts
+    let wall =
+        LayeredSolid::new(tube(&path), [layer(0.0, 42.0), grainy(3.0, 5.0, 75.0)]).wobbly(2.0).in_cavity(3.0);
+    let mut solids = vec![wall];
+    solids.extend(gas(&path, 4.5, 15, random));
+    solids
 }
 
-/// Loops through a jittered lattice of points, each joined to its nearest free neighbor.
-fn small_bowel(person: &Habitus, random: &mut Random) -> Vec<Part> {
+/// The small bowel: tubes through the points of a jittered lattice, each joined to its nearest
+/// unused neighbor.
+fn small_bowel(person: &Habitus, random: &mut Random) -> Vec<LayeredSolid> {
     let mut free = Vec::new();
     for k in -4..=4 {
         for j in -2..=2 {
@@ -89,22 +91,25 @@ fn small_bowel(person: &Habitus, random: &mut Random) -> Vec<Part> {
             }
         }
     }
-    let mut parts = Vec::new();
+    let mut solids = Vec::new();
     let (mut walls, mut pockets) = (Vec::new(), Vec::new());
-    for course in chains(free, 1.7 * LOOP_MM) {
+    for chain in chains(free, 1.7 * LOOP_MM) {
         let radius = random.between(11.5, 14.0);
         let knots: Vec<_> =
-            course.iter().map(|&[x, y, z]| [x, y, z, radius * random.between(0.85, 1.1)]).collect();
+            chain.iter().map(|&[x, y, z]| [x, y, z, radius * random.between(0.85, 1.1)]).collect();
         let path = smooth_path(&knots, 5);
         walls.extend(tube(&path));
         pockets.extend(gas(&path, 4.0, 11, random));
     }
-    parts.push(Part::new(walls, [layer(0.0, 48.0), grainy(2.5, 18.0, 30.0)]).wobbly(2.0).in_cavity(4.0));
-    parts.extend(pockets);
-    parts
+    solids.push(
+        LayeredSolid::new(walls, [layer(0.0, 48.0), grainy(2.5, 18.0, 30.0)]).wobbly(2.0).in_cavity(4.0),
+    );
+    solids.extend(pockets);
+    solids
 }
 
-/// Splits points into paths that step to the nearest point left, and end where that is farther than `limit_mm`.
+/// Joins points into chains. Each chain continues with the nearest unused point, and ends if that
+/// is farther than `limit_mm`.
 fn chains(mut free: Vec<[f32; 3]>, limit_mm: f32) -> Vec<Vec<[f32; 3]>> {
     let mut chains: Vec<Vec<[f32; 3]>> = Vec::new();
     let mut last: Option<[f32; 3]> = None;
@@ -123,9 +128,10 @@ fn chains(mut free: Vec<[f32; 3]>, limit_mm: f32) -> Vec<Vec<[f32; 3]>> {
     chains
 }
 
-/// Pockets of gas along a tube, about one in `every` pieces of it, `wall_mm` below its surface.
-fn gas(path: &[[f32; 4]], wall_mm: f32, every: usize, random: &mut Random) -> Vec<Part> {
-    let mut parts = Vec::new();
+/// Pockets of gas along a tube, `wall_mm` below its surface: about one for every `every` points of
+/// the path.
+fn gas(path: &[[f32; 4]], wall_mm: f32, every: usize, random: &mut Random) -> Vec<LayeredSolid> {
+    let mut solids = Vec::new();
     let mut start = random.between(0.0, every as f32) as usize;
     while start + 2 < path.len() {
         let length = 2 + random.between(0.0, 4.0) as usize;
@@ -134,10 +140,12 @@ fn gas(path: &[[f32; 4]], wall_mm: f32, every: usize, random: &mut Random) -> Ve
             .map(|&[x, y, z, r]| [x, y, z, (r - wall_mm).max(2.0)])
             .collect();
         let level = pocket[0][1] + pocket[0][3] * random.between(-0.7, 0.4);
-        parts.push(Part::new(tube(&pocket), [layer(0.0, GAS_HU)]).wobbly(2.0).in_cavity(8.0).above(1, level));
+        solids.push(
+            LayeredSolid::new(tube(&pocket), [layer(0.0, GAS_HU)]).wobbly(2.0).in_cavity(8.0).above(1, level),
+        );
         start += length + every / 2 + random.between(0.0, every as f32) as usize;
     }
-    parts
+    solids
 }
 
 #[cfg(test)]
@@ -145,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chains_use_every_point_once_and_break_at_wide_gaps() {
+    fn chains_use_every_point_once_and_end_at_wide_gaps() {
         let points =
             vec![[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 0.0, 0.0], [50.0, 0.0, 0.0], [51.0, 0.0, 0.0]];
         let chains = chains(points, 5.0);

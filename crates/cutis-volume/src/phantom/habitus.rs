@@ -1,18 +1,20 @@
-//! Build of the person: outlines of skin, muscle and body cavity, the course of the spine, and the scanner table.
+//! The build of a person: outlines of skin, muscle and body cavity, the curve of the spine, and the
+//! scanner table.
 //!
-//! RAS+ millimeters: x to the right, y to the front, z to the head; the lowest rib arch is near z = 0.
+//! All positions are in RAS+ millimeters: x to the right, y to the front, z to the head. The lowest
+//! ribs are near z = 0.
 
+use super::layered_solid::{Layer, LayeredSolid, grainy, layer};
 use super::outline::Outline;
-use super::part::{Layer, Part, grainy, layer};
 use super::profile::Profile;
 use super::random::Random;
 use super::solid::{Board, Solid};
 
-/// Height of the skin of the back, mm: flat, as the person lies on it.
+/// Depth of the back below the origin in mm. The back is flat, because the person lies on it.
 const BACK_MM: f32 = 100.0;
-/// Between an ellipse and a rounded box.
+/// Shape of the outlines, between an ellipse (0) and a rounded box (1).
 const SQUARENESS: f32 = 0.3;
-/// Planes of fat between sheets of muscle.
+/// Layers of muscle with planes of fat between them.
 const MUSCLE: [Layer; 5] = [
     grainy(0.0, 52.0, 14.0),
     layer(5.0, -45.0),
@@ -20,7 +22,7 @@ const MUSCLE: [Layer; 5] = [
     layer(10.0, -30.0),
     grainy(10.8, 54.0, 14.0),
 ];
-/// Free distance between the skin of the back and the table, mm.
+/// Distance between the skin of the back and the table in mm.
 const TABLE_GAP_MM: f32 = 12.0;
 
 /// Outlines of one person.
@@ -34,7 +36,7 @@ pub(super) struct Habitus {
 }
 
 impl Habitus {
-    /// A person of random width, depth and fatness.
+    /// Creates a person of random width, depth and amount of fat.
     pub(super) fn new(random: &mut Random) -> Self {
         let width = random.between(0.94, 1.05);
         let depth = random.between(0.94, 1.08);
@@ -70,30 +72,30 @@ impl Habitus {
         Self { skin, muscle, cavity, spine, width, depth }
     }
 
-    /// A place described for the average person, moved to where it is in this one.
+    /// Maps a position in the average person to the position in this one.
     pub(super) fn place(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         [x * self.width, if y > 0.0 { y * self.depth } else { y }, z]
     }
 
-    /// Height of the middle of the vertebral column at `z`.
+    /// The y coordinate of the middle of the vertebral column at height `z`.
     pub(super) fn spine(&self, z: f32) -> f32 {
         self.spine.at(z)
     }
 
-    /// Skin and subcutaneous fat, the muscle wall, and the cavity filled with inner fat.
-    pub(super) fn walls(&self) -> Vec<Part> {
+    /// Skin with subcutaneous fat, the muscle wall, and the body cavity filled with fat.
+    pub(super) fn walls(&self) -> Vec<LayeredSolid> {
         vec![
-            Part::new([Solid::Outline(self.skin)], [layer(0.0, 25.0), grainy(2.0, -102.0, 12.0)]),
-            Part::new([Solid::Outline(self.muscle)], MUSCLE).wobbly(1.5),
-            Part::new([Solid::Outline(self.cavity)], [grainy(0.0, -98.0, 14.0)]).wobbly(1.0),
+            LayeredSolid::new([Solid::Outline(self.skin)], [layer(0.0, 25.0), grainy(2.0, -102.0, 12.0)]),
+            LayeredSolid::new([Solid::Outline(self.muscle)], MUSCLE).wobbly(1.5),
+            LayeredSolid::new([Solid::Outline(self.cavity)], [grainy(0.0, -98.0, 14.0)]).wobbly(1.0),
         ]
     }
 }
 
 /// The scanner table: a carbon shell around foam.
-pub(super) fn table() -> Part {
+pub(super) fn table() -> LayeredSolid {
     let board = Board { top: -BACK_MM - TABLE_GAP_MM, thickness: 26.0, half_width: 185.0, bend: 620.0 };
-    Part::new([Solid::Board(board)], [layer(0.0, -20.0), layer(4.5, -925.0)])
+    LayeredSolid::new([Solid::Board(board)], [layer(0.0, -20.0), layer(4.5, -925.0)])
 }
 
 #[cfg(test)]
@@ -101,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn outlines_nest_in_everybody_and_fit_the_field_of_view() {
+    fn outlines_of_every_person_are_nested_and_fit_the_field_of_view() {
         for seed in 0..200 {
             let person = Habitus::new(&mut Random::new(seed, 0));
             for z in (-300..=300).step_by(10).map(|z| z as f32) {

@@ -1,17 +1,18 @@
-//! A synthetic CT of a human-like torso, and test solids with closed forms.
+//! Synthetic CTs: a human-like torso, and test solids with closed forms.
 //!
-//! [`Phantom`] is a scene of analytic solids: skin, subcutaneous fat, muscle, bones, lungs with vessels, organs, bowel with
-//! gas, and a scanner table. Each voxel is the mean over sample points at most 2.5 mm apart (partial volume), plus
-//! noise. A voxel's value depends on shape, seed and index alone: it is bitwise the same for any number of threads and any
-//! order of slices, and only arithmetic that IEEE 754 fixes is used.
+//! [`Phantom`] consists of analytic solids: skin, subcutaneous fat, muscle, bones, lungs with
+//! vessels, organs, bowel with gas, and a scanner table. Each voxel is the mean over sample points
+//! at most 2.5 mm apart (partial volume effect) plus noise. Its value depends only on shape, seed
+//! and index. It is bitwise the same for any number of threads and any order of slices, because
+//! only arithmetic that IEEE 754 specifies exactly is used.
 
 mod anatomy;
 mod bowel;
 mod chest;
 mod habitus;
+mod layered_solid;
 mod organs;
 mod outline;
-mod part;
 mod profile;
 mod random;
 mod scan;
@@ -29,24 +30,27 @@ pub use solids::{nested_spheres, sphere};
 
 use crate::{Affine, Grid, Volume, VolumeError, nifti};
 
-/// Most voxels along one axis.
+/// Largest number of voxels along one axis.
 pub const MAX_VOXELS_PER_AXIS: usize = 4096;
-/// Width and depth of the field of view, mm.
+/// Width and depth of the field of view in mm.
 const FIELD_OF_VIEW_MM: f64 = 400.0;
-/// Shortest and longest stretch of the body in a scan, mm.
+/// Shortest and longest length of a scan along the body in mm.
 const LENGTH_MM: [f64; 2] = [300.0, 600.0];
-/// Bytes of slices that [`Phantom::write`] computes at a time.
+/// Number of bytes that [`Phantom::write`] computes at a time.
 const PORTION_BYTES: usize = 16 << 20;
 
 /// A synthetic CT scan of a torso.
 ///
-/// The person lies on the back. The frame is RAS+ with the origin in the middle of the body: the belly is at +y, the table
-/// at −y, the head at +z; index axes run along +x, +y, +z. The field of view is 400 × 400 mm, so the axial spacing is
-/// `400/nx` × `400/ny`. Slices are as far apart as the finer of these two, but the scan is at least 300 mm long (lower
-/// chest to iliac crests) and at most 600 mm (upper chest to hips):
-/// `spacing_z = clamp(nz · min(400/nx, 400/ny), 300, 600)/nz`.
+/// The person lies on the back. The frame is RAS+ with the origin in the middle of the body. The
+/// belly is at +y, the table at −y and the head at +z. The index axes run along +x, +y and +z.
 ///
-/// The seed varies the build, the sizes and places of organs, the bowel and the noise.
+/// The field of view is 400 × 400 mm, so the axial spacing is `400/nx` × `400/ny`. The slice
+/// spacing equals the finer of these two, within limits on the length of the scan: at least 300 mm
+/// (lower chest to iliac crests) and at most 600 mm (upper chest to hips). `spacing_z = clamp(nz ·
+/// min(400/nx, 400/ny), 300, 600)/nz`.
+///
+/// The seed varies the build of the body, the sizes and positions of organs, the bowel and the
+/// noise.
 ///
 /// ```
 /// use cutis_volume::phantom::Phantom;
@@ -64,7 +68,7 @@ pub struct Phantom {
 }
 
 impl Phantom {
-    /// The scan with `shape` voxels of the person `seed`.
+    /// Creates a scan with `shape` voxels of the person with number `seed`.
     ///
     /// # Errors
     /// [`VolumeError::PhantomShape`] if an axis has no voxels or more than [`MAX_VOXELS_PER_AXIS`].
@@ -73,27 +77,28 @@ impl Phantom {
         let [nx, ny, nz] = shape.map(|n| n as f64);
         let (sx, sy) = (FIELD_OF_VIEW_MM / nx, FIELD_OF_VIEW_MM / ny);
         let length = (nz * sx.min(sy)).clamp(LENGTH_MM[0], LENGTH_MM[1]);
-        let grid = centerd_grid(shape, [sx, sy, length / nz])?;
+        let grid = centered_grid(shape, [sx, sy, length / nz])?;
         Ok(Self { grid, seed, anatomy: Anatomy::new(seed) })
     }
 
-    /// Where the voxel centers lie.
+    /// The grid of the voxel centers.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Two points on the skin of the belly, mm, about 100 mm apart along the body: a good place to cut, beside the midline.
+    /// Two points in mm on the skin of the belly, next to the midline and about 100 mm apart along
+    /// the body. They suit an incision.
     pub fn incision_site(&self) -> ([f64; 3], [f64; 3]) {
         const X_MM: f32 = 36.0;
         let at = |z: f32| [X_MM, self.anatomy.person.skin.front_at(X_MM, z), z].map(f64::from);
         (at(-85.0), at(15.0))
     }
 
-    /// Computes the HU of the slices `slices`, index `i` fastest, in parallel.
+    /// Computes the HU of some slices in parallel, index `i` fastest.
     ///
     /// # Errors
-    /// [`VolumeError::SliceRange`] for slices that the grid does not have; [`VolumeError::VoxelCount`] if `out` does not hold
-    /// exactly those slices.
+    /// [`VolumeError::SliceRange`] if the grid does not have these slices.
+    /// [`VolumeError::VoxelCount`] if the length of `out` is not the number of their voxels.
     pub fn fill_slices(&self, slices: Range<usize>, out: &mut [i16]) -> Result<(), VolumeError> {
         let [nx, ny, nz] = self.grid.shape;
         if slices.start > slices.end || slices.end > nz {
@@ -108,17 +113,19 @@ impl Phantom {
         Ok(())
     }
 
-    /// The whole scan in memory: two bytes per voxel.
+    /// Computes the whole scan. It takes two bytes of memory per voxel.
     ///
     /// # Errors
-    /// [`VolumeError::PhantomShape`] if this machine cannot hold it; [`Phantom::write`] needs little memory.
+    /// [`VolumeError::PhantomShape`] if the memory does not suffice. [`Phantom::write`] needs
+    /// little memory.
     pub fn volume(&self) -> Result<Volume, VolumeError> {
         let mut voxels = zeros(self.grid.shape)?;
         self.fill_slices(0..self.grid.shape[2], &mut voxels)?;
         Volume::new(self.grid, voxels, 1.0, 0.0)
     }
 
-    /// Writes the scan as `.nii` or `.nii.gz`, a few slices at a time. `progress` is told the slices done and their total.
+    /// Writes the scan to a `.nii` or `.nii.gz` file, a few slices at a time. Calls `progress` with
+    /// the number of finished slices and of all slices.
     ///
     /// # Errors
     /// As [`nifti::Writer`].
@@ -142,7 +149,7 @@ impl Phantom {
     }
 }
 
-/// Product of a shape within the limits.
+/// Number of voxels of a shape, or an error if the shape exceeds the limits.
 fn voxel_count(shape: [usize; 3]) -> Result<usize, VolumeError> {
     let refused = VolumeError::PhantomShape { shape, most: MAX_VOXELS_PER_AXIS };
     if shape.iter().any(|n| !(1..=MAX_VOXELS_PER_AXIS).contains(n)) {
@@ -151,7 +158,8 @@ fn voxel_count(shape: [usize; 3]) -> Result<usize, VolumeError> {
     shape.iter().try_fold(1_usize, |count, &n| count.checked_mul(n)).ok_or(refused)
 }
 
-/// Voxels of a shape within the limits, or an error where memory does not suffice.
+/// Zeroed voxels of a shape, or an error if the shape exceeds the limits or the memory does not
+/// suffice.
 fn zeros(shape: [usize; 3]) -> Result<Vec<i16>, VolumeError> {
     let count = voxel_count(shape)?;
     let mut voxels = Vec::new();
@@ -162,20 +170,20 @@ fn zeros(shape: [usize; 3]) -> Result<Vec<i16>, VolumeError> {
     Ok(voxels)
 }
 
-/// The grid along +x, +y, +z whose middle is the origin.
-fn centerd_grid(shape: [usize; 3], spacing_mm: [f64; 3]) -> Result<Grid, VolumeError> {
+/// The grid along +x, +y and +z whose middle is at the origin.
+fn centered_grid(shape: [usize; 3], spacing_mm: [f64; 3]) -> Result<Grid, VolumeError> {
     let origin_mm = std::array::from_fn(|c| -0.5 * (shape[c] as f64 - 1.0) * spacing_mm[c]);
     Ok(Grid { shape, affine: Affine::from_spacing(spacing_mm, origin_mm)? })
 }
 
-/// The pieces of a tube through `[x, y, z, radius]` points.
+/// Capsules that form a tube through points `[x, y, z, radius]`.
 fn tube(points: &[[f32; 4]]) -> impl Iterator<Item = Solid> + use<> {
-    let pieces: Vec<_> = points
+    let capsules: Vec<_> = points
         .windows(2)
         .map(|pair| {
             let [from, to] = [pair[0], pair[1]].map(|[x, y, z, _]| [x, y, z]);
             Solid::Capsule(Capsule::new([from, to], [pair[0][3], pair[1][3]]))
         })
         .collect();
-    pieces.into_iter()
+    capsules.into_iter()
 }

@@ -1,28 +1,30 @@
-//! Solid organs of the abdomen and their vessels: liver, spleen, kidneys, pancreas, psoas muscles, aorta and vena cava.
+//! Solid organs, muscles and vessels of the abdomen: liver, spleen, kidneys, pancreas, bladder,
+//! psoas muscles, aorta and vena cava.
 
 use super::habitus::Habitus;
-use super::part::{Part, grainy, layer};
+use super::layered_solid::{LayeredSolid, grainy, layer};
 use super::random::Random;
 use super::solid::{Blob, Solid};
 use super::tube;
 
-/// Thickness of the fat around a kidney, mm.
+/// Thickness of the fat around a kidney in mm.
 const CAPSULE_MM: f32 = 6.0;
 
-/// The organs, in painting order: the fat around the kidneys makes room in what lies before them.
-pub(super) fn parts(person: &Habitus, random: &mut Random) -> Vec<Part> {
-    let mut parts = upper_organs(person, random);
-    parts.extend([-1.0, 1.0].into_iter().flat_map(|side| kidney(person, side, random)));
-    parts
+/// The organs in painting order. The fat around the kidneys is painted over the organs before it.
+pub(super) fn solids(person: &Habitus, random: &mut Random) -> Vec<LayeredSolid> {
+    let mut solids = upper_organs(person, random);
+    solids.extend([-1.0, 1.0].into_iter().flat_map(|side| kidney(person, side, random)));
+    solids
 }
 
-/// Muscles and vessels beside the spine, which nothing pushes aside.
-pub(super) fn rear_parts(person: &Habitus) -> Vec<Part> {
+/// Muscles and vessels next to the spine. They are painted after the bowel, so that they keep their
+/// shape.
+pub(super) fn rear_solids(person: &Habitus) -> Vec<LayeredSolid> {
     vec![psoas(person), vessels(person)]
 }
 
-/// Liver with gallbladder, spleen, pancreas and the bladder.
-fn upper_organs(person: &Habitus, random: &mut Random) -> Vec<Part> {
+/// Liver with gallbladder, spleen, pancreas and bladder.
+fn upper_organs(person: &Habitus, random: &mut Random) -> Vec<LayeredSolid> {
     let size = random.between(0.93, 1.06);
     let shift = random.between(-8.0, 8.0);
     let blob = |center: [f32; 3], radii: [f32; 3]| {
@@ -44,14 +46,18 @@ fn upper_organs(person: &Habitus, random: &mut Random) -> Vec<Part> {
     });
     let bladder = Blob::new(person.place([0.0, 22.0, -236.0]), [42.0, 30.0, 28.0]);
     vec![
-        Part::new([Solid::Blob(right_lobe), Solid::Blob(left_lobe)], [grainy(0.0, 60.0, 9.0)])
+        LayeredSolid::new([Solid::Blob(right_lobe), Solid::Blob(left_lobe)], [grainy(0.0, 60.0, 9.0)])
             .wobbly(3.0)
             .in_cavity(3.0),
-        Part::new(liver_vessels(person, shift), [layer(0.0, 42.0)]).wobbly(1.0),
-        Part::new([Solid::Blob(gallbladder)], [layer(0.0, 35.0), layer(2.5, 8.0)]).wobbly(1.5).in_cavity(4.0),
-        Part::new([Solid::Blob(spleen)], [grainy(0.0, 50.0, 7.0)]).wobbly(3.0).in_cavity(3.0),
-        Part::new(tube(&pancreas), [grainy(0.0, 38.0, 20.0)]).wobbly(3.0).in_cavity(3.0),
-        Part::new([Solid::Blob(bladder)], [layer(0.0, 38.0), layer(4.0, 6.0)]).wobbly(2.0).in_cavity(2.0),
+        LayeredSolid::new(liver_vessels(person, shift), [layer(0.0, 42.0)]).wobbly(1.0),
+        LayeredSolid::new([Solid::Blob(gallbladder)], [layer(0.0, 35.0), layer(2.5, 8.0)])
+            .wobbly(1.5)
+            .in_cavity(4.0),
+        LayeredSolid::new([Solid::Blob(spleen)], [grainy(0.0, 50.0, 7.0)]).wobbly(3.0).in_cavity(3.0),
+        LayeredSolid::new(tube(&pancreas), [grainy(0.0, 38.0, 20.0)]).wobbly(3.0).in_cavity(3.0),
+        LayeredSolid::new([Solid::Blob(bladder)], [layer(0.0, 38.0), layer(4.0, 6.0)])
+            .wobbly(2.0)
+            .in_cavity(2.0),
     ]
 }
 
@@ -73,8 +79,8 @@ fn liver_vessels(person: &Habitus, shift: f32) -> Vec<Solid> {
     branches.iter().flat_map(|branch| tube(branch)).collect()
 }
 
-/// A kidney with the fat of its sinus; the right one (`side` 1) lies lower.
-fn kidney(person: &Habitus, side: f32, random: &mut Random) -> Vec<Part> {
+/// A kidney with the fat of its sinus. The right kidney (`side` 1) lies lower.
+fn kidney(person: &Habitus, side: f32, random: &mut Random) -> Vec<LayeredSolid> {
     let z = -22.0 - 9.0 * side + random.between(-7.0, 7.0);
     let size = random.between(0.94, 1.08);
     let at = |x: f32, y: f32| person.place([side * x, y, z]);
@@ -83,15 +89,15 @@ fn kidney(person: &Habitus, side: f32, random: &mut Random) -> Vec<Part> {
         .turned(2, side * 0.2);
     let sinus = Blob::new(at(55.0, -26.0), [15.0, 9.0, 26.0]);
     vec![
-        Part::new([Solid::Blob(body)], [grainy(0.0, -100.0, 10.0), grainy(CAPSULE_MM, 36.0, 6.0)])
+        LayeredSolid::new([Solid::Blob(body)], [grainy(0.0, -100.0, 10.0), grainy(CAPSULE_MM, 36.0, 6.0)])
             .wobbly(2.0)
             .in_cavity(0.0),
-        Part::new([Solid::Blob(sinus)], [grainy(0.0, -70.0, 50.0)]).wobbly(4.0),
+        LayeredSolid::new([Solid::Blob(sinus)], [grainy(0.0, -70.0, 50.0)]).wobbly(4.0),
     ]
 }
 
 /// The psoas muscles, from the lumbar spine to the groin.
-fn psoas(person: &Habitus) -> Part {
+fn psoas(person: &Habitus) -> LayeredSolid {
     let sides = [-1.0, 1.0].map(|side| {
         tube(&[
             [side * 26.0, person.spine(10.0) - 2.0, 10.0, 8.0],
@@ -102,11 +108,11 @@ fn psoas(person: &Habitus) -> Part {
             [side * 96.0, 20.0, -310.0, 15.0],
         ])
     });
-    Part::new(sides.into_iter().flatten(), [grainy(0.0, 54.0, 12.0)]).wobbly(2.0)
+    LayeredSolid::new(sides.into_iter().flatten(), [grainy(0.0, 54.0, 12.0)]).wobbly(2.0)
 }
 
-/// Abdominal aorta and vena cava with their forks.
-fn vessels(person: &Habitus) -> Part {
+/// Abdominal aorta and vena cava with their iliac branches.
+fn vessels(person: &Habitus) -> LayeredSolid {
     let before_spine = |x: f32, gap: f32, z: f32, r: f32| [x, person.spine(z) + gap, z, r];
     let mut solids = Vec::new();
     for (side, radius, top) in [(-1.0, 10.0, 80.0), (1.0, 12.0, 95.0)] {
@@ -119,14 +125,14 @@ fn vessels(person: &Habitus) -> Part {
         ]));
         for limb in [-1.0, 1.0] {
             let [_, y, z, _] = before_spine(0.0, 34.0, -160.0, 0.0);
-            let drawn = 0.62 * radius;
+            let branch_radius = 0.62 * radius;
             solids.extend(tube(&[
                 fork,
-                [limb * 38.0, y, z, drawn],
-                [limb * 84.0, 40.0, -260.0, drawn],
-                [limb * 92.0, 44.0, -310.0, drawn],
+                [limb * 38.0, y, z, branch_radius],
+                [limb * 84.0, 40.0, -260.0, branch_radius],
+                [limb * 92.0, 44.0, -310.0, branch_radius],
             ]));
         }
     }
-    Part::new(solids, [layer(0.0, 43.0)])
+    LayeredSolid::new(solids, [layer(0.0, 43.0)])
 }

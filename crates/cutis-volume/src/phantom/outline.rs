@@ -1,9 +1,10 @@
-//! Outlines of the trunk: skin, muscle and body cavity as closed curves that change along the long axis.
+//! Outlines of the trunk: closed curves around the long axis that vary along it.
 
 use super::profile::Profile;
 use super::solid::{Bounds, gauge_distance};
 
-/// A closed curve around the long axis whose half width and depths to the front and back follow profiles along z.
+/// A closed curve around the long axis. Its half-width and its depths to the front and back are
+/// profiles along z.
 #[derive(Clone, Copy)]
 pub(super) struct Outline {
     pub(super) side: Profile,
@@ -17,7 +18,7 @@ impl Outline {
         [self.side.at(z), if y > 0.0 { self.front.at(z) } else { self.back.at(z) }]
     }
 
-    /// Where the ray from the axis along `(x, y)` leaves the outline at height `z`.
+    /// The point where the ray from the axis along `(x, y)` leaves the outline at height `z`.
     pub(super) fn exit(&self, [x, y]: [f32; 2], z: f32) -> [f32; 3] {
         let [a, b] = self.radii(y, z);
         let (u, v) = ((x / a) * (x / a), (y / b) * (y / b));
@@ -25,7 +26,8 @@ impl Outline {
         [x / q, y / q, z]
     }
 
-    /// Height of the front surface above the axis at `(x, z)`, by bisection; 0 beside the outline.
+    /// The y coordinate of the front surface at `(x, z)`, found by bisection. It is 0 if `x` is
+    /// outside the outline.
     pub(super) fn front_at(&self, x: f32, z: f32) -> f32 {
         let (mut inside, mut outside) = (0.0, self.front.at(z));
         for _ in 0..32 {
@@ -45,7 +47,8 @@ impl Outline {
         }
     }
 
-    /// Lowers each `distance` to that of the outline, measured within the axial plane.
+    /// Lowers each `distance` to the signed distance of the outline, measured within the axial
+    /// plane.
     pub(super) fn lower_row(&self, xs: &[f32], y: f32, z: f32, distance: &mut [f32]) {
         let [a, b] = self.radii(y, z);
         let (p, q) = (1.0 / a, 1.0 / b);
@@ -62,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn outline_exits_and_front_lie_on_the_surface() {
+    fn exit_and_front_points_lie_on_the_surface() {
         let outline = Outline {
             side: Profile::new([150.0; 7]),
             front: Profile::new([90.0, 100.0, 110.0, 105.0, 100.0, 95.0, 90.0]),

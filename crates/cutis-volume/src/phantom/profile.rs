@@ -1,10 +1,10 @@
-//! Smooth curves: a value along the body's long axis, and a path through points in space.
+//! Smooth curves: a value that varies along the body, and a path through points in space.
 
-/// Heights of the first and last knot are `∓REACH_MM`; beyond them a profile stays constant.
+/// The first and last knots are at `∓REACH_MM`. A profile is constant beyond them.
 const REACH_MM: f32 = 300.0;
 const KNOTS: usize = 7;
 
-/// A quantity along z: Catmull–Rom through seven values, at −300, −200, …, 300 mm.
+/// A quantity along z: a Catmull–Rom spline through seven values, at −300, −200, …, 300 mm.
 #[derive(Clone, Copy)]
 pub(super) struct Profile([f32; KNOTS]);
 
@@ -13,7 +13,7 @@ impl Profile {
         Self(values)
     }
 
-    /// The value at height `z`, mm.
+    /// The value at height `z` in mm.
     pub(super) fn at(&self, z: f32) -> f32 {
         let last = KNOTS - 1;
         let s = ((z + REACH_MM) * (last as f32 / (2.0 * REACH_MM))).clamp(0.0, last as f32);
@@ -22,26 +22,26 @@ impl Profile {
         catmull_rom(knots.map(|n| self.0[n]), s - k as f32)
     }
 
-    /// Sum of two profiles, the second one scaled.
+    /// The sum of this profile and the scaled `other`.
     pub(super) fn plus(&self, other: &Self, scale: f32) -> Self {
         Self(std::array::from_fn(|k| self.0[k] + scale * other.0[k]))
     }
 
-    /// All values scaled.
+    /// This profile with all values scaled.
     pub(super) fn scaled(&self, scale: f32) -> Self {
         Self(self.0.map(|v| scale * v))
     }
 
-    /// An upper bound of the curve: the largest knot and what the spline may overshoot by.
+    /// An upper bound of the curve: the largest knot plus the largest possible overshoot.
     pub(super) fn highest(&self) -> f32 {
         let (low, high) =
             self.0.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-        // Between knots the outer weights of Catmull–Rom sum to −1/8 at most.
+        // Between knots the sum of the two outer weights of Catmull–Rom is not below −1/8.
         high + 0.125 * (high - low)
     }
 }
 
-/// Uniform Catmull–Rom spline between `p[1]` and `p[2]`.
+/// Value of the uniform Catmull–Rom spline between `p[1]` and `p[2]`.
 fn catmull_rom(p: [f32; 4], t: f32) -> f32 {
     let slope = 0.5 * (p[2] - p[0]);
     let curve = p[0] - 2.5 * p[1] + 2.0 * p[2] - 0.5 * p[3];
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn profile_meets_its_knots_and_stays_constant_beyond() {
+    fn profile_passes_through_its_knots_and_is_constant_beyond() {
         let profile = Profile::new([1.0, 4.0, 9.0, 2.0, 5.0, 7.0, 3.0]);
         for (k, value) in [1.0, 4.0, 9.0, 2.0, 5.0, 7.0, 3.0].into_iter().enumerate() {
             assert!((profile.at(-300.0 + 100.0 * k as f32) - value).abs() < 1e-5);
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn path_meets_its_points() {
+    fn path_passes_through_its_points() {
         let points = [[0.0, 0.0, 0.0, 1.0], [10.0, 0.0, 5.0, 2.0], [10.0, 8.0, 9.0, 1.0]];
         let path = smooth_path(&points, 4);
         assert_eq!(path.len(), 9);

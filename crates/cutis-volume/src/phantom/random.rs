@@ -1,8 +1,11 @@
-//! Counter-based random numbers: every value is a pure function of a key and a counter, so order and threads cannot matter.
+//! Counter-based random numbers. Each value is a pure function of a key and a counter, so it does
+//! not depend on order or threads.
 //!
-//! Only integer operations, additions, multiplications and roundings that IEEE 754 fixes are used: the same bits everywhere.
+//! The functions use only integer operations and floating-point operations that IEEE 754 specifies
+//! exactly. Therefore the bits are the same on every machine.
 
-/// The SplitMix64 output function (Steele, Lea & Flood 2014) at position `counter` of the stream `key`.
+/// The SplitMix64 output function (Steele, Lea & Flood 2014) at position `counter` of the stream
+/// `key`.
 pub(super) fn hash(key: u64, counter: u64) -> u64 {
     let mut h = key.wrapping_add(counter.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     h = (h ^ (h >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -10,17 +13,19 @@ pub(super) fn hash(key: u64, counter: u64) -> u64 {
     h ^ (h >> 31)
 }
 
-/// Uniform in `[0, 1)` from the upper 24 bits of a hash.
+/// A uniform number in `[0, 1)` from the upper 24 bits of a hash.
 fn unit(hash: u64) -> f32 {
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Nearly normal, mean 0 and variance 1: the sum of the eight bytes of a hash, centerd and scaled (Irwin–Hall, n = 8).
+/// A nearly normal number with mean 0 and variance 1: the sum of the eight bytes of a hash,
+/// centered and scaled (Irwin–Hall, n = 8).
 pub(super) fn normal(hash: u64) -> f32 {
     const PAIRS: u64 = 0x00FF_00FF_00FF_00FF;
     let pairs = (hash & PAIRS) + ((hash >> 8) & PAIRS);
     let sum = pairs.wrapping_mul(0x0001_0001_0001_0001) >> 48;
-    // Each byte has mean 127.5 and variance (256² − 1)/12; eight of them: 1020 and 43690.
+    // A byte has the mean 127.5 and the variance (256² − 1)/12. For eight bytes these are 1020 and
+    // 43690.
     (sum as f32 - 1020.0) * (1.0 / 209.021_53)
 }
 
@@ -31,12 +36,12 @@ pub(super) struct Random {
 }
 
 impl Random {
-    /// The sequence number `stream` of a seed; different streams are independent.
+    /// The sequence with number `stream` of a seed. Different streams are independent.
     pub(super) fn new(seed: u64, stream: u64) -> Self {
         Self { key: hash(seed, stream), counter: 0 }
     }
 
-    /// Uniform in `[low, high)`.
+    /// A uniform number in `[low, high)`.
     pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
         self.counter += 1;
         low + (high - low) * unit(hash(self.key, self.counter))
@@ -48,20 +53,21 @@ impl Random {
     }
 }
 
-/// Smooth random field (value noise) in `[-1, 1]`: random values on a cubic lattice, blended by a cubic ramp.
+/// A smooth random field in `[-1, 1]` (value noise): random values on a cubic lattice, interpolated
+/// with a cubic ramp.
 pub(super) struct Field {
     key: u64,
     cell_mm: f32,
 }
 
 impl Field {
-    /// The field number `stream` of a seed, with features about `cell_mm` across.
+    /// The field with number `stream` of a seed. Its features are about `cell_mm` wide.
     pub(super) fn new(seed: u64, stream: u64, cell_mm: f32) -> Self {
         Self { key: hash(seed, stream), cell_mm }
     }
 
     fn corner(&self, cell: [i32; 3]) -> f32 {
-        // 21 bits per axis hold any cell of a field of view.
+        // 21 bits per axis suffice for any cell in the field of view.
         let packed = cell.iter().fold(0, |bits, &c| (bits << 21) | (c as u64 & 0x1F_FFFF));
         2.0 * unit(hash(self.key, packed)) - 1.0
     }
@@ -73,7 +79,7 @@ impl Field {
         (cell as i32, t * t * (3.0 - 2.0 * t))
     }
 
-    /// Values at `(x, y, z)` for each `x` of an ascending row; `columns` is scratch.
+    /// Computes the values at `(x, y, z)` for each `x` of an ascending row. `columns` is a buffer.
     pub(super) fn fill_row(&self, xs: &[f32], y: f32, z: f32, columns: &mut Vec<f32>, out: &mut [f32]) {
         let (Some(&first), Some(&last)) = (xs.first(), xs.last()) else { return };
         let ((j, v), (k, w)) = (self.locate(y), self.locate(z));
@@ -126,7 +132,8 @@ mod tests {
         field.fill_row(&xs, 12.0, -7.0, &mut columns, &mut whole);
         field.fill_row(&xs[150..250], 12.0, -7.0, &mut columns, &mut part);
         assert_eq!(whole[150..250], part);
-        // The ramp is at most 1.5 times as steep as a straight line between values two apart.
+        // The ramp is at most 1.5 times as steep as a straight line, and lattice values differ by
+        // at most 2.
         assert!(whole.windows(2).all(|w| (w[1] - w[0]).abs() <= 0.3 + 1e-5));
         assert!(whole.iter().any(|&v| v > 0.3) && whole.iter().any(|&v| v < -0.3));
     }

@@ -1,25 +1,26 @@
-//! The scanner: voxels as means over sample points, with noise.
+//! The simulated scanner: each voxel is a mean over sample points, plus noise.
 
 use rayon::prelude::*;
 
 use super::anatomy::Anatomy;
-use super::part::{Active, Row, active};
+use super::layered_solid::{InPlane, SampleRow, in_plane};
 use super::random::{hash, normal};
 use crate::{AIR_HU, Grid};
 
-/// Largest distance between sample points, mm.
+/// Largest distance between sample points in mm.
 const SAMPLE_MM: f64 = 2.5;
 const BACKGROUND_HU: f32 = -1000.0;
-/// Upper end of a 12-bit scanner's range, HU.
+/// Highest value of a 12-bit scanner in HU.
 const HIGHEST_HU: f32 = 3071.0;
-/// Standard deviation of the noise at the edge of the field of view and what the middle adds to it, HU.
+/// Standard deviation of the noise in HU: at the edge of the field of view, and the addition in the
+/// middle.
 const NOISE_HU: [f32; 2] = [6.0, 7.0];
-/// The stream of random numbers of the noise.
+/// Number of the random stream for the noise.
 const NOISE_STREAM: u64 = 100;
-/// Rows that one task computes at least.
+/// Smallest number of rows per parallel task.
 const ROWS_PER_TASK: usize = 4;
 
-/// Sample points of one axis: `factor` for each voxel, evenly spread over it.
+/// Sample points along one axis: `factor` points per voxel, evenly spaced over it.
 struct Samples {
     at: Vec<f32>,
     factor: usize,
@@ -42,7 +43,8 @@ impl Samples {
     }
 }
 
-/// Computes the slices from `first` on until `out` is full. `out` holds whole slices of the grid.
+/// Computes slices until `out` is full, beginning with slice `first`. `out` holds whole slices of
+/// the grid.
 pub(super) fn fill(grid: &Grid, seed: u64, anatomy: &Anatomy, first: usize, out: &mut [i16]) {
     let [nx, ny, _] = grid.shape;
     let [xs, ys, zs] = [0, 1, 2].map(|axis| Samples::new(grid, axis));
@@ -53,16 +55,16 @@ pub(super) fn fill(grid: &Grid, seed: u64, anatomy: &Anatomy, first: usize, out:
 
     out.par_chunks_mut(nx * ny).enumerate().for_each(|(slice, out)| {
         let k = first + slice;
-        let planes: Vec<(f32, Vec<Active<'_>>)> =
-            zs.of(k).iter().map(|&z| (z, active(&anatomy.parts, z, blend_mm))).collect();
-        let scratch = || (Row::new(&xs.at, xs.step, blend_mm), vec![0.0_f32; nx]);
+        let planes: Vec<(f32, Vec<InPlane<'_>>)> =
+            zs.of(k).iter().map(|&z| (z, in_plane(&anatomy.solids, z, blend_mm))).collect();
+        let scratch = || (SampleRow::new(&xs.at, xs.step, blend_mm), vec![0.0_f32; nx]);
         out.par_chunks_mut(nx).with_min_len(ROWS_PER_TASK).enumerate().for_each_init(
             scratch,
             |(row, sums), (j, out)| {
                 sums.fill(0.0);
-                for (z, actives) in &planes {
+                for (z, solids) in &planes {
                     for &y in ys.of(j) {
-                        let hu = row.paint(actives, &anatomy.surroundings, y, *z, BACKGROUND_HU);
+                        let hu = row.paint(solids, &anatomy.surroundings, y, *z, BACKGROUND_HU);
                         for (sum, samples) in sums.iter_mut().zip(hu.chunks_exact(xs.factor)) {
                             *sum += samples.iter().sum::<f32>();
                         }
@@ -79,7 +81,8 @@ pub(super) fn fill(grid: &Grid, seed: u64, anatomy: &Anatomy, first: usize, out:
     });
 }
 
-/// Noise that grows towards the middle of the field of view, where the rays pass through more body.
+/// Noise that increases towards the middle of the field of view, where the rays pass through more
+/// tissue.
 struct Noise {
     key: u64,
     edge_mm: f32,
@@ -92,20 +95,20 @@ impl Noise {
     }
 }
 
-/// Rounded and clamped to a scanner's range.
+/// Rounds a value and clamps it to the range of the scanner.
 fn stored(hu: f32) -> i16 {
-    // The offset makes the value positive, so that truncation rounds down.
+    // The offset makes the value positive, because a cast truncates towards 0.
     ((hu.clamp(AIR_HU, HIGHEST_HU) + 4096.5) as i32 - 4096) as i16
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phantom::centerd_grid;
+    use crate::phantom::centered_grid;
 
     #[test]
-    fn samples_are_centerd_on_their_voxels() -> Result<(), crate::VolumeError> {
-        let grid = centerd_grid([4, 4, 2], [1.0, 6.0, 2.5])?;
+    fn samples_are_centered_on_their_voxels() -> Result<(), crate::VolumeError> {
+        let grid = centered_grid([4, 4, 2], [1.0, 6.0, 2.5])?;
         assert_eq!(Samples::new(&grid, 0).at, [-1.5, -0.5, 0.5, 1.5]);
         assert_eq!(Samples::new(&grid, 1).of(2), [1.0, 3.0, 5.0]);
         assert_eq!(Samples::new(&grid, 2).at, [-1.25, 1.25]);

@@ -1,21 +1,21 @@
-//! Bones: vertebrae with discs, ribs and breastbone, sacrum, iliac wings and hips.
+//! Bones: vertebrae with discs, ribs, breastbone, sacrum, iliac wings and hips.
 
 use super::habitus::Habitus;
-use super::part::{Layer, Part, grainy, layer};
+use super::layered_solid::{Layer, LayeredSolid, grainy, layer};
 use super::profile::smooth_path;
 use super::random::Random;
 use super::solid::{Blob, Solid};
 use super::tube;
 
-/// Dense shell around a spongy core.
+/// A dense shell around a spongy core.
 const BONE: [Layer; 2] = [grainy(0.0, 720.0, 90.0), grainy(2.0, 240.0, 90.0)];
-/// Slender bone is mostly shell.
+/// Thin bones consist mostly of the dense shell.
 const THIN_BONE: [Layer; 2] = [grainy(0.0, 680.0, 80.0), grainy(2.6, 330.0, 80.0)];
-/// Center of the fifth lumbar vertebra, mm.
+/// Height of the center of the fifth lumbar vertebra in mm.
 const LOWEST_MM: f32 = -138.0;
 const RIB_PAIRS: usize = 12;
 
-/// Center and height of each vertebra with its disc, from the fifth lumbar one upwards.
+/// Center and height of each vertebra with its disc in mm, from the fifth lumbar vertebra upwards.
 fn vertebrae() -> impl Iterator<Item = (f32, f32)> {
     let height = |n: usize| (34.0 - n as f32).max(24.0);
     (0..18).scan(LOWEST_MM, move |z, n| {
@@ -25,29 +25,29 @@ fn vertebrae() -> impl Iterator<Item = (f32, f32)> {
     })
 }
 
-/// All bones, in painting order.
-pub(super) fn parts(person: &Habitus, random: &mut Random) -> Vec<Part> {
-    let mut parts = vec![Part::new(ribs(person, random), THIN_BONE), pelvis(person), sacrum(person)];
+/// All bones in painting order.
+pub(super) fn solids(person: &Habitus, random: &mut Random) -> Vec<LayeredSolid> {
+    let mut solids = vec![LayeredSolid::new(ribs(person, random), THIN_BONE), pelvis(person), sacrum(person)];
     let breastbone = [[0.0, 150.0], [0.0, 200.0], [0.0, 290.0]].map(|[x, z]| {
         let y = person.muscle.front_at(x, z) - 9.0;
         [x, y, z, 7.0]
     });
     let [low, middle, high] = breastbone;
-    let beside = |x: f32| [low, middle, high].map(|[_, y, z, r]| [x, y, z, r]);
-    parts.push(Part::new(tube(&beside(-6.0)).chain(tube(&beside(6.0))), THIN_BONE));
-    parts.extend(spine(person));
-    parts
+    let line = |x: f32| [low, middle, high].map(|[_, y, z, r]| [x, y, z, r]);
+    solids.push(LayeredSolid::new(tube(&line(-6.0)).chain(tube(&line(6.0))), THIN_BONE));
+    solids.extend(spine(person));
+    solids
 }
 
-/// Vertebral bodies, arches and processes, the discs between, and the canal.
-fn spine(person: &Habitus) -> Vec<Part> {
+/// The spine: vertebral bodies, arches, processes, discs and the spinal canal.
+fn spine(person: &Habitus) -> Vec<LayeredSolid> {
     let (mut bodies, mut arches, mut discs) = (Vec::new(), Vec::new(), Vec::new());
     for (z, height) in vertebrae() {
         let y = person.spine(z);
         let size = (height - 14.0) / 20.0;
-        bodies.push(body(y, z, [25.0 * size.max(0.7), 17.0, 0.5 * height - 3.0]));
+        bodies.push(vertebral_body(y, z, [25.0 * size.max(0.7), 17.0, 0.5 * height - 3.0]));
         let gap = z + 0.5 * height;
-        discs.push(body(person.spine(gap), gap, [23.0 * size.max(0.7), 15.5, 5.0]));
+        discs.push(vertebral_body(person.spine(gap), gap, [23.0 * size.max(0.7), 15.5, 5.0]));
         for side in [-1.0, 1.0] {
             let pedicle = [side * 15.0, y - 13.0, z + 3.0, 5.0];
             let lamina = [side * 13.0, y - 28.0, z, 5.0];
@@ -62,24 +62,26 @@ fn spine(person: &Habitus) -> Vec<Part> {
     });
     let canal: Vec<_> = canal.collect();
     vec![
-        Part::new(discs, [layer(0.0, 85.0)]),
-        Part::new(arches, THIN_BONE),
-        Part::new(bodies, BONE).wobbly(0.8),
-        Part::new(tube(&canal), [layer(0.0, -20.0), layer(2.0, 18.0)]),
+        LayeredSolid::new(discs, [layer(0.0, 85.0)]),
+        LayeredSolid::new(arches, THIN_BONE),
+        LayeredSolid::new(bodies, BONE).wobbly(0.8),
+        LayeredSolid::new(tube(&canal), [layer(0.0, -20.0), layer(2.0, 18.0)]),
     ]
 }
 
-fn body(y: f32, z: f32, radii: [f32; 3]) -> Solid {
+/// A rounded box at `(0, y, z)`, for the body of a vertebra or a disc.
+fn vertebral_body(y: f32, z: f32, radii: [f32; 3]) -> Solid {
     Solid::Blob(Blob::new([0.0, y, z], radii).squared(0.75))
 }
 
-/// Twelve pairs that wind down and forward within the wall of the chest; the lowest two end at the side.
+/// Twelve pairs of ribs that run down and forward within the chest wall. The lowest two pairs end
+/// at the side.
 fn ribs(person: &Habitus, random: &mut Random) -> Vec<Solid> {
     let roots: Vec<f32> = vertebrae().skip(5).map(|(z, _)| z).take(RIB_PAIRS).collect();
     let drop = random.between(62.0, 82.0);
     let mut solids = Vec::new();
     for (n, &root) in roots.iter().enumerate() {
-        // Share of the way from the spine to the breastbone.
+        // Length as a share of the way from the spine to the breastbone.
         let reach = [0.42, 0.55, 0.74, 0.84].get(n).copied().unwrap_or(0.92);
         for side in [-1.0, 1.0] {
             let head = [side * 21.0, person.spine(root) - 12.0, root + 4.0, 4.5];
@@ -100,15 +102,16 @@ fn ribs(person: &Habitus, random: &mut Random) -> Vec<Solid> {
     solids
 }
 
-/// A point of the half circle from the back (0) over the side to the front (1), by the rational parametrization.
+/// A point of the half circle from the back (`along` = 0) over the side to the front (1), in
+/// rational parametrization.
 fn half_circle(along: f32) -> [f32; 2] {
     let t = (2.0 * along - 1.0).clamp(-1.0, 1.0);
     let scale = 1.0 / (1.0 + t * t);
     [(1.0 - t * t) * scale, 2.0 * t * scale]
 }
 
-/// Sacrum and coccyx: a wedge that bends backwards.
-fn sacrum(person: &Habitus) -> Part {
+/// Sacrum and coccyx: a wedge that curves backwards.
+fn sacrum(person: &Habitus) -> LayeredSolid {
     let middle = [-168.0, -190.0, -212.0, -236.0, -258.0].map(|z| person.spine(z) - 4.0);
     let column = [
         [0.0, middle[0], -168.0, 15.0],
@@ -122,11 +125,12 @@ fn sacrum(person: &Habitus) -> Part {
             Blob::new([side * 28.0, middle[0] - 6.0, -182.0], [26.0, 13.0, 27.0]).turned(1, side * 0.25),
         )
     });
-    Part::new(tube(&column).chain(wings), BONE).wobbly(1.5)
+    LayeredSolid::new(tube(&column).chain(wings), BONE).wobbly(1.5)
 }
 
-/// Iliac wings as fans of thin struts from the hip joint to the crest, with thighbone heads and the pubic arch.
-fn pelvis(person: &Habitus) -> Part {
+/// The pelvis: iliac wings built of thin struts from the hip joint to the crest, femoral heads and
+/// the pubic arch.
+fn pelvis(person: &Habitus) -> LayeredSolid {
     let mut solids = Vec::new();
     for side in [-1.0, 1.0] {
         let at = |x: f32, y: f32, z: f32, r: f32| {
@@ -155,7 +159,7 @@ fn pelvis(person: &Habitus) -> Part {
         ]));
         solids.extend(tube(&[socket, at(52.0, 32.0, -262.0, 9.0), at(8.0, 42.0, -292.0, 9.0)]));
     }
-    Part::new(solids, BONE)
+    LayeredSolid::new(solids, BONE)
 }
 
 #[cfg(test)]
@@ -163,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn half_circle_goes_from_back_to_front() {
+    fn half_circle_runs_from_back_to_front() {
         assert_eq!(
             [half_circle(0.0), half_circle(0.5), half_circle(1.0)],
             [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0]]

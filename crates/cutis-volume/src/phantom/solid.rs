@@ -1,11 +1,13 @@
-//! The solids the anatomy is made of, as signed distances in mm (negative inside), evaluated along rows of voxels.
+//! The solids of the anatomy as signed distances in mm (negative inside), evaluated along rows of
+//! sample points.
 //!
-//! Ellipsoids and outlines use the first-order distance `(q − 1)/|∇q|` of their gauge `q`, which is exact on the surface
-//! and close to the true distance near it; capsules and the board are exact.
+//! Ellipsoids and outlines use the first-order distance `(q − 1)/|∇q|` of their gauge `q`. It is
+//! exact on the surface and close to the true distance near it. The distances of capsules and the
+//! board are exact.
 
 use super::outline::Outline;
 
-/// An axis-aligned box, mm.
+/// An axis-aligned box in mm.
 #[derive(Clone, Copy)]
 pub(super) struct Bounds {
     pub(super) low: [f32; 3],
@@ -13,13 +15,13 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// True if `value`, widened by `margin`, lies within the box along `axis`.
+    /// True if `value` is at most `margin` outside the box along `axis`.
     pub(super) fn covers(&self, axis: usize, value: f32, margin: f32) -> bool {
         value >= self.low[axis] - margin && value <= self.high[axis] + margin
     }
 }
 
-/// Any solid.
+/// A solid of any kind.
 pub(super) enum Solid {
     Blob(Blob),
     Capsule(Capsule),
@@ -37,7 +39,7 @@ impl Solid {
         }
     }
 
-    /// Lowers each `distance` to that of this solid at `(x, y, z)`.
+    /// Lowers each `distance` to the signed distance of this solid at `(x, y, z)`.
     pub(super) fn lower_row(&self, xs: &[f32], y: f32, z: f32, distance: &mut [f32]) {
         match self {
             Self::Blob(blob) => blob.lower_row(xs, y, z, distance),
@@ -60,9 +62,11 @@ pub(super) fn norm(a: [f32; 3]) -> f32 {
     dot(a, a).sqrt()
 }
 
-/// First-order distance to `q = 1` where `q² = (1 − s) Σu² + s √Σu⁴` blends an ellipsoid (`s = 0`) towards a rounded box.
+/// First-order distance to the surface `q = 1`, where `q² = (1 − s) Σu² + s √Σu⁴` blends an
+/// ellipsoid (`s = 0`) into a rounded box.
 ///
-/// `gradient` maps the derivative by `u` to that by mm; `inradius` keeps the center, where both vanish, well defined.
+/// `gradient` maps the derivative by `u` to the derivative by mm. `inradius` keeps the value
+/// defined at the center, where `q` and its gradient vanish.
 #[inline(always)]
 pub(super) fn gauge_distance(
     u: [f32; 3],
@@ -79,7 +83,7 @@ pub(super) fn gauge_distance(
     (q - 1.0) * (q + TINY) / (slope + TINY / inradius)
 }
 
-/// An ellipsoid, turned at will and squared towards a rounded box.
+/// An ellipsoid, optionally rotated and blended into a rounded box.
 #[derive(Clone, Copy)]
 pub(super) struct Blob {
     pub(super) center: [f32; 3],
@@ -93,12 +97,14 @@ impl Blob {
         Self { center, radii, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], squareness: 0.0 }
     }
 
-    /// Towards a rounded box: 0 is the ellipsoid, 1 the superellipsoid of exponent 4.
+    /// Blends the ellipsoid into a rounded box: 0 is the ellipsoid, 1 the superellipsoid of
+    /// exponent 4.
     pub(super) fn squared(self, squareness: f32) -> Self {
         Self { squareness, ..self }
     }
 
-    /// Turned about the coordinate axis `axis` by the angle whose half has the tangent `half_tangent`.
+    /// Rotates the solid about the coordinate axis `axis`. `half_tangent` is the tangent of half
+    /// the angle.
     pub(super) fn turned(mut self, axis: usize, half_tangent: f32) -> Self {
         let scale = 1.0 / (1.0 + half_tangent * half_tangent);
         let (cos, sin) = ((1.0 - half_tangent * half_tangent) * scale, 2.0 * half_tangent * scale);
@@ -109,7 +115,7 @@ impl Blob {
         self
     }
 
-    /// The same with every radius smaller by `inset`.
+    /// Reduces every radius by `inset`.
     pub(super) fn shrunk(self, inset: f32) -> Self {
         Self { radii: self.radii.map(|r| r - inset), ..self }
     }
@@ -136,7 +142,7 @@ impl Blob {
     }
 }
 
-/// A round cone between two balls: the points near a segment, with the radius going linearly along it.
+/// A round cone between two balls: a segment with a radius that varies linearly along it.
 #[derive(Clone, Copy)]
 pub(super) struct Capsule {
     ends: [[f32; 3]; 2],
@@ -159,7 +165,7 @@ impl Capsule {
 
     fn lower_row(&self, xs: &[f32], y: f32, z: f32, distance: &mut [f32]) {
         let along = subtract(self.ends[1], self.ends[0]);
-        // A segment without length acts as a ball: any finite scale will do.
+        // A segment without length acts as a ball. Any finite scale is correct.
         let squared = dot(along, along);
         let scale = if squared > 0.0 { 1.0 / squared } else { 0.0 };
         let (dy, dz) = (y - self.ends[0][1], z - self.ends[0][2]);
@@ -173,14 +179,14 @@ impl Capsule {
     }
 }
 
-/// A board bent like a trough: an arc of a cylinder about an axis parallel to z, above the board.
+/// A curved board: an arc of a cylinder whose axis is parallel to z and above the board.
 #[derive(Clone, Copy)]
 pub(super) struct Board {
-    /// Height of the upper surface at the middle, mm.
+    /// The y coordinate of the upper surface in the middle, in mm.
     pub(super) top: f32,
     pub(super) thickness: f32,
     pub(super) half_width: f32,
-    /// Radius of the middle of the board, mm.
+    /// Radius of curvature of the middle of the board in mm.
     pub(super) bend: f32,
 }
 
@@ -226,8 +232,8 @@ mod tests {
     }
 
     #[test]
-    fn turning_moves_the_long_axis() {
-        // A quarter turn about z (half tangent 1) swaps the long axis from x to y.
+    fn rotation_moves_the_long_axis() {
+        // A rotation by 90° about z (half tangent 1) moves the long axis from x to y.
         let long = Solid::Blob(Blob::new([0.0; 3], [9.0, 2.0, 2.0]));
         let turned = Solid::Blob(Blob::new([0.0; 3], [9.0, 2.0, 2.0]).turned(2, 1.0));
         assert!(at(&long, [8.0, 0.0, 0.0]) < 0.0 && at(&long, [0.0, 8.0, 0.0]) > 0.0);
@@ -256,7 +262,7 @@ mod tests {
                     );
                 }
             }
-            assert!(inside > 100, "the scan met the solid {inside} times only");
+            assert!(inside > 100, "only {inside} points are inside the solid");
         }
     }
 }

@@ -1,18 +1,19 @@
-//! Test solids whose volume and surface have closed forms: a sphere, and a sphere within a hollow sphere.
+//! Test volumes with closed forms: a sphere, and a sphere within a hollow sphere.
 
 use rayon::prelude::*;
 
-use super::{centerd_grid, zeros};
+use super::{centered_grid, zeros};
 use crate::{AIR_HU, Volume, VolumeError};
 
-/// A ball of `hu_inside` in air, in the middle of the grid, which is at the origin.
+/// A ball of `hu_inside` in air. Its center is the middle of the grid and the origin of the world.
 ///
-/// Voxels across the surface are blended linearly over about one voxel, so that their sum, as share of tissue, is close to
-/// `4/3 π r³`. The voxels are `spacing_mm` apart along +x, +y, +z.
+/// The voxels are `spacing_mm` apart along +x, +y and +z. At the surface their values are blended
+/// linearly over about one voxel, so that the sum of their tissue shares is close to `4/3 π r³`.
 ///
 /// # Errors
-/// [`VolumeError::PhantomShape`] as for [`Phantom::new`](super::Phantom::new); [`VolumeError::SphereRadii`] unless the radius is
-/// finite and positive; [`VolumeError::SingularAffine`] for a spacing that is zero or not finite.
+/// [`VolumeError::PhantomShape`] as for [`Phantom::new`](super::Phantom::new).
+/// [`VolumeError::SphereRadii`] if the radius is not finite and positive.
+/// [`VolumeError::SingularAffine`] if a spacing is zero or not finite.
 ///
 /// ```
 /// let ball = cutis_volume::phantom::sphere([40, 40, 40], [1.0; 3], 15.0, 50)?;
@@ -30,12 +31,14 @@ pub fn sphere(
     concentric(shape, spacing_mm, &[radius_mm], hu_inside)
 }
 
-/// A ball of `hu_inside` with a hollow full of air, and a second ball free in the hollow, all around the origin.
+/// A ball of `hu_inside` with a hollow of air, and a second ball inside the hollow. All are
+/// centered at the origin.
 ///
-/// `radii_mm` are those of the outer ball, the hollow and the inner ball. The exterior surface is the outermost sphere alone.
+/// `radii_mm` holds the radii of the outer ball, the hollow and the inner ball, in decreasing
+/// order. Only the outermost sphere is an exterior surface.
 ///
 /// # Errors
-/// As [`sphere`]; the radii must decrease.
+/// As [`sphere`], and [`VolumeError::SphereRadii`] if the radii do not decrease.
 pub fn nested_spheres(
     shape: [usize; 3],
     spacing_mm: [f64; 3],
@@ -45,7 +48,7 @@ pub fn nested_spheres(
     concentric(shape, spacing_mm, &radii_mm, hu_inside)
 }
 
-/// Balls around the origin, tissue and air in turn from the outermost inwards.
+/// Concentric balls around the origin, alternately of tissue and air from the outermost inwards.
 fn concentric(
     shape: [usize; 3],
     spacing_mm: [f64; 3],
@@ -57,7 +60,7 @@ fn concentric(
         return Err(VolumeError::SphereRadii { radii_mm: radii_mm.to_vec() });
     }
     let mut voxels = zeros(shape)?;
-    let grid = centerd_grid(shape, spacing_mm)?;
+    let grid = centered_grid(shape, spacing_mm)?;
     let blend = grid.affine.spacing_mm().iter().sum::<f64>() / 3.0;
     let [nx, ny, _] = shape;
     let (air, inside) = (f64::from(AIR_HU), f64::from(hu_inside));
@@ -66,8 +69,8 @@ fn concentric(
             let distance = grid.mm([i, row % ny, row / ny]).coords.norm();
             let cover = |radius: &f64| (0.5 + (radius - distance) / blend).clamp(0.0, 1.0);
             let tissue = radii_mm.iter().enumerate().fold(0.0, |tissue, (n, radius)| {
-                let kind = if n % 2 == 0 { 1.0 } else { 0.0 };
-                tissue + cover(radius) * (kind - tissue)
+                let filling = if n % 2 == 0 { 1.0 } else { 0.0 };
+                tissue + cover(radius) * (filling - tissue)
             });
             *voxel = (air + tissue * (inside - air)).round() as i16;
         }

@@ -1,17 +1,18 @@
-//! Sampling along the volume's own axes: one filter after the other, first within slices, then across them.
+//! Applies the filter one axis after the other, first within slices, then across them.
 
 use rayon::prelude::*;
 
 use super::{Axis, Stop};
 use crate::{AIR_HU, Volume};
 
-/// Voxels that a grid point draws on, with weights that sum to 1; none outside the volume.
+/// The voxels that contribute to a lattice point, with weights that sum to 1. Empty outside the
+/// volume.
 struct Taps {
     first: usize,
     weights: Vec<f32>,
 }
 
-/// HU at the stops of three axes.
+/// HU at every combination of stops of the three axes.
 pub(super) fn sample(volume: &Volume, axes: [Axis; 3], stops: &[Vec<Stop>; 3]) -> Vec<f32> {
     let along = |a: usize| stops[a].iter().map(|&stop| taps(axes[a], stop)).collect::<Vec<_>>();
     let [x, y, z] = [along(0), along(1), along(2)];
@@ -19,31 +20,32 @@ pub(super) fn sample(volume: &Volume, axes: [Axis; 3], stops: &[Vec<Stop>; 3]) -
     if slice_len == 0 {
         return Vec::new();
     }
-    // Slices are reduced in batches, each as soon as it is needed and only once, so that no more than a batch's are in memory.
+    // Each slice is filtered once, when the first batch needs it. Only the slices of one batch are
+    // in memory.
     let mut out = vec![0.0; slice_len * z.len()];
     let threads = rayon::current_num_threads().max(1);
-    let mut reduced = Window { first: 0, slices: Vec::new() };
+    let mut filtered = Window { first: 0, slices: Vec::new() };
     for (batch, z) in out.chunks_mut(slice_len * threads).zip(z.chunks(threads)) {
         let used = z.iter().filter(|taps| !taps.weights.is_empty());
         let begin = used.clone().map(|taps| taps.first).min();
         let end = used.map(|taps| taps.first + taps.weights.len()).max();
         if let (Some(begin), Some(end)) = (begin, end) {
-            reduced.advance(begin, end, |k| reduce(volume, k, &x, &y));
+            filtered.advance(begin, end, |k| filter_slice(volume, k, &x, &y));
         }
-        batch.par_chunks_mut(slice_len).zip(z).for_each(|(slice, taps)| reduced.mix(taps, slice));
+        batch.par_chunks_mut(slice_len).zip(z).for_each(|(slice, taps)| filtered.mix(taps, slice));
     }
     out
 }
 
-/// Reduced slices `first ..`.
+/// Consecutive filtered slices that start with slice `first`.
 struct Window {
     first: usize,
     slices: Vec<Vec<f32>>,
 }
 
 impl Window {
-    /// Keeps and makes the slices `begin .. end`.
-    fn advance(&mut self, begin: usize, end: usize, make: impl Fn(usize) -> Vec<f32> + Sync) {
+    /// Moves the window to the slices `begin .. end`: keeps those it has and computes the others.
+    fn advance(&mut self, begin: usize, end: usize, compute: impl Fn(usize) -> Vec<f32> + Sync) {
         let kept = self.first..self.first + self.slices.len();
         let old = std::mem::take(&mut self.slices);
         let mut old: Vec<Option<Vec<f32>>> = old.into_iter().map(Some).collect();
@@ -53,11 +55,12 @@ impl Window {
         self.slices = slices
             .into_par_iter()
             .enumerate()
-            .map(|(n, slice)| slice.unwrap_or_else(|| make(begin + n)))
+            .map(|(n, slice)| slice.unwrap_or_else(|| compute(begin + n)))
             .collect();
     }
 
-    /// Weighted sum of slices; written as a base and differences from it, so that what is uniform stays exactly so.
+    /// Weighted sum of slices. It is computed as a base plus differences, so that a uniform volume
+    /// stays exactly uniform.
     fn mix(&self, taps: &Taps, out: &mut [f32]) {
         let Some((_, rest)) = taps.weights.split_first() else {
             return out.fill(AIR_HU);
@@ -73,8 +76,8 @@ impl Window {
     }
 }
 
-/// Slice `k` of the volume at the points of the first two axes.
-fn reduce(volume: &Volume, k: usize, x: &[Taps], y: &[Taps]) -> Vec<f32> {
+/// Filters slice `k` of the volume along the first two axes.
+fn filter_slice(volume: &Volume, k: usize, x: &[Taps], y: &[Taps]) -> Vec<f32> {
     let [nx, ny, _] = volume.grid().shape;
     let slice = &volume.voxels()[k * nx * ny..(k + 1) * nx * ny];
     let hu = |stored: i16| volume.hu(stored).max(AIR_HU);
@@ -96,11 +99,11 @@ fn reduce(volume: &Volume, k: usize, x: &[Taps], y: &[Taps]) -> Vec<f32> {
     out
 }
 
-/// The tent around a stop.
+/// The voxels and weights of the tent around a stop.
 fn taps(axis: Axis, stop: Stop) -> Taps {
     let center = axis.start + stop.at * axis.step;
     let last = (axis.voxels - 1) as f64;
-    // Half a voxel beyond the last center is still that voxel.
+    // The last voxel reaches half a voxel beyond its center.
     if !(-0.5..=last + 0.5).contains(&center) {
         return Taps { first: 0, weights: Vec::new() };
     }

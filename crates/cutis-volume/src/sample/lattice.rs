@@ -1,30 +1,28 @@
-//! Lattices laid over a volume: as many vertices as voxels, a spacing in mm, or a number of vertices.
+//! Grids of lattices that cover a volume.
 
 use std::str::FromStr;
-
-use serde::{Deserialize, Serialize};
 
 use crate::{Affine, Grid, VolumeError};
 
 /// Vertices are numbered in 32 bits.
 const MOST_VERTICES: u64 = u32::MAX as u64;
 
-/// How many vertices a lattice has.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// Size of a lattice over a volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LatticeSize {
-    /// A vertex on every voxel center.
+    /// One vertex on every voxel center.
     Native,
-    /// The spacing nearest to this, mm, that divides the extent of the volume evenly.
+    /// Spacing in mm. It is rounded to the nearest value that divides the extent of the volume
+    /// evenly.
     SpacingMm(f64),
-    /// Vertices along the axes.
+    /// Number of vertices along each axis.
     Vertices([usize; 3]),
 }
 
 impl FromStr for LatticeSize {
     type Err = VolumeError;
 
-    /// From `native`, `4.0` (mm) or `129,107,118`.
+    /// Parses `native`, a spacing in mm such as `4.0`, or vertices per axis such as `129,107,118`.
     fn from_str(text: &str) -> Result<Self, VolumeError> {
         let wrong = || VolumeError::LatticeText { text: text.into() };
         if text.trim() == "native" {
@@ -42,11 +40,13 @@ impl FromStr for LatticeSize {
     }
 }
 
-/// The grid of a lattice over `voxels`: along each axis from the first voxel center to the last one.
+/// The grid of a lattice over `voxels`. It reaches from the first to the last voxel center along
+/// each axis.
 ///
 /// # Errors
-/// [`VolumeError::LatticeSpacing`] for a spacing that is no positive length; [`VolumeError::LatticeSize`] for fewer than two
-/// vertices or voxels along an axis, or more than 2³² − 1 vertices in all.
+/// [`VolumeError::LatticeSpacing`] if the spacing is not a positive length.
+/// [`VolumeError::LatticeSize`] if an axis has fewer than two vertices or voxels, or the lattice
+/// has more than 2³² − 1 vertices.
 pub fn lattice_grid(voxels: &Grid, size: LatticeSize) -> Result<Grid, VolumeError> {
     let shape = voxels.shape;
     let vertices: [f64; 3] = match size {
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_coincide() {
+    fn the_corners_of_lattice_and_volume_coincide() {
         let volume = voxels([101, 33, 48]);
         for text in ["native", "4.0", "51, 17 ,90", "7"] {
             let lattice = lattice_grid(&volume, text.parse().unwrap()).unwrap();

@@ -1,4 +1,4 @@
-//! Damaged, hostile and unusual files, made here byte by byte.
+//! Damaged, hostile and unusual files, built byte by byte.
 
 use std::fs;
 use std::io::Write;
@@ -7,7 +7,7 @@ use cutis_volume::{VolumeError, nifti};
 use flate2::{Compression, write::GzEncoder};
 use proptest::prelude::*;
 
-/// A NIfTI-1 file of `voxels` bytes, 2 × 3 × 4 voxels unless changed.
+/// The bytes of a NIfTI-1 file with 2 × 3 × 4 voxels by default.
 #[derive(Clone)]
 struct Image {
     bytes: Vec<u8>,
@@ -58,7 +58,7 @@ impl Image {
         read("scan.nii", &self.bytes)
     }
 
-    /// The message, which must name the file.
+    /// Reads the file, which must fail with an error that names it.
     fn refused(&self) -> VolumeError {
         let error = self.read().unwrap_err();
         assert!(error.to_string().contains("scan.nii"), "{error}");
@@ -80,7 +80,7 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn headers_that_cannot_be_right_are_refused_by_field() {
+fn invalid_headers_are_refused_with_the_name_of_the_field() {
     assert!(Image::int16().read().is_ok());
     type Change = fn(&mut Image) -> &mut Image;
     let cases: [(&str, Change); 15] = [
@@ -118,18 +118,19 @@ fn headers_that_cannot_be_right_are_refused_by_field() {
 }
 
 #[test]
-fn a_small_file_cannot_promise_a_large_volume() {
+fn small_files_with_headers_of_large_volumes_are_refused() {
     let mut image = Image::int16();
     image.dim(&[3, 32767, 32767, 32767]);
     assert!(matches!(image.refused(), VolumeError::Truncated { .. }));
     let packed = gzip(&image.bytes);
     assert!(packed.len() < 1024);
-    // Refused for what so short a file can hold at most, before the 48 bytes that it does hold are unpacked.
+    // The error gives the most that a file of this length can hold. The 48 bytes of voxels are not
+    // decompressed.
     let most = packed.len() as u64 * 1032 - 352;
     assert!(
         matches!(read("scan.nii.gz", &packed), Err(VolumeError::Truncated { found_bytes, .. }) if found_bytes == most)
     );
-    // Overflow of the product is possible in NIfTI-2 alone.
+    // The product of the shape can overflow only in NIfTI-2.
     let mut large = vec![0; 600];
     large[..4].copy_from_slice(&540i32.to_le_bytes());
     large[4..12].copy_from_slice(b"n+2\0\r\n\x1a\n");
@@ -146,11 +147,11 @@ fn a_small_file_cannot_promise_a_large_volume() {
 }
 
 #[test]
-fn of_a_gzip_bomb_no_more_is_unpacked_than_the_header_says() {
+fn a_gzip_bomb_is_unpacked_only_up_to_the_size_in_the_header() {
     let mut bytes = Image::int16().bytes;
     bytes.resize(4 << 20, 0);
     let mut packed = gzip(&bytes);
-    // Whoever unpacks to the end finds the checksum wrong.
+    // The checksum is wrong, so that decompression to the end would fail.
     let checksum = packed.len() - 8;
     packed[checksum] ^= 1;
     let loaded = read("scan.nii.gz", &packed).unwrap();
@@ -163,7 +164,7 @@ fn of_a_gzip_bomb_no_more_is_unpacked_than_the_header_says() {
 }
 
 #[test]
-fn damaged_gzip_is_refused() {
+fn damaged_gzip_files_are_refused() {
     let voxels: Vec<u8> = (0..48).map(|n| n * 5).collect();
     let packed = gzip(&Image::new(4, &voxels).bytes);
     let whole = read("scan.nii.gz", &packed).unwrap();
@@ -175,12 +176,12 @@ fn damaged_gzip_is_refused() {
     let at = packed.len() - 7;
     wrong_checksum[at] ^= 1;
     assert!(matches!(read("scan.nii.gz", &wrong_checksum), Err(VolumeError::Io { .. })));
-    // A name without .gz does not matter, the content does.
+    // The content decides, not the extension of the name.
     assert_eq!(read("scan.nii", &packed).unwrap().volume, whole.volume);
 }
 
 #[test]
-fn pairs_need_both_halves() {
+fn pairs_need_both_files() {
     let folder = tempfile::tempdir().unwrap();
     let mut image = Image::new(4, &[7; 48]);
     image.put(344, b"ni1\0").f32(108, 0.0);
@@ -227,7 +228,7 @@ fn the_observer_receives_every_byte_of_each_file() {
     };
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
     let mut long = Image::int16().bytes;
-    // Far more bytes after the last voxel than the reader looks at.
+    // Many more bytes after the last voxel than the reader decodes.
     long.extend((0..3_000_000u32).flat_map(|n| n.wrapping_mul(2_654_435_761).to_le_bytes()));
     for (name, bytes) in [("long.nii", long.clone()), ("long.nii.gz", gzip(&long))] {
         write(name, &bytes);
@@ -248,7 +249,7 @@ fn bytes_of<const N: usize, T: Copy>(values: &[T], encode: fn(T) -> [u8; N]) -> 
 }
 
 #[test]
-fn uint16_above_int16_is_shifted() {
+fn uint16_values_above_int16_are_shifted() {
     let loaded = Image::new(512, &bytes_of(&[0u16, 65535, 1024, 40000], u16::to_le_bytes)).read().unwrap();
     let volume = &loaded.volume;
     let hu: Vec<f32> = volume.voxels()[..4].iter().map(|&stored| volume.hu(stored)).collect();
@@ -259,7 +260,7 @@ fn uint16_above_int16_is_shifted() {
 }
 
 #[test]
-fn wide_types_become_whole_hu() {
+fn wide_types_are_rounded_to_whole_hu() {
     let mut image = Image::new(16, &bytes_of(&[-1000.25f32, 40.5, f32::NAN, 3000.0], f32::to_le_bytes));
     let loaded = image.read().unwrap();
     assert_eq!(loaded.volume.voxels()[..4], [-1000, 41, -1024, 3000]);
@@ -299,7 +300,7 @@ fn wide_types_become_whole_hu() {
 }
 
 #[test]
-fn units_and_missing_axes() {
+fn units_missing_axes_and_mirrored_axes_are_handled() {
     let spacing = |image: &mut Image| image.read().unwrap().volume.grid().affine.spacing_mm();
     assert_eq!(spacing(Image::int16().put(123, &[0])), [2.0, 3.0, 4.0]);
     assert_eq!(spacing(Image::int16().put(123, &[1 | 8])), [2000.0, 3000.0, 4000.0]);
@@ -312,7 +313,7 @@ fn units_and_missing_axes() {
 }
 
 #[test]
-fn forms_that_disagree_are_named() {
+fn forms_that_disagree_give_warnings() {
     let both = || Image::int16().put(252, &[1, 0, 2, 0]).clone();
     let warnings = |image: &Image| image.read().unwrap().warnings;
     assert_eq!(warnings(&both()), Vec::<String>::new());

@@ -1,4 +1,5 @@
-//! The synthetic torso as a whole: bits that nothing can change, plausible tissue, connectivity, closed forms, hostile input.
+//! Tests of the synthetic torso and the test solids: reproducible bits, plausible tissue,
+//! connectivity, closed forms and invalid input.
 
 use std::sync::Mutex;
 
@@ -6,7 +7,7 @@ use cutis_volume::phantom::{MAX_VOXELS_PER_AXIS, Phantom, nested_spheres, sphere
 use cutis_volume::{Grid, Volume, VolumeError, nifti};
 use proptest::prelude::*;
 
-/// Tissue begins above this value, HU.
+/// Voxels above this value in HU are tissue.
 const TISSUE_HU: i16 = -449;
 
 fn with_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
@@ -18,7 +19,7 @@ fn volume(shape: [usize; 3], seed: u64) -> Volume {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bits() {
+fn bits_do_not_depend_on_the_number_of_threads() {
     let one = with_threads(1, || volume([37, 41, 19], 5));
     for threads in [2, 3, 8] {
         assert_eq!(with_threads(threads, || volume([37, 41, 19], 5)), one, "{threads} threads");
@@ -26,10 +27,10 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert_ne!(volume([37, 41, 19], 6), one);
 }
 
-/// The phantom stands in for data sets, so its bits are part of what figures rest on: a change here must be meant.
+/// Published figures use the phantom as a data set, so its bits may change only on purpose.
 #[test]
-fn the_bits_are_the_known_ones() {
-    // FNV-1a over the little-endian voxels.
+fn bits_are_the_recorded_ones() {
+    // FNV-1a hash of the little-endian voxels.
     let hash = volume([40, 32, 24], 1)
         .voxels()
         .iter()
@@ -44,7 +45,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
-    fn any_chunk_of_slices_equals_the_whole(seed in 0_u64..4, cuts in proptest::collection::vec(0_usize..=13, 0..5)) {
+    fn any_range_of_slices_equals_that_of_the_whole_volume(seed in 0_u64..4, cuts in proptest::collection::vec(0_usize..=13, 0..5)) {
         let phantom = Phantom::new([24, 30, 13], seed).expect("a small phantom");
         let whole = phantom.volume().expect("a small phantom");
         let mut ends = cuts;
@@ -59,14 +60,15 @@ proptest! {
 }
 
 #[test]
-fn the_written_file_holds_the_volume() -> Result<(), Box<dyn std::error::Error>> {
+fn the_written_file_equals_the_volume() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let phantom = Phantom::new([33, 29, 21], 3)?;
     for name in ["torso.nii", "torso.nii.gz"] {
         let path = folder.path().join(name);
         let calls = Mutex::new(Vec::new());
-        phantom
-            .write(&path, &|done, total| calls.lock().expect("no panic in between").push((done, total)))?;
+        phantom.write(&path, &|done, total| {
+            calls.lock().expect("the lock is not poisoned").push((done, total))
+        })?;
         let loaded = nifti::read(&path)?.volume;
         assert_eq!(loaded.voxels(), phantom.volume()?.voxels());
         for corner in [[0, 0, 0], [32, 28, 20]] {
@@ -98,12 +100,12 @@ fn spacing_follows_the_documented_rule() -> Result<(), VolumeError> {
 }
 
 #[test]
-fn hounsfield_units_are_those_of_a_torso() {
+fn hounsfield_units_are_plausible_for_a_torso() {
     for seed in 0..3 {
         let torso = volume([96, 96, 72], seed);
         let hu = torso.voxels();
         assert!(hu.iter().all(|hu| (-1024..=1600).contains(hu)));
-        // Air in the corners: mean and noise.
+        // Mean and noise of the air in the corners.
         let corner: Vec<f64> = (0..72)
             .flat_map(|k| (0..8).map(move |i| [i, 95, k]))
             .map(|p| f64::from(hu[torso.grid().index(p)]))
@@ -111,7 +113,7 @@ fn hounsfield_units_are_those_of_a_torso() {
         let mean = corner.iter().sum::<f64>() / corner.len() as f64;
         let deviation = (corner.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / corner.len() as f64).sqrt();
         assert!((mean + 1000.0).abs() < 1.5 && (4.0..9.0).contains(&deviation), "{mean} ± {deviation}");
-        // Shares of the body's tissues, in percent of the voxels above the threshold or in the lungs.
+        // Share of each tissue in percent of the voxels above −900 HU.
         let count = |low: i16, high: i16| hu.iter().filter(|hu| (low..high).contains(hu)).count() as f64;
         let body = count(-900, 3000);
         let shares = [(-900, -750), (-150, -50), (0, 110), (180, 1600)]
@@ -123,28 +125,28 @@ fn hounsfield_units_are_those_of_a_torso() {
     }
 }
 
-/// Takes the voxels joined by faces to `seeds` out of `open` and returns them.
+/// Removes from `open` the voxels that are face-connected to `seeds`, and returns them.
 fn flood(grid: &Grid, seeds: impl Iterator<Item = usize>, open: &mut [bool]) -> Vec<usize> {
-    let mut taken: Vec<usize> = seeds.filter(|&seed| std::mem::take(&mut open[seed])).collect();
+    let mut reached: Vec<usize> = seeds.filter(|&seed| std::mem::take(&mut open[seed])).collect();
     let mut next = 0;
-    while let Some(&index) = taken.get(next) {
+    while let Some(&index) = reached.get(next) {
         next += 1;
         let point = grid.point(index);
         for axis in 0..3 {
             for step in [-1, 1] {
-                let mut beside = point;
-                beside[axis] = beside[axis].wrapping_add_signed(step);
-                if beside[axis] < grid.shape[axis] && std::mem::take(&mut open[grid.index(beside)]) {
-                    taken.push(grid.index(beside));
+                let mut neighbor = point;
+                neighbor[axis] = neighbor[axis].wrapping_add_signed(step);
+                if neighbor[axis] < grid.shape[axis] && std::mem::take(&mut open[grid.index(neighbor)]) {
+                    reached.push(grid.index(neighbor));
                 }
             }
         }
     }
-    taken
+    reached
 }
 
 #[test]
-fn body_and_table_are_two_separate_components() {
+fn body_and_table_are_separate_components() {
     for seed in 0..3 {
         let torso = volume([128, 128, 96], seed);
         let grid = *torso.grid();
@@ -165,14 +167,14 @@ fn body_and_table_are_two_separate_components() {
             body.len()
         );
         assert!(table.len() > 15_000 && edge < -75.0, "table of {}, up to {edge} mm", table.len());
-        // The rest are ends of lung vessels.
+        // The remaining components are ends of lung vessels.
         assert!(total - body.len() - table.len() < total / 200, "stray: {:?}", rest.iter().map(Vec::len));
     }
 }
 
 #[test]
-fn lungs_and_bowel_gas_are_closed_to_the_sides() {
-    // 500 mm long: the windpipe and the lungs reach the last slice.
+fn lungs_and_bowel_gas_are_closed_at_the_sides() {
+    // The scan is 500 mm long, so that the windpipe and the lungs reach the last slice.
     let torso = volume([96, 96, 120], 4);
     let grid = *torso.grid();
     let air: Vec<bool> = torso.voxels().iter().map(|&hu| hu <= TISSUE_HU).collect();
@@ -185,18 +187,18 @@ fn lungs_and_bowel_gas_are_closed_to_the_sides() {
         flood(&grid, (0..grid.len()).filter(on_a_face), &mut left);
         left
     };
-    let litres = |voxels: &[bool], low_mm: f64, high_mm: f64| {
+    let liters = |voxels: &[bool], low_mm: f64, high_mm: f64| {
         let counted =
             (0..grid.len()).filter(|&n| voxels[n] && (low_mm..high_mm).contains(&grid.mm(grid.point(n)).z));
         counted.count() as f64 * grid.affine.voxel_volume_mm3() * 1e-6
     };
     let from_the_sides = unreached_from(&[0, 1]);
-    let (lungs, gas) = (litres(&from_the_sides, 80.0, 300.0), litres(&from_the_sides, -300.0, 80.0));
-    assert!((2.0..7.0).contains(&lungs), "{lungs} litres of lung");
-    assert!((0.1..2.0).contains(&gas), "{gas} litres below the lungs");
-    // A fill from the ends too runs into the lungs: the measure can tell.
-    let open_to_the_ends = litres(&unreached_from(&[0, 1, 2]), 80.0, 300.0);
-    assert!(open_to_the_ends < 0.3 * lungs, "{open_to_the_ends} of {lungs} litres");
+    let (lungs, gas) = (liters(&from_the_sides, 80.0, 300.0), liters(&from_the_sides, -300.0, 80.0));
+    assert!((2.0..7.0).contains(&lungs), "{lungs} liters of lung");
+    assert!((0.1..2.0).contains(&gas), "{gas} liters below the lungs");
+    // Control: a fill that also starts at the end slices enters the lungs.
+    let open_to_the_ends = liters(&unreached_from(&[0, 1, 2]), 80.0, 300.0);
+    assert!(open_to_the_ends < 0.3 * lungs, "{open_to_the_ends} of {lungs} liters");
 }
 
 #[test]
@@ -223,7 +225,7 @@ fn the_incision_site_lies_on_the_belly() -> Result<(), VolumeError> {
     Ok(())
 }
 
-/// Volume of what is inside, from the gray values, mm³.
+/// Volume of the tissue in mm³, computed from the gray values.
 fn tissue_mm3(volume: &Volume, hu_inside: f64) -> f64 {
     let share = |&hu: &i16| (f64::from(hu) + 1024.0) / (hu_inside + 1024.0);
     volume.voxels().iter().map(share).sum::<f64>() * volume.grid().affine.voxel_volume_mm3()
@@ -239,7 +241,7 @@ fn spheres_have_the_volume_of_their_closed_forms() -> Result<(), VolumeError> {
     assert!((tissue_mm3(&ball, 60.0) / ball_mm3(28.0) - 1.0).abs() < 2e-3);
     assert!(
         (tissue_mm3(&ball, 60.0) / ball_mm3(28.3) - 1.0).abs() > 2e-2,
-        "the tolerance can tell 1 % of the radius"
+        "the tolerance does not detect an error of 1 % in the radius"
     );
     let nested = nested_spheres([72; 3], [1.0; 3], [32.0, 24.0, 12.0], 60)?;
     let exact = ball_mm3(32.0) - ball_mm3(24.0) + ball_mm3(12.0);
@@ -250,7 +252,7 @@ fn spheres_have_the_volume_of_their_closed_forms() -> Result<(), VolumeError> {
 }
 
 #[test]
-fn hostile_requests_are_refused_by_name() -> Result<(), VolumeError> {
+fn invalid_requests_are_refused() -> Result<(), VolumeError> {
     let bad = [[0, 5, 5], [5, 5, 0], [MAX_VOXELS_PER_AXIS + 1, 1, 1], [usize::MAX; 3], [1 << 32, 1 << 32, 1]];
     for shape in bad {
         for result in [Phantom::new(shape, 0).map(|_| ()), sphere(shape, [1.0; 3], 5.0, 0).map(|_| ())] {
@@ -275,15 +277,15 @@ fn hostile_requests_are_refused_by_name() -> Result<(), VolumeError> {
         );
     }
     let phantom = Phantom::new([8, 8, 8], 0)?;
-    let mut room = vec![0; 64 * 2];
+    let mut buffer = vec![0; 64 * 2];
     for (slices, wrong_range) in
         [(7..9, true), (usize::MAX - 1..usize::MAX, true), (2..3, false), (2..5, false)]
     {
-        match phantom.fill_slices(slices.clone(), &mut room) {
+        match phantom.fill_slices(slices.clone(), &mut buffer) {
             Err(VolumeError::SliceRange { .. }) => assert!(wrong_range, "{slices:?}"),
             Err(VolumeError::VoxelCount { .. }) => assert!(!wrong_range, "{slices:?}"),
             other => panic!("{slices:?}: {other:?}"),
         }
     }
-    phantom.fill_slices(2..4, &mut room)
+    phantom.fill_slices(2..4, &mut buffer)
 }

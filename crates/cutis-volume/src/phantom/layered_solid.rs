@@ -1,10 +1,11 @@
-//! Tissue: solids joined into one body with layers of Hounsfield units, painted over what lies below along rows of voxels.
+//! Unions of solids with layers of Hounsfield units, painted one over the other along rows of
+//! sample points.
 
 use super::outline::Outline;
 use super::random::Field;
 use super::solid::{Bounds, Solid};
 
-/// Material from `inset_mm` below the surface inwards, until the next layer.
+/// A layer of material. It begins `inset_mm` below the surface and ends at the next layer.
 #[derive(Clone, Copy)]
 pub(super) struct Layer {
     inset_mm: f32,
@@ -12,18 +13,18 @@ pub(super) struct Layer {
     grain_hu: f32,
 }
 
-/// A layer of even Hounsfield units.
+/// A layer of uniform Hounsfield units.
 pub(super) const fn layer(inset_mm: f32, hu: f32) -> Layer {
     grainy(inset_mm, hu, 0.0)
 }
 
-/// A layer whose Hounsfield units vary by `grain_hu` from place to place.
+/// A layer whose Hounsfield units vary in space by up to `grain_hu`.
 pub(super) const fn grainy(inset_mm: f32, hu: f32, grain_hu: f32) -> Layer {
     Layer { inset_mm, hu, grain_hu }
 }
 
-/// The union of some solids, filled with layers from the surface inwards.
-pub(super) struct Part {
+/// A union of solids, filled with layers from the surface inwards.
+pub(super) struct LayeredSolid {
     solids: Vec<(Solid, Bounds)>,
     layers: Vec<Layer>,
     wobble_mm: f32,
@@ -31,7 +32,7 @@ pub(super) struct Part {
     above: Option<(usize, f32)>,
 }
 
-impl Part {
+impl LayeredSolid {
     pub(super) fn new(solids: impl IntoIterator<Item = Solid>, layers: impl Into<Vec<Layer>>) -> Self {
         let solids = solids.into_iter().map(|solid| {
             let bounds = solid.bounds();
@@ -46,46 +47,46 @@ impl Part {
         }
     }
 
-    /// With a surface that swells and shrinks by up to `wobble_mm`.
+    /// Moves the surface in or out by up to `wobble_mm`, smoothly varying in space.
     pub(super) fn wobbly(self, wobble_mm: f32) -> Self {
         Self { wobble_mm, ..self }
     }
 
-    /// Only what lies at least `margin_mm` inside the body cavity.
+    /// Restricts the solid to points at least `margin_mm` inside the body cavity.
     pub(super) fn in_cavity(self, margin_mm: f32) -> Self {
         Self { cavity_margin_mm: Some(margin_mm), ..self }
     }
 
-    /// Only what lies above `level_mm` along `axis` (1 or 2).
+    /// Restricts the solid to points above `level_mm` along `axis` (1 or 2).
     pub(super) fn above(self, axis: usize, level_mm: f32) -> Self {
         Self { above: Some((axis, level_mm)), ..self }
     }
 }
 
-/// The part and those of its solids that meet one axial plane.
-pub(super) struct Active<'a> {
-    part: &'a Part,
+/// A layered solid with those of its solids that reach one axial plane.
+pub(super) struct InPlane<'a> {
+    whole: &'a LayeredSolid,
     solids: Vec<&'a (Solid, Bounds)>,
 }
 
-impl Active<'_> {
-    fn meets_row(&self, y: f32, blend_mm: f32) -> bool {
-        self.solids.iter().any(|(_, bounds)| bounds.covers(1, y, self.part.wobble_mm + blend_mm))
+impl InPlane<'_> {
+    fn reaches_row(&self, y: f32, blend_mm: f32) -> bool {
+        self.solids.iter().any(|(_, bounds)| bounds.covers(1, y, self.whole.wobble_mm + blend_mm))
     }
 }
 
-/// The parts that meet the plane at height `z`, in painting order.
-pub(super) fn active(parts: &[Part], z: f32, blend_mm: f32) -> Vec<Active<'_>> {
-    let meets = |part: &Part, bounds: &Bounds| bounds.covers(2, z, part.wobble_mm + blend_mm);
-    let actives = parts.iter().map(|part| Active {
-        part,
-        solids: part.solids.iter().filter(|(_, bounds)| meets(part, bounds)).collect(),
+/// The layered solids that reach the plane at height `z`, in painting order.
+pub(super) fn in_plane(all: &[LayeredSolid], z: f32, blend_mm: f32) -> Vec<InPlane<'_>> {
+    let reaches = |whole: &LayeredSolid, bounds: &Bounds| bounds.covers(2, z, whole.wobble_mm + blend_mm);
+    let cut = all.iter().map(|whole| InPlane {
+        whole,
+        solids: whole.solids.iter().filter(|(_, bounds)| reaches(whole, bounds)).collect(),
     });
-    actives.filter(|active| !active.solids.is_empty()).collect()
+    cut.filter(|in_plane| !in_plane.solids.is_empty()).collect()
 }
 
-/// One row of sample points along x, and scratch space for painting it.
-pub(super) struct Row<'a> {
+/// A row of sample points along x, with buffers for painting it.
+pub(super) struct SampleRow<'a> {
     xs: &'a [f32],
     step: f32,
     blend_mm: f32,
@@ -97,15 +98,16 @@ pub(super) struct Row<'a> {
     columns: Vec<f32>,
 }
 
-/// What rows share: the fields of variation and the body cavity.
+/// The body cavity and the random fields that all rows share.
 pub(super) struct Surroundings {
     pub(super) cavity: Outline,
     pub(super) wobble: Field,
     pub(super) grain: Field,
 }
 
-impl<'a> Row<'a> {
-    /// For the ascending, evenly spaced sample points `xs`; edges are blended over `blend_mm`.
+impl<'a> SampleRow<'a> {
+    /// Creates a row with the sample points `xs`, ascending with distance `step`. Edges are blended
+    /// over `blend_mm`.
     pub(super) fn new(xs: &'a [f32], step: f32, blend_mm: f32) -> Self {
         let zeros = || vec![0.0; xs.len()];
         Self {
@@ -121,42 +123,43 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// Hounsfield units of the row at `(y, z)`: `background_hu`, then the parts painted over it one after the other.
+    /// Hounsfield units of the row at `(y, z)`: the background with the solids painted over it in
+    /// order.
     pub(super) fn paint(
         &mut self,
-        actives: &[Active<'_>],
+        solids: &[InPlane<'_>],
         around: &Surroundings,
         y: f32,
         z: f32,
         background_hu: f32,
     ) -> &[f32] {
         self.hu.fill(background_hu);
-        if !actives.iter().any(|active| active.meets_row(y, self.blend_mm)) {
+        if !solids.iter().any(|solid| solid.reaches_row(y, self.blend_mm)) {
             return &self.hu;
         }
         self.cavity.fill(f32::INFINITY);
         around.cavity.lower_row(self.xs, y, z, &mut self.cavity);
         around.wobble.fill_row(self.xs, y, z, &mut self.columns, &mut self.wobble);
         around.grain.fill_row(self.xs, y, z, &mut self.columns, &mut self.grain);
-        for active in actives {
-            self.paint_part(active, y, z);
+        for solid in solids {
+            self.paint_solid(solid, y, z);
         }
         &self.hu
     }
 
-    fn paint_part(&mut self, active: &Active<'_>, y: f32, z: f32) {
-        let part = active.part;
+    fn paint_solid(&mut self, in_plane: &InPlane<'_>, y: f32, z: f32) {
+        let whole = in_plane.whole;
         let scale = 1.0 / self.blend_mm;
-        let side = match part.above {
+        let side = match whole.above {
             Some((axis, level)) => coverage(level - if axis == 1 { y } else { z }, scale),
             None => 1.0,
         };
         if side == 0.0 {
             return;
         }
-        let margin = part.wobble_mm + self.blend_mm;
+        let margin = whole.wobble_mm + self.blend_mm;
         let mut touched = self.xs.len()..0;
-        for (solid, bounds) in &active.solids {
+        for (solid, bounds) in &in_plane.solids {
             if bounds.covers(1, y, margin) {
                 let span = self.span(bounds.low[0] - margin, bounds.high[0] + margin);
                 solid.lower_row(&self.xs[span.clone()], y, z, &mut self.distance[span.clone()]);
@@ -171,12 +174,12 @@ impl<'a> Row<'a> {
         let [cavity, wobble, grain] =
             [&self.cavity, &self.wobble, &self.grain].map(|values| &values[touched.clone()]);
         for (d, w) in distance.iter_mut().zip(wobble) {
-            *d += part.wobble_mm * w;
+            *d += whole.wobble_mm * w;
         }
         let mut outer: Option<Layer> = None;
-        for &layer in &part.layers {
+        for &layer in &whole.layers {
             for i in 0..hu.len() {
-                let share = match part.cavity_margin_mm {
+                let share = match whole.cavity_margin_mm {
                     Some(margin) => side * coverage(cavity[i] + margin, scale),
                     None => side,
                 };
@@ -189,7 +192,7 @@ impl<'a> Row<'a> {
         distance.fill(f32::INFINITY);
     }
 
-    /// The sample points from `low` to `high`, mm.
+    /// The indices of the sample points from `low` to `high` in mm.
     fn span(&self, low: f32, high: f32) -> std::ops::Range<usize> {
         let Some(&first) = self.xs.first() else { return 0..0 };
         let index = |x: f32| ((x - first) / self.step).max(0.0) as usize;
@@ -198,7 +201,8 @@ impl<'a> Row<'a> {
     }
 }
 
-/// Share of a sample within a surface at signed distance `d`: a ramp over the width of one blend.
+/// Share of a sample that is inside a surface at signed distance `d`. It is a linear ramp of width
+/// `1 / scale`.
 #[inline(always)]
 fn coverage(d: f32, scale: f32) -> f32 {
     (0.5 - d * scale).clamp(0.0, 1.0)
@@ -210,7 +214,7 @@ mod tests {
     use super::super::solid::Blob;
     use super::*;
 
-    fn paint(part: Part) -> Vec<f32> {
+    fn paint(solid: LayeredSolid) -> Vec<f32> {
         let xs: Vec<f32> = (0..81).map(|i| i as f32 - 40.0).collect();
         let cavity = Outline {
             side: Profile::new([15.0; 7]),
@@ -219,8 +223,10 @@ mod tests {
             squareness: 0.0,
         };
         let around = Surroundings { cavity, wobble: Field::new(1, 1, 9.0), grain: Field::new(1, 2, 9.0) };
-        let parts = [part];
-        Row::new(&xs, 1.0, 1.0).paint(&active(&parts, 0.5, 1.0), &around, 0.25, 0.5, -1000.0).to_vec()
+        let solids = [solid];
+        SampleRow::new(&xs, 1.0, 1.0)
+            .paint(&in_plane(&solids, 0.5, 1.0), &around, 0.25, 0.5, -1000.0)
+            .to_vec()
     }
 
     fn ball(radius: f32) -> Solid {
@@ -229,26 +235,26 @@ mod tests {
 
     #[test]
     fn layers_follow_the_surface() {
-        let row = paint(Part::new([ball(20.0)], [layer(0.0, 10.0), layer(4.0, 200.0)]));
+        let row = paint(LayeredSolid::new([ball(20.0)], [layer(0.0, 10.0), layer(4.0, 200.0)]));
         assert_eq!([row[0], row[40], row[40 + 18], row[40 - 18]], [-1000.0, 200.0, 10.0, 10.0]);
         assert!(row[60] > -1000.0 && row[60] < 10.0, "the edge is blended: {}", row[60]);
     }
 
     #[test]
-    fn clips_hold() {
-        let row = paint(Part::new([ball(20.0)], [layer(0.0, 10.0)]).in_cavity(2.0));
+    fn cavity_and_level_restrict_the_solid() {
+        let row = paint(LayeredSolid::new([ball(20.0)], [layer(0.0, 10.0)]).in_cavity(2.0));
         assert_eq!([row[40 + 12], row[40 + 14]], [10.0, -1000.0]);
-        let below = paint(Part::new([ball(20.0)], [layer(0.0, 10.0)]).above(1, 5.0));
+        let below = paint(LayeredSolid::new([ball(20.0)], [layer(0.0, 10.0)]).above(1, 5.0));
         assert!(below.iter().all(|&hu| hu == -1000.0));
-        let above = paint(Part::new([ball(20.0)], [layer(0.0, 10.0)]).above(2, -5.0));
+        let above = paint(LayeredSolid::new([ball(20.0)], [layer(0.0, 10.0)]).above(2, -5.0));
         assert_eq!(above[40], 10.0);
     }
 
     #[test]
-    fn solids_of_one_part_share_their_inside() {
-        // Two overlapping balls with a thick wall: no wall where they overlap.
+    fn overlapping_solids_have_no_wall_between_them() {
+        // Two overlapping balls with a thick wall.
         let at = |x: f32| Solid::Blob(Blob::new([x, 0.0, 0.0], [12.0; 3]));
-        let row = paint(Part::new([at(-8.0), at(8.0)], [layer(0.0, 50.0), layer(3.0, 0.0)]));
+        let row = paint(LayeredSolid::new([at(-8.0), at(8.0)], [layer(0.0, 50.0), layer(3.0, 0.0)]));
         assert_eq!([row[40], row[40 + 18], row[40 - 18]], [0.0, 50.0, 50.0]);
     }
 }

@@ -1,26 +1,12 @@
-//! Odd NIfTI files against what nibabel 5.4.2 says about them.
+//! Compares how unusual NIfTI files are read with nibabel 5.4.2.
 //!
-//! Figures are nibabel's, but for `no_form`, where nibabel mirrors and centers the volume, ITK takes the axes for LPS, and we
-//! follow the standard's method 1 (voxel sizes alone). SimpleITK 2.5.7 agrees wherever it reads the file, but for `i16_slope0` (it adds
-//! the intercept), `q_s_conflict` (it prefers the qform) and `no_form`.
+//! The expected values are those of nibabel except for `no_form`. Without a form, nibabel mirrors
+//! and centers the volume, ITK reads the axes as LPS, and Cutis follows method 1 of the standard
+//! (voxel sizes only). SimpleITK 2.5.7 agrees for every file that it reads, with three exceptions:
+//! for `i16_slope0` it adds the intercept, for `q_s_conflict` it prefers the qform, and `no_form`.
 
-use std::path::PathBuf;
-
+use cutis_test_kit::scans;
 use cutis_volume::{VolumeError, nifti};
-
-/// The shared test data, if it is there.
-fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("CUTIS_TEST_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    if folder.join("awkward").is_dir() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the test data is missing: {}", folder.display());
-    eprintln!("skipped: no test data at {} (set CUTIS_TEST_DATA)", folder.display());
-    None
-}
 
 type Rows = [[f64; 4]; 3];
 
@@ -39,11 +25,11 @@ struct Expected {
     range: (f64, f64),
     sum: f64,
     nan_count: u64,
-    /// A word of each warning.
+    /// A phrase of each warning.
     warnings: &'static [&'static str],
 }
 
-/// A file that differs from the plain one only in how it is stored.
+/// A file with the same content as the plain one, but stored differently.
 const fn same(file: &'static str, dtype: &'static str) -> Expected {
     Expected { file, dtype, shape: SHAPE, rows: BASE, range: ORDINARY, sum: SUM, nan_count: 0, warnings: &[] }
 }
@@ -131,32 +117,32 @@ const ACCEPTED: &[Expected] = &[
     Expected { shape: [40, 33, 1], sum: -497809.0, ..same("single_slice.nii.gz", "int16") },
     same("u16_inter-1024.nii.gz", "uint16"),
     Expected { range: (-1008.0, 2832.0), sum: -18503712.0, ..same("u8_slope16_inter-1024.nii.gz", "uint8") },
-    // nibabel's rows are in meters here.
-    same("units_meter.nii.gz", "int16"),
+    // The rows of nibabel are in meters for this file.
+    same("units_metre.nii.gz", "int16"),
     same("with_extension.nii.gz", "int16"),
 ];
 
-/// What is wrong with a file's reading, in words.
+/// Describes the differences between a volume and its expected properties.
 fn problems(found: &nifti::Loaded, expected: &Expected) -> Vec<String> {
     let grid = found.volume.grid();
     let stats = found.stats;
     let mut problems = Vec::new();
-    let mut check = |right: bool, what: String| {
-        if !right {
-            problems.push(what);
+    let mut check = |equal: bool, found: String| {
+        if !equal {
+            problems.push(found);
         }
     };
     check(grid.shape == expected.shape, format!("shape {:?}", grid.shape));
     check(found.dtype == expected.dtype, format!("type {}", found.dtype));
     check((stats.min, stats.max) == expected.range, format!("range {stats:?}"));
     check(stats.sum == expected.sum && stats.nan_count == expected.nan_count, format!("stats {stats:?}"));
-    for (row, right) in grid.affine.rows().iter().zip(&expected.rows) {
-        // f32 in the file: seven digits of the largest number in the row.
-        let scale = right.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        let near = row.iter().zip(right).all(|(a, b)| (a - b).abs() <= 2.5e-7 * scale);
+    for (row, expected) in grid.affine.rows().iter().zip(&expected.rows) {
+        // The file holds f32: seven digits of the largest number in the row.
+        let scale = expected.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let near = row.iter().zip(expected).all(|(a, b)| (a - b).abs() <= 2.5e-7 * scale);
         check(near, format!("affine row {row:?}"));
     }
-    // The voxels hold what the stats say: NaN is air.
+    // The voxels agree with the statistics, and NaN voxels are air.
     let voxels: f64 = found.volume.voxels().iter().map(|&stored| f64::from(found.volume.hu(stored))).sum();
     check(voxels == expected.sum - 1024.0 * expected.nan_count as f64, format!("voxel sum {voxels}"));
     let warned = found.warnings.len() == expected.warnings.len()
@@ -166,15 +152,14 @@ fn problems(found: &nifti::Loaded, expected: &Expected) -> Vec<String> {
 }
 
 #[test]
-fn files_that_nibabel_reads_are_read_alike() {
-    let Some(data) = data() else { return };
+fn files_are_read_as_nibabel_reads_them() {
+    let Some(folder) = scans::find("awkward") else { return };
     for expected in ACCEPTED {
-        let found =
-            nifti::read(data.join("awkward").join(expected.file)).unwrap_or_else(|error| panic!("{error}"));
+        let found = nifti::read(folder.join(expected.file)).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(problems(&found, expected), Vec::<String>::new(), "{}", expected.file);
     }
-    // Negative control: the comparison sees a wrong expectation of each kind.
-    let found = nifti::read(data.join("awkward/base_i16.nii.gz")).unwrap();
+    // Negative control: the comparison detects each kind of wrong expectation.
+    let found = nifti::read(folder.join("base_i16.nii.gz")).unwrap();
     let base = || same("base_i16.nii.gz", "int16");
     let mut moved = BASE;
     moved[0][3] += 0.001;
@@ -191,11 +176,11 @@ fn files_that_nibabel_reads_are_read_alike() {
 }
 
 #[test]
-fn the_rest_is_refused_by_name() {
-    let Some(data) = data() else { return };
+fn other_files_are_refused_by_name() {
+    let Some(folder) = scans::find("awkward") else { return };
     let refused = ["4d_x3.nii.gz", "rgb24.nii.gz", "truncated.nii", "truncated.nii.gz"];
     for name in refused {
-        let error = nifti::read(data.join("awkward").join(name)).unwrap_err();
+        let error = nifti::read(folder.join(name)).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");
         match name {
             "4d_x3.nii.gz" => {
@@ -211,10 +196,10 @@ fn the_rest_is_refused_by_name() {
             _ => assert!(matches!(error, VolumeError::Truncated { expected_bytes: 95040, .. }), "{error}"),
         }
     }
-    // No file of the folder is in neither list.
+    // Each file of the folder is in one of the two lists.
     let listed =
         |name: &str| refused.contains(&name) || ACCEPTED.iter().any(|expected| expected.file == name);
-    for entry in std::fs::read_dir(data.join("awkward")).unwrap() {
+    for entry in std::fs::read_dir(&folder).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         assert!(listed(&name), "{name} is in no list");
     }

@@ -1,4 +1,4 @@
-//! What is written is read back: by our reader exactly, and by the independent `nifti` crate.
+//! Written files are read back exactly by this crate, and equally by the independent `nifti` crate.
 
 use std::fs;
 use std::path::Path;
@@ -9,12 +9,12 @@ use proptest::prelude::*;
 
 fn rotation(angles: [f64; 3], spacing: [f64; 3], mirrored: bool, origin: [f64; 3]) -> Affine {
     let [a, b, c] = angles;
-    let turn = nalgebra::Rotation3::from_euler_angles(a, b, c);
+    let rotation = nalgebra::Rotation3::from_euler_angles(a, b, c);
     let sign = [1.0, 1.0, if mirrored { -1.0 } else { 1.0 }];
     let rows: [[f64; 4]; 3] = std::array::from_fn(|r| {
         std::array::from_fn(|c| {
-            let value = if c < 3 { turn[(r, c)] * spacing[c] * sign[c] } else { origin[r] };
-            // A header holds f32.
+            let value = if c < 3 { rotation[(r, c)] * spacing[c] * sign[c] } else { origin[r] };
+            // A header holds f32 values.
             f64::from(value as f32)
         })
     });
@@ -35,7 +35,7 @@ fn names(folder: &Path) -> Vec<String> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
     #[test]
-    fn every_volume_comes_back_exactly(
+    fn every_volume_is_read_back_exactly(
         shape in [1usize..9, 1usize..9, 1usize..9],
         angles in [-3.2f64..3.2, -1.6f64..1.6, -3.2f64..3.2],
         spacing in [0.05f64..9.0, 0.05f64..9.0, 0.05f64..9.0],
@@ -52,7 +52,7 @@ proptest! {
         let path = folder.path().join(if gz { "v.nii.gz" } else { "v.nii" });
         nifti::write(&path, &volume).unwrap();
         let back = nifti::read(&path).unwrap();
-        // No warning: in particular the qform is the sform.
+        // There are no warnings. In particular the qform equals the sform.
         prop_assert_eq!(&back.warnings, &Vec::<String>::new());
         prop_assert_eq!(back.volume.grid(), volume.grid());
         let hu = |volume: &Volume| volume.voxels().iter().map(|&stored| volume.hu(stored)).collect::<Vec<_>>();
@@ -60,7 +60,7 @@ proptest! {
         if hu(&volume).iter().all(|hu| hu.fract() == 0.0 && hu.abs() < 32768.0) {
             prop_assert_eq!((back.volume.slope(), back.volume.intercept()), (1.0, 0.0));
         }
-        // The qform alone puts the voxels at the same place.
+        // With the qform only, the voxels have the same positions.
         let mut bytes = fs::read(&path).unwrap();
         if !gz {
             bytes[254] = 0;
@@ -74,7 +74,7 @@ proptest! {
 }
 
 #[test]
-fn the_nifti_crate_reads_the_same_voxels_and_place() {
+fn the_nifti_crate_reads_the_same_voxels_and_positions() {
     let volume = ramp([7, 6, 5]);
     let folder = tempfile::tempdir().unwrap();
     for name in ["v.nii", "v.nii.gz"] {
@@ -97,7 +97,7 @@ fn the_nifti_crate_reads_the_same_voxels_and_place() {
 }
 
 #[test]
-fn a_header_that_f32_cannot_hold_still_places_the_volume() {
+fn rounding_of_the_header_to_f32_moves_the_volume_very_little() {
     let grid = Grid {
         shape: [3, 3, 3],
         affine: Affine::from_spacing([0.1, 0.7, 1.0 / 3.0], [1e3, -0.3, 0.0]).unwrap(),
@@ -111,7 +111,7 @@ fn a_header_that_f32_cannot_hold_still_places_the_volume() {
 }
 
 #[test]
-fn a_volume_of_many_portions_comes_back_with_its_figures() {
+fn volumes_of_many_portions_are_read_back_with_their_statistics() {
     let volume = ramp([70, 65, 61]);
     let folder = tempfile::tempdir().unwrap();
     for name in ["v.nii", "v.nii.gz"] {
@@ -125,7 +125,7 @@ fn a_volume_of_many_portions_comes_back_with_its_figures() {
 }
 
 #[test]
-fn what_cannot_be_written_is_refused_and_leaves_nothing() {
+fn refused_writes_leave_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let volume = ramp([4, 3, 2]);
     let at = |name: &str| folder.path().join(name);
@@ -154,7 +154,7 @@ fn what_cannot_be_written_is_refused_and_leaves_nothing() {
 }
 
 #[test]
-fn a_writer_counts_its_voxels_and_keeps_the_old_file_until_it_is_done() {
+fn writers_count_voxels_and_keep_the_old_file_until_they_finish() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("v.nii.gz");
     let volume = ramp([4, 3, 2]);
