@@ -1,4 +1,4 @@
-//! The tissue's tets, vertices and edges, taken from a lattice.
+//! Tetrahedral meshes of tissue, built from lattices.
 
 use cutis_volume::Grid;
 use nalgebra::Point3;
@@ -6,78 +6,63 @@ use rayon::prelude::*;
 
 use crate::cells::CellMasks;
 use crate::select::HalfSpace;
-use crate::{Frame, Frozen, Lattice, MeshError, TissueMask, edges};
+use crate::{Frame, InactiveTissue, Lattice, MeshError, TissueMask, edges};
 
-/// Stands for "no vertex" in [`TetMesh::vertex_of_point`].
+/// Marks lattice points without a vertex in [`TetMesh::vertex_of_point`].
 pub const NO_VERTEX: u32 = u32::MAX;
 
-/// What of a lattice becomes a mesh.
+/// Selects the lattice points that are tissue. Input of [`TissueMask::find`].
 #[derive(Clone, Copy, Debug)]
 pub struct Tissue<'a> {
-    /// Per lattice point, in grid order: true if the point is air. With the transfer table from −449 to 6 HU that is a value *below* −449 HU;
-    /// a point of exactly −449 HU is tissue (published counts of skin triangles rest on this).
+    /// One flag per lattice point, in grid order: true if the point is air. With the transfer table
+    /// from −449 to 6 HU, air is *below* −449 HU. Published counts of skin triangles require that a
+    /// point of exactly −449 HU is tissue.
     pub air: &'a [bool],
-    /// Everything strictly inside one of these is left out, as if it were air.
+    /// Points strictly inside one of these half-spaces count as air.
     pub cut_away: &'a [HalfSpace],
-    /// Keep only the largest face-connected component; drops the scanner table, and what else lies apart.
+    /// Keep only the largest face-connected component. This removes the scanner table and other
+    /// separate objects.
     pub largest_component: bool,
 }
 
-/// Tetrahedra over tissue, with vertices numbered in lattice order.
+/// A tetrahedral mesh of tissue, with vertices numbered in lattice order. Built by
+/// [`TissueMask::mesh`] or [`TissueMask::mesh_within`].
 ///
-/// Indices in `tets` and `edges` are below `positions.len()`; `lattice_index` is ascending.
+/// All indices in `tets` and `edges` are below `positions.len()`. `lattice_index` is ascending.
 #[derive(Clone, Debug)]
 pub struct TetMesh {
-    /// Places `positions` in the world.
+    /// Maps `positions` to the world.
     pub frame: Frame,
-    /// The lattice the mesh was taken from.
+    /// The lattice from which the mesh was built.
     pub lattice: Lattice,
-    /// Local meters.
+    /// Rest positions in local meters.
     pub positions: Vec<Point3<f32>>,
-    /// Positively oriented tets, in the order of their cells, then as [`Lattice::cell_tets`].
+    /// Positively oriented tets in the order of their cells, and within a cell in the order of
+    /// [`Lattice::cell_tets`].
     pub tets: Vec<[u32; 4]>,
-    /// Each edge of a tet once, lower vertex first, in ascending order.
+    /// The edges of the tets in ascending order. Each occurs once, with the lower vertex first.
     pub edges: Vec<[u32; 2]>,
-    /// Vertex → flat index of its lattice point.
+    /// Flat index of the lattice point of each vertex.
     pub lattice_index: Vec<u32>,
     /// HU at each vertex.
     pub hu: Vec<f32>,
-    /// Face-connected components among the tissue tets, before any was dropped; 1 where they were not told apart.
+    /// Number of face-connected components of the tissue, before the smaller ones were dropped. It
+    /// is 1 if components were not searched for.
     pub components: usize,
-    /// Tissue tets that were dropped with the smaller components.
+    /// Number of tissue tets in the components that were dropped.
     pub dropped_tets: usize,
-    /// What a region left out of the mesh, if it was built within one ([`TissueMask::mesh_within`]).
-    pub frozen: Option<Frozen>,
+    /// The tissue outside the region, if the mesh was built by [`TissueMask::mesh_within`].
+    pub inactive: Option<InactiveTissue>,
 }
 
 impl TetMesh {
-    /// Keeps the tets whose four corners are tissue. `hu` holds a value per lattice point, in grid order.
-    ///
-    /// ```
-    /// use cutis_mesh::{Lattice, Split, TetMesh, Tissue};
-    /// use cutis_volume::{Affine, Grid};
-    /// let grid = Grid { shape: [3, 3, 3], affine: Affine::from_spacing([2.0; 3], [0.0; 3])? };
-    /// let lattice = Lattice::new(grid, Split::Kuhn6)?;
-    /// let tissue = Tissue { air: &[false; 27], cut_away: &[], largest_component: true };
-    /// let mesh = TetMesh::build(&lattice, &[40.0; 27], &tissue)?;
-    /// assert_eq!((mesh.positions.len(), mesh.edges.len(), mesh.tets.len()), (27, 98, 48));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`MeshError::Length`] for arrays of another length, [`MeshError::NotFinite`] for a HU value of a mesh vertex that is NaN or
-    /// infinite, [`MeshError::Plane`] for a bad half-space, [`MeshError::NoTissue`] if no tet is kept.
-    pub fn build(lattice: &Lattice, hu: &[f32], tissue: &Tissue<'_>) -> Result<Self, MeshError> {
-        TissueMask::find(lattice, tissue)?.mesh(hu)
-    }
-
-    /// Numbers the vertices of the tets in `masks` and lists tets and edges.
+    /// Builds the mesh of the tets in `masks`.
     pub(crate) fn from_masks(
-        whole: &TissueMask,
+        tissue: &TissueMask,
         hu_at_grid: &[f32],
         masks: &CellMasks,
     ) -> Result<Self, MeshError> {
-        let lattice = whole.lattice();
+        let lattice = tissue.lattice();
         let grid = lattice.grid();
         if hu_at_grid.len() != grid.len() {
             return Err(MeshError::Length { array: "hu", expected: grid.len(), found: hu_at_grid.len() });
@@ -107,13 +92,13 @@ impl TetMesh {
             edges,
             lattice_index,
             hu,
-            components: whole.components(),
-            dropped_tets: whole.dropped_tets(),
-            frozen: None,
+            components: tissue.components(),
+            dropped_tets: tissue.dropped_tets(),
+            inactive: None,
         })
     }
 
-    /// Flat lattice index → vertex, or [`NO_VERTEX`].
+    /// The vertex of each lattice point, or [`NO_VERTEX`], by flat lattice index.
     pub fn vertex_of_point(&self) -> Vec<u32> {
         invert(self.lattice.grid(), &self.lattice_index)
     }
@@ -123,7 +108,7 @@ impl TetMesh {
         self.lattice.grid().point(self.lattice_index[vertex as usize] as usize)
     }
 
-    /// Bits of the cells' tets, recovered from the tets that are (still) there.
+    /// The tets of the mesh as one bit mask per cell. After a cut it has only the remaining tets.
     pub(crate) fn cell_masks(&self) -> CellMasks {
         let mut masks = CellMasks::empty(&self.lattice);
         let [cx, cy, cz] = masks.shape;
@@ -145,7 +130,7 @@ impl TetMesh {
         masks
     }
 
-    /// The cell of a tet, and which of the cell's tets it is.
+    /// The cell of a tet, and the number of the tet within the cell.
     pub(crate) fn cell_of(&self, tet: &[u32; 4]) -> ([usize; 3], usize) {
         let points = tet.map(|vertex| self.point(vertex));
         let cell: [usize; 3] =
@@ -176,8 +161,8 @@ fn tets(grid: &Grid, masks: &CellMasks, vertex_of: &[u32]) -> Vec<[u32; 4]> {
         let mut out = layer.iter_mut();
         masks.for_layer(k, |cell, _, mask| {
             let first = grid.index(cell);
-            let kinds = &masks.stencil.tets[cell.iter().sum::<usize>() & 1];
-            let kept = kinds.iter().enumerate().filter(|(t, _)| mask >> t & 1 == 1);
+            let cell_tets = &masks.stencil.tets[cell.iter().sum::<usize>() & 1];
+            let kept = cell_tets.iter().enumerate().filter(|(t, _)| mask >> t & 1 == 1);
             for ((_, corners), tet) in kept.zip(&mut out) {
                 *tet = corners.map(|corner| vertex_of[first + corner_step[usize::from(corner)]]);
             }
@@ -186,7 +171,7 @@ fn tets(grid: &Grid, masks: &CellMasks, vertex_of: &[u32]) -> Vec<[u32; 4]> {
     tets
 }
 
-/// Cuts a slice into consecutive parts of the given lengths.
+/// Splits a slice into consecutive parts of the given lengths.
 pub(crate) fn split<'a, T>(mut slice: &'a mut [T], lengths: &[usize]) -> Vec<&'a mut [T]> {
     let take = |&length: &usize| {
         let (part, rest) = std::mem::take(&mut slice).split_at_mut(length);

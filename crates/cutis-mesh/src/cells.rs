@@ -1,13 +1,14 @@
-//! Which tets of each cell are present: one byte per cell, with a border of empty cells.
+//! Bit masks of the tets that are present in each cell.
 
 use rayon::prelude::*;
 
 use crate::Lattice;
 use crate::stencil::Stencil;
 
-/// A bit per tet of each cell.
+/// One byte per cell with one bit per tet.
 ///
-/// One layer of empty cells surrounds the lattice, so that looking at a neighboring cell needs no bounds check.
+/// A layer of empty cells surrounds the lattice, so that reading a neighboring cell needs no bounds
+/// check.
 #[derive(Clone)]
 pub(crate) struct CellMasks {
     pub stencil: &'static Stencil,
@@ -23,7 +24,7 @@ impl CellMasks {
         Self { stencil: lattice.stencil(), shape, bytes }
     }
 
-    /// The tets whose four corners are all `present`.
+    /// The masks of the tets whose four corners are all `present`.
     pub fn of_points(lattice: &Lattice, present: &[bool]) -> Self {
         let mut masks = Self::empty(lattice);
         let [cx, cy, cz] = masks.shape;
@@ -61,7 +62,8 @@ impl CellMasks {
         counts.map(|layer| layer.iter().map(|mask| mask.count_ones() as usize).sum()).collect()
     }
 
-    /// Calls `visit(cell, position, mask)` for the cells of a layer that have tets, in lattice order.
+    /// Calls `visit(cell, position, mask)` for each cell of a layer that has tets, in lattice
+    /// order.
     pub fn for_layer(&self, k: usize, mut visit: impl FnMut([usize; 3], usize, u8)) {
         for j in 0..self.shape[1] {
             let start = self.flat([0, j, k]);
@@ -73,7 +75,7 @@ impl CellMasks {
         }
     }
 
-    /// The points that are corners of some tet present.
+    /// One flag per lattice point: true if the point is a corner of a present tet.
     pub fn used_points(&self) -> Vec<bool> {
         let [cx, cy, cz] = self.shape;
         let mut used = vec![false; (cx + 1) * (cy + 1) * (cz + 1)];
@@ -99,7 +101,7 @@ impl CellMasks {
     }
 }
 
-/// Reads the flags of a cell's eight corners as one byte.
+/// Reads the flags at the eight corners of a cell as one byte.
 pub(crate) struct CornerBits<'a> {
     points: &'a [bool],
     shape: [usize; 3],

@@ -1,15 +1,16 @@
-//! Face-connected components of tets.
+//! Finds the largest face-connected component of tets.
 
 use crate::cells::CellMasks;
 
-/// Outcome of [`largest`].
+/// The largest component of a set of tets.
 pub(crate) struct Largest {
     pub masks: CellMasks,
-    /// Number of components before the others were dropped.
+    /// Number of all components.
     pub components: usize,
 }
 
-/// Keeps the component with the most tets (the first one in lattice order if several have as many).
+/// Finds the component with the most tets. Of several such components, the first in lattice order
+/// is chosen.
 pub(crate) fn largest(masks: CellMasks) -> Largest {
     let flood = Flood::new(&masks);
     let mut seen = vec![0u8; masks.bytes.len()];
@@ -38,7 +39,7 @@ pub(crate) fn largest(masks: CellMasks) -> Largest {
     }
 }
 
-/// A way from a tet to a tet of another cell.
+/// A face that a tet shares with a tet of another cell.
 struct Crossing {
     tet: u8,
     delta: isize,
@@ -47,7 +48,7 @@ struct Crossing {
 
 struct Flood<'a> {
     masks: &'a CellMasks,
-    /// `[parity][mask][tet]`: the tets of the mask that are connected to a tet within its cell.
+    /// `[parity][mask][tet]`: the tets of the mask that are connected to `tet` within the cell.
     parts: [Vec<[u8; 6]>; 2],
     crossings: [Vec<Crossing>; 2],
 }
@@ -86,7 +87,7 @@ impl<'a> Flood<'a> {
         Self { masks, parts, crossings }
     }
 
-    /// Marks everything connected to a tet; returns how many tets that are.
+    /// Marks all tets connected to a tet in `seen`. Returns their number.
     fn fill(&self, seen: &mut [u8], flat: usize, parity: usize, tet: usize) -> usize {
         let part = |flat: usize, parity: usize, tet: usize| {
             self.parts[parity][usize::from(self.masks.bytes[flat])][tet]

@@ -1,4 +1,4 @@
-//! Edges of a lattice mesh, generated per direction, and the lattice's closed-form colors.
+//! The edges of a lattice mesh, and the colors of edges, vertices and tets in closed form.
 
 use cutis_volume::Grid;
 use rayon::prelude::*;
@@ -7,23 +7,24 @@ use crate::build::split;
 use crate::cells::CellMasks;
 use crate::{Split, TetMesh};
 
-/// Which edges start at a point: an edge is there if any of the tets around it is.
-struct Starting<'a> {
+/// Finds the edges that start at a point. An edge exists if any tet around it is present.
+struct EdgeFinder<'a> {
     grid: &'a Grid,
     masks: &'a CellMasks,
-    /// By parity of the point.
-    directions: [Vec<Course>; 2],
+    /// Indexed by the parity of the point.
+    directions: [Vec<EdgeDirection>; 2],
 }
 
-/// A direction that edges of a lattice run in.
-struct Course {
-    /// To the second point, in flat indices.
+/// A direction of lattice edges.
+struct EdgeDirection {
+    /// Difference between the flat indices of the two points.
     step: isize,
-    /// The cells around, relative to the point's, and their tets with the edge.
+    /// The cells around the edge, relative to the cell of the first point, each with a mask of its
+    /// tets that have the edge.
     around: Vec<(isize, u8)>,
 }
 
-impl<'a> Starting<'a> {
+impl<'a> EdgeFinder<'a> {
     fn new(grid: &'a Grid, masks: &'a CellMasks) -> Self {
         let point_step = |[i, j, k]: [i8; 3]| {
             i as isize + grid.shape[0] as isize * (j as isize + grid.shape[1] as isize * k as isize)
@@ -31,31 +32,34 @@ impl<'a> Starting<'a> {
         let around =
             |cells: &[([i8; 3], u8)]| cells.iter().map(|&(cell, mask)| (masks.delta(cell), mask)).collect();
         let directions = masks.stencil.directions.each_ref().map(|directions| {
-            directions.iter().map(|d| Course { step: point_step(d.step), around: around(&d.cells) }).collect()
+            directions
+                .iter()
+                .map(|d| EdgeDirection { step: point_step(d.step), around: around(&d.cells) })
+                .collect()
         });
         Self { grid, masks, directions }
     }
 
-    /// A bit per direction.
-    fn at(&self, point: usize) -> u16 {
+    /// One bit per direction: set if an edge in that direction starts at the point.
+    fn starting_at(&self, point: usize) -> u16 {
         let [i, j, k] = self.grid.point(point);
         let cell = self.masks.flat([i, j, k]);
         let has = |around: &[(isize, u8)]| {
             around.iter().any(|&(delta, mask)| self.masks.bytes[cell.wrapping_add_signed(delta)] & mask != 0)
         };
         let own = self.directions[(i + j + k) & 1].iter().enumerate();
-        own.fold(0u16, |bits, (d, course)| bits | u16::from(has(&course.around)) << d)
+        own.fold(0u16, |bits, (d, direction)| bits | u16::from(has(&direction.around)) << d)
     }
 }
 
-/// Number of edges of the tets in `masks`, whose corners are the points `used`.
+/// Counts the edges of the tets in `masks`. `used` flags the corners of these tets.
 pub(crate) fn count(grid: &Grid, masks: &CellMasks, used: &[bool]) -> usize {
-    let starting = Starting::new(grid, masks);
-    let edges = |(point, _): (usize, &bool)| starting.at(point).count_ones() as usize;
+    let finder = EdgeFinder::new(grid, masks);
+    let edges = |(point, _): (usize, &bool)| finder.starting_at(point).count_ones() as usize;
     used.par_iter().enumerate().filter(|(_, used)| **used).map(edges).reduce(|| 0, |a, b| a + b)
 }
 
-/// Ascending; lower vertex first.
+/// Lists the edges of the tets in `masks` in ascending order, with the lower vertex first.
 pub(crate) fn generate(
     grid: &Grid,
     masks: &CellMasks,
@@ -65,14 +69,14 @@ pub(crate) fn generate(
     let layer_size = grid.shape[0] * grid.shape[1];
     let start = |layer: usize| lattice_index.partition_point(|&point| (point as usize) < layer * layer_size);
     let starts: Vec<usize> = (0..=grid.shape[2]).map(start).collect();
-    let starting = Starting::new(grid, masks);
-    // First pass: which directions each vertex has an edge in.
-    let bits: Vec<u16> = lattice_index.par_iter().map(|&point| starting.at(point as usize)).collect();
+    let finder = EdgeFinder::new(grid, masks);
+    // First pass: find the directions of the edges that start at each vertex.
+    let bits: Vec<u16> = lattice_index.par_iter().map(|&point| finder.starting_at(point as usize)).collect();
     let layers: Vec<_> = starts.windows(2).map(|w| w[0]..w[1]).collect();
     let count =
         |layer: &std::ops::Range<usize>| bits[layer.clone()].iter().map(|b| b.count_ones() as usize).sum();
     let counts: Vec<usize> = layers.par_iter().map(count).collect();
-    // Second pass: write them.
+    // Second pass: write the edges.
     let mut edges = vec![[0u32; 2]; counts.iter().sum()];
     split(&mut edges, &counts).into_par_iter().zip(layers).for_each(|(out, layer)| {
         let mut out = out.iter_mut();
@@ -80,9 +84,9 @@ pub(crate) fn generate(
             let point = lattice_index[vertex] as usize;
             let parity = grid.point(point).iter().sum::<usize>() & 1;
             let own =
-                starting.directions[parity].iter().enumerate().filter(|(d, _)| bits[vertex] >> d & 1 == 1);
-            for ((_, course), edge) in own.zip(&mut out) {
-                *edge = [vertex as u32, vertex_of[point.wrapping_add_signed(course.step)]];
+                finder.directions[parity].iter().enumerate().filter(|(d, _)| bits[vertex] >> d & 1 == 1);
+            for ((_, direction), edge) in own.zip(&mut out) {
+                *edge = [vertex as u32, vertex_of[point.wrapping_add_signed(direction.step)]];
             }
         }
     });
@@ -90,13 +94,14 @@ pub(crate) fn generate(
 }
 
 impl TetMesh {
-    /// Colors of lattice edges in closed form: edges of one color share no vertex.
+    /// Colors of lattice edges in closed form. Edges of one color share no vertex.
     ///
-    /// Color = 2 · direction + parity of the first point along the direction's first axis: 14 colors for `kuhn6` (7 directions),
-    /// 18 for `five` (9 directions). `edges` are edges of this mesh, or what a cut has left of them.
+    /// The color is 2 · direction + the parity of the first point along the first axis of the
+    /// direction. There are 14 colors for `kuhn6` (7 directions) and 18 for `five` (9 directions).
+    /// `edges` are edges of this mesh, before or after a cut.
     pub fn edge_colors(&self, edges: &[[u32; 2]]) -> Vec<u16> {
         let directions = &self.lattice.stencil().directions;
-        let class = |&[a, b]: &[u32; 2]| {
+        let color = |&[a, b]: &[u32; 2]| {
             let (p, q) = (self.point(a), self.point(b));
             let step: [i8; 3] = std::array::from_fn(|axis| (q[axis] as isize - p[axis] as isize) as i8);
             let axis = step.iter().position(|&s| s != 0).unwrap_or(0);
@@ -104,16 +109,17 @@ impl TetMesh {
             let number = own.iter().find(|d| d.step == step).map_or(0, |d| d.number);
             2 * number + (p[axis] & 1) as u16
         };
-        edges.par_iter().map(class).collect()
+        edges.par_iter().map(color).collect()
     }
 
-    /// Colors of the vertices in closed form: vertices of one color are in no common tet, edge or face.
+    /// Colors of the vertices in closed form. Two vertices of one color never belong to the same
+    /// tet.
     ///
-    /// `kuhn6`: (i + j + k) mod 4, since the corners of a tet lie on a monotonous path; 4 colors. `five`: the parities of i, j
-    /// and k; 8 colors.
-    pub fn vertex_classes(&self) -> Vec<u16> {
+    /// For `kuhn6` the color is (i + j + k) mod 4, because the corners of a tet lie on a monotonic
+    /// path: 4 colors. For `five` it combines the parities of i, j and k: 8 colors.
+    pub fn vertex_colors(&self) -> Vec<u16> {
         let grid = self.lattice.grid();
-        let class = |&point: &u32| {
+        let color = |&point: &u32| {
             let [i, j, k] = grid.point(point as usize);
             let color = match self.lattice.split() {
                 Split::Kuhn6 => (i + j + k) % 4,
@@ -121,15 +127,16 @@ impl TetMesh {
             };
             color as u16
         };
-        self.lattice_index.par_iter().map(class).collect()
+        self.lattice_index.par_iter().map(color).collect()
     }
 
-    /// Colors of lattice tets in closed form: tets of one color share no vertex.
+    /// Colors of lattice tets in closed form. Tets of one color share no vertex.
     ///
-    /// `kuhn6`: color = 4 · type + (i + j + k) mod 4 of the cell, 24 colors. `five`: 8 · type + the parities of i, j and k, 40
-    /// colors. `tets` are tets of this mesh, or what a cut has left of them.
-    pub fn tet_classes(&self, tets: &[[u32; 4]]) -> Vec<u16> {
-        let class = |tet: &[u32; 4]| {
+    /// Let `t` be the number of the tet within its cell `(i, j, k)`. For `kuhn6` the color is 4t +
+    /// (i + j + k) mod 4: 24 colors. For `five` it is 8t + a number from the parities of i, j and
+    /// k: 40 colors. `tets` are tets of this mesh, before or after a cut.
+    pub fn tet_colors(&self, tets: &[[u32; 4]]) -> Vec<u16> {
+        let color = |tet: &[u32; 4]| {
             let ([i, j, k], t) = self.cell_of(tet);
             let color = match self.lattice.split() {
                 Split::Kuhn6 => 4 * t + (i + j + k) % 4,
@@ -137,6 +144,6 @@ impl TetMesh {
             };
             color as u16
         };
-        tets.par_iter().map(class).collect()
+        tets.par_iter().map(color).collect()
     }
 }

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-/// Everything that can be wrong with a lattice, a mesh, an incision or a mesh file.
+/// Errors of lattices, meshes, skin detection, incisions and mesh files.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// A lattice needs a cell along every axis, and its points must be countable in 32 bits.
+    /// A lattice has fewer than two points along an axis, or too many for 32-bit indices.
     #[error(
-        "a lattice of {shape:?} vertices is not possible: each axis needs at least 2, and all together at most {max}"
+        "a lattice of {shape:?} vertices is not possible: expected at least 2 along each axis, and at most {max} in total"
     )]
     LatticeSize {
         /// Vertices per axis.
@@ -16,182 +16,186 @@ pub enum MeshError {
         /// Largest number of vertices.
         max: usize,
     },
-    /// The lattice's extent cannot be held in 32-bit meters.
-    #[error("lattice steps of {spacing_mm:?} mm over {shape:?} vertices cannot be held in 32-bit meters")]
+    /// The steps or the extent of a lattice exceed the range of 32-bit meters.
+    #[error("lattice steps of {spacing_mm:?} mm over {shape:?} vertices exceed the range of 32-bit meters")]
     LatticeExtent {
-        /// Step along each axis, mm.
+        /// Step along each axis in mm.
         spacing_mm: [f64; 3],
         /// Vertices per axis.
         shape: [usize; 3],
     },
-    /// An array given per lattice vertex has another length.
-    #[error("the array `{array}` has {found} values; the lattice has {expected} vertices")]
+    /// An array does not have one value per vertex.
+    #[error("the array `{array}` has {found} values; expected {expected}, one per vertex")]
     Length {
-        /// Which array.
+        /// Name of the array.
         array: &'static str,
-        /// Vertices of the lattice or mesh.
+        /// Number of vertices of the lattice or mesh.
         expected: usize,
-        /// Values given.
+        /// Number of values given.
         found: usize,
     },
-    /// A HU value is NaN or infinite.
+    /// A HU value of a mesh vertex is NaN or infinite.
     #[error("the HU value at lattice vertex {point:?} is {hu}; it must be finite")]
     NotFinite {
         /// Lattice vertex `(i, j, k)`.
         point: [usize; 3],
-        /// The value.
+        /// The HU value.
         hu: f32,
     },
-    /// No tetrahedron has tissue at all four corners.
+    /// No tetrahedron has four tissue corners.
     #[error(
-        "no tissue: none of the {tets} tetrahedra has tissue at all four corners ({tissue_vertices} of {vertices} vertices are tissue on the kept side of the cut planes); check the air threshold, the lattice spacing and the cut planes"
+        "no tissue: none of the {tets} tetrahedra has four tissue corners ({tissue_vertices} of {vertices} vertices are tissue and not cut away); check the air threshold, the lattice spacing and the cut planes"
     )]
     NoTissue {
-        /// Tetrahedra of the lattice.
+        /// Number of tetrahedra of the lattice.
         tets: usize,
-        /// Vertices of the lattice that are tissue and not cut away.
+        /// Number of vertices that are tissue and not cut away.
         tissue_vertices: usize,
-        /// Vertices of the lattice.
+        /// Number of vertices of the lattice.
         vertices: usize,
     },
-    /// A half-space needs a finite point and a finite normal other than zero.
+    /// The point or normal of a half-space is not finite, or the normal is zero.
     #[error(
-        "the plane through {point_mm:?} mm with normal {normal:?} is no plane: the point must be finite, the normal finite and not zero"
+        "the plane through {point_mm:?} mm with normal {normal:?} is not valid: both must be finite, and the normal must not be zero"
     )]
     Plane {
-        /// A point of the plane, mm.
+        /// A point of the plane in mm.
         point_mm: [f64; 3],
-        /// Its normal.
+        /// Normal of the plane.
         normal: [f64; 3],
     },
-    /// The through axis of a skin search is not an index axis.
+    /// The through axis of a skin detection is not an index axis.
     #[error("through axis {axis} does not exist; it must be 0, 1 or 2")]
     Axis {
-        /// The axis given.
+        /// The given axis.
         axis: usize,
     },
-    /// An index names no vertex.
+    /// A vertex index is out of range.
     #[error("`{array}`[{position}] names vertex {vertex}; there are {vertices}")]
     VertexIndex {
-        /// Which array.
+        /// Name of the array.
         array: &'static str,
-        /// Entry in that array.
+        /// Position in that array.
         position: usize,
-        /// The vertex named.
+        /// The vertex index.
         vertex: u32,
         /// Number of vertices.
         vertices: usize,
     },
-    /// A number of an incision is not usable.
+    /// A length, depth or width of an incision is not finite and positive.
     #[error("incision {incision}: `{key}` is {value}; it must be finite and positive")]
     IncisionSize {
-        /// Which incision, from 0.
+        /// Number of the incision, from 0.
         incision: usize,
         /// `depth_mm`, `width_mm`, or `length` (the distance from `from_mm` to `to_mm`).
         key: &'static str,
-        /// The value given.
+        /// The given value.
         value: f64,
     },
-    /// The incision's segment lies too far from the skin.
+    /// The segment of an incision is too far from the skin.
     #[error(
         "incision {incision}: the segment {from_mm:?} → {to_mm:?} mm is {distance_mm:.1} mm from the skin; it must lie within {reach_mm:.1} mm of it"
     )]
     IncisionOffSkin {
-        /// Which incision, from 0.
+        /// Number of the incision, from 0.
         incision: usize,
-        /// Start, mm.
+        /// Start of the segment in mm.
         from_mm: [f64; 3],
-        /// End, mm.
+        /// End of the segment in mm.
         to_mm: [f64; 3],
-        /// Distance from the segment to the nearest skin triangle's center, mm; infinite without skin.
+        /// Distance in mm from the segment to the nearest center of a skin triangle. Infinite if
+        /// there is no skin.
         distance_mm: f64,
-        /// The distance allowed, mm.
+        /// Largest allowed distance in mm.
         reach_mm: f64,
     },
-    /// The segment runs into the skin and not along it, so "down" has no meaning.
+    /// The segment pierces the skin instead of running along it, so the direction of depth is
+    /// undefined.
     #[error(
         "incision {incision}: the segment {from_mm:?} → {to_mm:?} mm pierces the skin instead of running along it (the skin's mean outward normal there is {normal:?})"
     )]
     IncisionThroughSkin {
-        /// Which incision, from 0.
+        /// Number of the incision, from 0.
         incision: usize,
-        /// Start, mm.
+        /// Start of the segment in mm.
         from_mm: [f64; 3],
-        /// End, mm.
+        /// End of the segment in mm.
         to_mm: [f64; 3],
-        /// Mean outward normal of the skin near the segment; short where normals cancel.
+        /// Mean outward normal of the skin near the segment. It is short if normals cancel.
         normal: [f64; 3],
     },
-    /// The slit holds no vertex and crosses no edge.
+    /// The slit contains no vertex and crosses no edge.
     #[error(
-        "incision {incision} cuts nothing: no vertex lies in it and no edge crosses it; make it longer than the lattice step of {step_mm:.1} mm, deeper, or the lattice finer"
+        "incision {incision} cuts nothing: it contains no vertex and crosses no edge; make it longer than the lattice step of {step_mm:.1} mm, or deeper, or use a finer lattice"
     )]
     IncisionEmpty {
-        /// Which incision, from 0.
+        /// Number of the incision, from 0.
         incision: usize,
-        /// Longest lattice step, mm.
+        /// Longest lattice step in mm.
         step_mm: f64,
     },
-    /// The slit touches vertices of the body that a region froze, or that lie where a graded lattice is coarse.
+    /// The slit touches a vertex of the body outside the region, or in the coarse part of a graded
+    /// lattice.
     #[error(
-        "incision {incision} is not all inside: a vertex of the body at {at_mm:.1?} mm, {distance_mm:.1} mm from the middle of the slit, is touched by it and lies {}",
-        if *coarse { "where the lattice is coarse" } else { "outside the region" }
+        "incision {incision} touches a vertex of the body at {at_mm:.1?} mm, {distance_mm:.1} mm from the middle of the slit, that lies {}",
+        if *coarse { "in the coarse part of the lattice" } else { "outside the region" }
     )]
     IncisionBeyond {
-        /// Which incision, from 0.
+        /// Number of the incision, from 0.
         incision: usize,
-        /// How far the farthest such vertex is from the surface in the middle of the slit, mm.
+        /// Distance in mm of the farthest such vertex from the middle surface of the slit.
         distance_mm: f64,
-        /// Where it is, mm.
+        /// Position of that vertex in mm.
         at_mm: [f64; 3],
-        /// It lies where a graded lattice is coarse; else a region froze it.
+        /// True if the vertex is in the coarse part of a graded lattice, false if it is outside the
+        /// region.
         coarse: bool,
     },
-    /// A region holds no vertex of the body.
-    #[error("the region holds none of the {vertices} vertices of the body")]
+    /// A region contains no vertex of the body.
+    #[error("the region contains none of the {vertices} vertices of the body")]
     RegionEmpty {
-        /// Vertices of the whole body.
+        /// Number of vertices of the body.
         vertices: usize,
     },
-    /// The fine zone of a graded lattice is not within the lattice.
+    /// The fine zone of a graded lattice is empty or outside the lattice.
     #[error(
-        "along axis {axis} the fine zone reaches from step {from} to step {to} of the even lattice; it must begin before it ends and meet the lattice's {steps} steps"
+        "along axis {axis} the fine zone reaches from step {from} to step {to} of the even lattice; it must not end before it begins, and must overlap the {steps} steps of the lattice"
     )]
     FineZone {
         /// Index axis.
         axis: usize,
-        /// Where the zone begins, in steps of the even lattice.
+        /// Begin of the zone in steps of the even lattice.
         from: f64,
-        /// Where it ends.
+        /// End of the zone in steps of the even lattice.
         to: f64,
-        /// Steps of the even lattice.
+        /// Number of steps of the even lattice.
         steps: usize,
     },
-    /// A number of a grading is out of range.
+    /// A parameter of a grading is out of range.
     #[error("the grading's `{key}` is {value}; it must lie between {low} and {high}")]
     Grading {
         /// `growth` or `coarsest`.
         key: &'static str,
-        /// The value given.
+        /// The given value.
         value: f64,
-        /// Lowest value allowed.
+        /// Lower limit.
         low: f64,
-        /// Highest value allowed.
+        /// Upper limit.
         high: f64,
     },
-    /// The slit leaves no skin vertices on one of its sides.
+    /// The slit leaves no skin vertices on one side.
     #[error(
         "incision {incision} leaves no lips: {left} skin vertices to the left of the slit and {right} to the right"
     )]
     IncisionWithoutLips {
-        /// Which incision, from 0.
+        /// Number of the incision, from 0.
         incision: usize,
         /// Skin vertices on the left lip.
         left: usize,
         /// Skin vertices on the right lip.
         right: usize,
     },
-    /// A mesh file holds more than its format's counters can tell.
+    /// A mesh has too many cells for the 32-bit offsets of the file format.
     #[error("{path}: {cells} cells are too many for 32-bit offsets")]
     TooManyCells {
         /// The file.
@@ -199,41 +203,41 @@ pub enum MeshError {
         /// Number of cells.
         cells: usize,
     },
-    /// A `.vtp` file holds triangles only.
-    #[error("{path}: tetrahedra do not fit into a surface file; write a .vtu file")]
+    /// A `.vtp` file can hold only triangles.
+    #[error("{path}: a surface file cannot hold tetrahedra; write a .vtu file")]
     NotASurface {
         /// The file.
         path: PathBuf,
     },
-    /// A point array of a mesh file does not fit the mesh.
+    /// A point array for a mesh file does not have one value per point.
     #[error("{path}: the array `{array}` has {found} values; the mesh has {expected} points")]
     PointData {
         /// The file.
         path: PathBuf,
         /// Name of the array.
         array: String,
-        /// Points of the mesh.
+        /// Number of points of the mesh.
         expected: usize,
-        /// Values given.
+        /// Number of values given.
         found: usize,
     },
-    /// A name cannot stand in a mesh file.
-    #[error("{path}: `{name}` cannot name an array; use letters, digits, `_`, `-` and `.`")]
+    /// A name of an array has characters that a mesh file does not allow.
+    #[error("{path}: `{name}` is not a valid name of an array; use letters, digits, `_`, `-` and `.`")]
     ArrayName {
         /// The file.
         path: PathBuf,
         /// The name.
         name: String,
     },
-    /// A mesh file could not be created or put in its place.
+    /// A mesh file could not be created, or a volume could not be sampled on a lattice.
     #[error(transparent)]
-    File(#[from] cutis_volume::VolumeError),
+    Volume(#[from] cutis_volume::VolumeError),
     /// A mesh file could not be written.
-    #[error("{path}: cannot be written: {source}")]
+    #[error("cannot write {path}: {source}")]
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }

@@ -8,46 +8,53 @@ use serde::{Deserialize, Serialize};
 use crate::slit::Slit;
 use crate::{MeshError, TetMesh};
 
-/// Most bins along one slit.
+/// Largest number of bins along one slit.
 const MOST_BINS: f64 = 1024.0;
 
-/// Which vertices are measured, and along which axis.
+/// The vertices and the axis by which the opening of a wound is measured.
 ///
-/// The lips are the skin vertices left of the skin triangles that the slit opens, between start and end of the segment: left of its middle surface
-/// and right of it. The segment is divided into equal bins of at least one lattice step. In a bin, and in the middle tenth of the segment (or one
-/// lattice step, if that is longer), the opening is the difference between the mean position of the right lip's vertices and that of the
-/// left lip's, taken along the lateral axis of the slit at rest. Which vertices these are is fixed at rest, so that openings
-/// before and after differ by motion alone. At rest the opening is at least the distance between the nearest vertices left standing: width
-/// rounded up to the lattice.
+/// The lips are the remaining skin vertices of the skin triangles that the slit opens, between the
+/// start and the end of the segment. The left lip is on the left side of the middle surface of the
+/// slit, the right lip on the other side.
+///
+/// The segment is divided into equal bins of at least one lattice step. The opening in a bin is the
+/// difference between the mean positions of the two lips, along the lateral axis of the slit at
+/// rest. The opening is also measured in the middle tenth of the segment, or in one lattice step if
+/// that is longer.
+///
+/// The vertices are chosen at rest, so that openings before and after a run differ only by motion.
+/// At rest the opening is at least the distance between the nearest remaining vertices, that is,
+/// the width rounded up to the lattice.
 #[derive(Clone, Debug)]
 pub struct Gape {
     lateral: Vector3<f64>,
-    /// The bins within the middle 80 % of the segment that have vertices on both sides.
+    /// The bins in the middle 80 % of the segment that have vertices on both sides.
     bins: Vec<Sides>,
     middle: Sides,
     vertices: Vec<u32>,
     left: usize,
 }
 
-/// Vertices of both lips in a part of the segment, as ranges of `Gape::vertices`.
+/// The vertices of both lips in a part of the segment, as ranges of `Gape::vertices`.
 #[derive(Clone, Debug)]
 struct Sides {
     left: Range<usize>,
     right: Range<usize>,
 }
 
-/// Openings of one wound, mm.
+/// Openings of one wound in mm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WoundGape {
     /// Mean opening over the bins, without the first and last tenth of the segment.
     pub mean_mm: f64,
     /// Opening in the middle tenth.
     pub mid_mm: f64,
-    /// As `mean_mm`, with the full distance between the mean positions instead of its lateral part.
+    /// As `mean_mm`, but with the distance between the mean positions instead of its lateral
+    /// component.
     pub mean_distance_mm: f64,
-    /// As `mid_mm`, with the full distance.
+    /// As `mid_mm`, but with the distance between the mean positions.
     pub mid_distance_mm: f64,
-    /// Number of bins measured.
+    /// Number of measured bins.
     pub bins: usize,
 }
 
@@ -85,7 +92,7 @@ impl Gape {
         let bins = (0..count as usize).map(|bin| bin as f64).filter(inner);
         let bins: Vec<Sides> =
             bins.map(|bin| between(bin * width, (bin + 1.0) * width)).filter(Sides::complete).collect();
-        // Widen the middle until both lips have a vertex in it; the whole segment has.
+        // Widen the middle until it contains a vertex of each lip. The whole segment does.
         let mut half = (slit.length / 20.0).max(step / 2.0);
         let mut middle = between(slit.length / 2.0 - half, slit.length / 2.0 + half);
         while !middle.complete() {
@@ -107,7 +114,7 @@ impl Gape {
         &self.vertices[self.left..]
     }
 
-    /// Measures positions in local meters, one per mesh vertex.
+    /// Measures the openings at the given positions: local meters, one per mesh vertex.
     ///
     /// # Panics
     /// If there are fewer positions than mesh vertices.
@@ -115,7 +122,7 @@ impl Gape {
         self.measure_by(&|vertex| positions[vertex as usize].cast())
     }
 
-    /// As [`Gape::measure`], asking for each vertex's position, in local meters.
+    /// Measures the openings. `position` returns the position of a mesh vertex in local meters.
     pub fn measure_by(&self, position: &dyn Fn(u32) -> Point3<f64>) -> WoundGape {
         let mean = |part: &Range<usize>| {
             let sum =

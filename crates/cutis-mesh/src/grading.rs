@@ -1,7 +1,8 @@
-//! Graded lattices: planes across each axis that lie densely in a fine zone and further apart away from it.
+//! Graded lattices, whose planes are dense in a fine zone and farther apart outside it.
 //!
-//! Where the planes of the three axes meet there is a point, so that the lattice stays one of boxes: no hanging vertices, the same split,
-//! the same colors. The price is that a fine step along one axis runs through the whole lattice.
+//! The lattice points are the intersections of the planes of the three axes. Therefore all cells
+//! are boxes. There are no hanging vertices, and the split and the colors are those of an even
+//! lattice. The disadvantage is that a fine step along one axis extends through the whole lattice.
 
 use std::ops::RangeInclusive;
 
@@ -10,20 +11,23 @@ use nalgebra::Point3;
 
 use crate::MeshError;
 
-/// How steps grow away from the fine zone.
+/// The growth of lattice steps away from the fine zone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grading {
-    /// Largest ratio of two neighboring steps along an axis, above 1 and at most [`Grading::MOST_GROWTH`].
+    /// Largest ratio of two neighboring steps along an axis. It is above 1 and at most
+    /// [`Grading::MOST_GROWTH`].
     pub growth: f64,
-    /// Longest step, in steps of the fine zone, from 1 to [`Grading::MOST_COARSE`]. Cells are as much longer along one axis than along
-    /// another beside the zone.
+    /// Longest step in units of the fine step. It is above 1 and at most [`Grading::MOST_COARSE`].
+    /// It also limits the aspect ratio of the cells outside the zone.
     pub coarsest: f64,
 }
 
 impl Grading {
-    /// Largest growth: neighboring steps differ by a factor of 2 at most, as in a balanced octree.
+    /// Upper limit of `growth`: neighboring steps differ by at most a factor of 2, as in a balanced
+    /// octree.
     pub const MOST_GROWTH: f64 = 2.0;
-    /// Largest `coarsest`: the smallest dihedral angle of `kuhn6` is then 7° (14° at 4, 45° in a cube).
+    /// Upper limit of `coarsest`. The smallest dihedral angle of `kuhn6` is then 7° (14° for a
+    /// value of 4, 45° in a cube).
     pub const MOST_COARSE: f64 = 8.0;
 
     fn check(&self) -> Result<(), MeshError> {
@@ -38,7 +42,7 @@ impl Grading {
     }
 }
 
-/// Positions of the planes of a graded lattice, in steps of an even one.
+/// The positions of the planes of a graded lattice, in steps of an even lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planes {
     axes: [Vec<f64>; 3],
@@ -46,11 +50,13 @@ pub struct Planes {
 }
 
 impl Planes {
-    /// Planes over the extent of `even`: each of its own in the zone `fine` (from and to along each axis, in its steps, rounded outwards),
-    /// fewer beside it.
+    /// Computes planes over the extent of the lattice `even`. In the zone `fine` they are the
+    /// planes of `even`, outside it there are fewer.
     ///
-    /// On either side of the zone are as few planes as the grading allows, with one growth for all their steps so that the last plane
-    /// lies on the last one of `even`.
+    /// `fine` holds the begin and end of the zone along each axis in steps of `even`, and is
+    /// rounded outwards. On each side of the zone there are as few planes as the grading allows.
+    /// Their steps grow by one common factor, chosen such that the last plane is the last plane of
+    /// `even`.
     ///
     /// ```
     /// use cutis_mesh::{Grading, Planes};
@@ -64,8 +70,9 @@ impl Planes {
     /// ```
     ///
     /// # Errors
-    /// [`MeshError::LatticeSize`] if `even` has fewer than 2 points along an axis, [`MeshError::FineZone`] for a zone that is empty or beside
-    /// the lattice, [`MeshError::Grading`] for a growth or coarsest step out of range.
+    /// [`MeshError::LatticeSize`] if `even` has fewer than 2 points along an axis.
+    /// [`MeshError::FineZone`] if the zone is empty or outside the lattice. [`MeshError::Grading`]
+    /// if a parameter of the grading is out of range.
     pub fn new(even: &Grid, fine: [[f64; 2]; 3], grading: &Grading) -> Result<Self, MeshError> {
         grading.check()?;
         let most = crate::Lattice::MAX_POINTS;
@@ -97,31 +104,32 @@ impl Planes {
         self.axes.each_ref().map(Vec::len)
     }
 
-    /// Positions along each axis, in steps of the even lattice, ascending from 0.
+    /// Positions of the planes along each axis, in steps of the even lattice, ascending from 0.
     pub fn axes(&self) -> &[Vec<f64>; 3] {
         &self.axes
     }
 
-    /// True if a point lies in the fine zone or on its border.
+    /// True if a point is in the fine zone or on its border.
     pub fn is_fine(&self, point: [usize; 3]) -> bool {
         (0..3).all(|axis| self.fine[axis].contains(&point[axis]))
     }
 
-    /// Index of a point in the even lattice.
+    /// Position of a point in steps of the even lattice.
     pub(crate) fn index(&self, point: [usize; 3]) -> Point3<f64> {
         Point3::from(std::array::from_fn(|axis| self.axes[axis][point[axis]]))
     }
 }
 
-/// Distances of planes from the fine zone up to `end`, in its steps: the fewest whose steps begin at most `growth` and grow by at most
-/// `growth` up to `coarsest`.
+/// Distances of the planes from the fine zone up to `end`, in fine steps. It uses as few planes as
+/// possible: each step is at most `growth` times the step before it, and at most `coarsest`.
 fn growing(end: f64, grading: &Grading) -> Vec<f64> {
     if end == 0.0 {
         return Vec::new();
     }
     let count = 1 + distances(grading.growth, grading.coarsest).take_while(|reach| *reach < end).count();
     let reach = |growth: f64| distances(growth, grading.coarsest).nth(count - 1).unwrap_or(end);
-    // One growth for all steps, found by halving: with growth 1 so many steps reach no further than `end`, which is whole.
+    // Bisection finds one common growth. With a growth of 1 this number of steps does not reach
+    // beyond `end`, which is a whole number.
     let (mut low, mut high) = (1.0, grading.growth);
     loop {
         let middle = f64::midpoint(low, high);
@@ -137,7 +145,7 @@ fn growing(end: f64, grading: &Grading) -> Vec<f64> {
     distances
 }
 
-/// Distances after one step, two steps, and so on without an end.
+/// Infinite sequence of distances after one step, two steps, and so on.
 fn distances(growth: f64, coarsest: f64) -> impl Iterator<Item = f64> {
     let steps =
         std::iter::successors(Some(growth.min(coarsest)), move |step| Some((step * growth).min(coarsest)));
@@ -187,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_graded_is_refused() {
+    fn invalid_gradings_and_zones_are_refused() {
         let all = [[0.0, 4.0]; 3];
         let grading = |growth, coarsest| Planes::new(&even([5; 3]), all, &Grading { growth, coarsest });
         for (growth, coarsest) in

@@ -1,4 +1,4 @@
-//! Static incisions: what they take out of a mesh, and the lips they leave.
+//! Static incisions: the vertices and elements that they remove, and the lips that they leave.
 
 use std::collections::HashSet;
 
@@ -10,90 +10,86 @@ use crate::neighbors::Neighbors;
 use crate::slit::{Facet, Slit, check_indices};
 use crate::{MeshError, NO_VERTEX, TetMesh};
 
-/// A straight cut along a segment on or near the skin. World millimeters.
+/// A straight incision along a segment on or near the skin, in world millimeters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Incision {
-    /// Start of the segment, mm.
+    /// Start of the segment in mm.
     pub from_mm: [f64; 3],
-    /// End of the segment, mm.
+    /// End of the segment in mm.
     pub to_mm: [f64; 3],
-    /// Depth below the local skin, mm.
+    /// Depth below the local skin in mm.
     pub depth_mm: f64,
-    /// Full width of what is taken out, mm.
+    /// Full width of the slit in mm.
     pub width_mm: f64,
 }
 
 /// Incisions planned on a mesh.
 ///
-/// A vertex is *removed* if it lies in a slit: within half the width, between start and end, no deeper below the local skin than the depth.
-/// Removed vertices leave all constraints (paper, §4.2). A tet, edge or triangle with an edge through the surface in the middle of a
-/// slit goes as well, so that the lips part even where the slit is narrower than a lattice step or oblique to it. What then hangs
-/// on no tet goes too: such vertices count as removed.
+/// A vertex is *removed* if it is in a slit: within half the width, between start and end, and not
+/// deeper below the local skin than the depth. Removed vertices are in no constraint (paper, §4.2).
+///
+/// Tets, edges and triangles with an edge through the middle surface of a slit are removed as well.
+/// Therefore the lips separate even if the slit is narrower than a lattice step or oblique to the
+/// lattice. Vertices that have no tet after that are also removed.
 #[derive(Clone, Debug)]
 pub struct Cut {
-    /// Per mesh vertex: in no constraint any more.
+    /// One flag per mesh vertex: true if the vertex is removed.
     pub removed: Vec<bool>,
     /// The slits, in the order of the incisions.
     pub slits: Vec<Slit>,
-    /// The gape of each, in the same order.
+    /// The gape of each slit, in the same order.
     pub gapes: Vec<Gape>,
-    /// Per mesh vertex: could be a corner of something that a slit cuts.
+    /// One flag per mesh vertex: true if a slit can cut an element with this corner.
     near: Vec<bool>,
 }
 
-/// What [`Cut::apply`] took out.
+/// The elements that [`Cut::apply`] removed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Removed {
-    /// The tets, in mesh vertices.
+    /// Removed tets, in mesh vertices.
     pub tets: Vec<[u32; 4]>,
-    /// The edges, in mesh vertices.
+    /// Removed edges, in mesh vertices.
     pub edges: Vec<[u32; 2]>,
-    /// Number of skin triangles.
+    /// Number of removed skin triangles.
     pub triangles: usize,
 }
 
 const EDGES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
 
 impl Cut {
-    /// Plans incisions on an uncut mesh with its skin `triangles` (mesh vertices, outward oriented). No incision gives a cut that takes nothing.
+    /// Plans the incisions of some slits ([`Slit::on_lattice`]) on an uncut mesh with its skin
+    /// `triangles` (mesh vertices, oriented outwards). Without slits the cut removes nothing.
     ///
     /// # Errors
-    /// [`MeshError::VertexIndex`] for a triangle of vertices that are not there; [`MeshError::IncisionSize`] for a length, depth or width that is
-    /// not finite and positive; [`MeshError::IncisionOffSkin`], [`MeshError::IncisionThroughSkin`], [`MeshError::IncisionEmpty`] and
-    /// [`MeshError::IncisionWithoutLips`] as they say.
-    pub fn plan(mesh: &TetMesh, triangles: &[[u32; 3]], incisions: &[Incision]) -> Result<Self, MeshError> {
-        Self::of_slits(mesh, triangles, Slit::on_mesh(mesh, triangles, incisions)?)
-    }
-
-    /// As [`Cut::plan`], with slits that were placed before ([`Slit::on_lattice`]) and may lie on skin which the mesh does not have.
-    ///
-    /// # Errors
-    /// As [`Cut::plan`], less those of placing; [`MeshError::IncisionBeyond`] if a slit touches what a region left out of the mesh,
-    /// or the coarse part of a graded lattice.
+    /// [`MeshError::VertexIndex`] if a triangle names a vertex that does not exist.
+    /// [`MeshError::IncisionBeyond`] if a slit touches tissue outside the region of the mesh or the
+    /// coarse part of a graded lattice. [`MeshError::IncisionEmpty`] if a slit cuts nothing.
+    /// [`MeshError::IncisionWithoutLips`] if it leaves no skin on one side.
     pub fn of_slits(mesh: &TetMesh, triangles: &[[u32; 3]], slits: Vec<Slit>) -> Result<Self, MeshError> {
         check_indices(triangles, mesh.positions.len())?;
-        // Whatever a slit cuts has all corners within a cell's diagonal of it.
+        // All corners of a cut element are within the diagonal of a cell from the slit.
         let margin = mesh.lattice.grid().affine.spacing_mm().iter().sum::<f64>() / 1000.0;
         check_within(mesh, &slits, margin)?;
         let near = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.near(p, margin))).collect();
-        let removed = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.holds(p))).collect();
+        let removed = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.contains(p))).collect();
         let mut cut = Self { removed, slits, gapes: Vec::new(), near };
-        cut.check_cuts_something(mesh)?;
-        cut.remove_loose(mesh);
+        cut.check_each_slit_cuts(mesh)?;
+        cut.remove_vertices_without_tets(mesh);
         cut.gapes = cut.find_lips(mesh, triangles)?;
         Ok(cut)
     }
 
-    /// Takes the incisions out of the mesh and its skin.
+    /// Removes the cut elements from the mesh and its skin.
     ///
-    /// Vertices keep their numbers, removed ones included. `mesh` and `triangles` are those of [`Cut::plan`].
+    /// All vertices keep their numbers, including the removed ones. `mesh` and `triangles` must be
+    /// those of [`Cut::of_slits`].
     pub fn apply(&self, mesh: &mut TetMesh, triangles: &mut Vec<[u32; 3]>) -> Removed {
         if self.slits.is_empty() {
             return Removed::default();
         }
-        let kept: Vec<bool> = mesh.tets.iter().map(|tet| !self.takes(&mesh.positions, tet)).collect();
-        // An edge near a slit stays if a kept tet has it; far from the slits all edges stay.
+        let kept: Vec<bool> = mesh.tets.iter().map(|tet| !self.cuts(&mesh.positions, tet)).collect();
+        // An edge near a slit stays if a kept tet has it. All edges far from the slits stay.
         let mut held = HashSet::new();
         for (tet, _) in mesh.tets.iter().zip(&kept).filter(|(_, kept)| **kept) {
             for (a, b) in EDGES.map(|(a, b)| (tet[a], tet[b])) {
@@ -111,30 +107,31 @@ impl Cut {
             }
             stays
         });
-        let taken = mesh.tets.iter().zip(&kept).filter(|(_, kept)| !**kept).map(|(tet, _)| *tet).collect();
+        let removed = mesh.tets.iter().zip(&kept).filter(|(_, kept)| !**kept).map(|(tet, _)| *tet).collect();
         let mut stays = kept.iter();
         mesh.tets.retain(|_| stays.next() != Some(&false));
-        triangles.retain(|triangle| !self.takes(&mesh.positions, triangle));
-        Removed { tets: taken, edges, triangles: faces - triangles.len() }
+        triangles.retain(|triangle| !self.cuts(&mesh.positions, triangle));
+        Removed { tets: removed, edges, triangles: faces - triangles.len() }
     }
 
-    /// Distance from a position at rest (local meters) to the nearest slit, mm; infinite without slits.
+    /// Distance in mm from a rest position (local meters) to the nearest slit. Infinite without
+    /// slits.
     pub fn distance_mm(&self, position: Point3<f32>) -> f64 {
         self.slits.iter().map(|slit| slit.distance(position) * 1000.0).fold(f64::INFINITY, f64::min)
     }
 
-    /// True if the line between two positions at rest passes through the middle of a slit.
+    /// True if the line between two rest positions passes through the middle surface of a slit.
     pub(crate) fn crosses(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
         self.slits.iter().any(|slit| slit.crosses(a, b))
     }
 
-    /// True if a position at rest lies in a slit.
-    pub(crate) fn holds(&self, position: Point3<f32>) -> bool {
-        self.slits.iter().any(|slit| slit.holds(position))
+    /// True if a rest position is in a slit.
+    pub(crate) fn contains(&self, position: Point3<f32>) -> bool {
+        self.slits.iter().any(|slit| slit.contains(position))
     }
 
-    /// True if a simplex has a removed corner or an edge through a slit.
-    fn takes<const N: usize>(&self, positions: &[Point3<f32>], simplex: &[u32; N]) -> bool {
+    /// True if a simplex has a removed corner or an edge through the middle surface of a slit.
+    fn cuts<const N: usize>(&self, positions: &[Point3<f32>], simplex: &[u32; N]) -> bool {
         if simplex.iter().any(|&v| self.removed[v as usize]) {
             return true;
         }
@@ -142,12 +139,12 @@ impl Cut {
             && pairs(simplex).any(|(a, b)| self.crosses(positions[a as usize], positions[b as usize]))
     }
 
-    fn check_cuts_something(&self, mesh: &TetMesh) -> Result<(), MeshError> {
+    fn check_each_slit_cuts(&self, mesh: &TetMesh) -> Result<(), MeshError> {
         for (incision, slit) in self.slits.iter().enumerate() {
             let near = |&v: &u32| self.near[v as usize];
             let crosses =
                 |[a, b]: &[u32; 2]| slit.crosses(mesh.positions[*a as usize], mesh.positions[*b as usize]);
-            let held = mesh.positions.iter().zip(&self.near).any(|(&p, &near)| near && slit.holds(p));
+            let held = mesh.positions.iter().zip(&self.near).any(|(&p, &near)| near && slit.contains(p));
             if !held && !mesh.edges.iter().any(|edge| edge.iter().all(near) && crosses(edge)) {
                 return Err(MeshError::IncisionEmpty { incision, step_mm: mesh.lattice.longest_step_mm() });
             }
@@ -155,18 +152,19 @@ impl Cut {
         Ok(())
     }
 
-    /// Vertices all of whose tets go are removed.
-    fn remove_loose(&mut self, mesh: &TetMesh) {
+    /// Removes the vertices whose tets are all cut.
+    fn remove_vertices_without_tets(&mut self, mesh: &TetMesh) {
         let mut held: Vec<bool> = self.near.iter().map(|near| !near).collect();
         for tet in mesh.tets.iter().filter(|tet| tet.iter().any(|&v| self.near[v as usize])) {
-            if !self.takes(&mesh.positions, tet) {
+            if !self.cuts(&mesh.positions, tet) {
                 tet.iter().for_each(|&v| held[v as usize] = true);
             }
         }
         self.removed.iter_mut().zip(held).for_each(|(removed, held)| *removed |= !held);
     }
 
-    /// Lip vertices: what is left of the skin triangles that a slit opens.
+    /// The gape of each slit. The lips are the remaining vertices of the skin triangles that the
+    /// slit opens.
     fn find_lips(&self, mesh: &TetMesh, triangles: &[[u32; 3]]) -> Result<Vec<Gape>, MeshError> {
         let step = mesh.lattice.longest_step_mm() / 1000.0;
         let gape = |(incision, slit): (usize, &Slit)| {
@@ -189,30 +187,33 @@ impl Cut {
     }
 }
 
-/// Refuses slits that touch a vertex of the body that a region froze, or that lies where a lattice is coarse: a slit touches what
-/// lies in it, what an edge joins with that, and both ends of an edge that it crosses. `margin`: how far from it that can be.
+/// Returns an error if a slit touches a vertex of the body outside the region or in the coarse part
+/// of a lattice.
+///
+/// A slit touches the vertices in it, their neighbors along edges, and both ends of each edge that
+/// it crosses. These are at most `margin` from the slit.
 fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshError> {
     let (lattice, grid) = (&mesh.lattice, mesh.lattice.grid());
-    let (planes, frozen) = (lattice.planes(), mesh.frozen.as_ref());
-    if slits.is_empty() || (planes.is_none() && frozen.is_none()) {
+    let (planes, inactive) = (lattice.planes(), mesh.inactive.as_ref());
+    if slits.is_empty() || (planes.is_none() && inactive.is_none()) {
         return Ok(());
     }
     let around = Neighbors::new(lattice);
-    let (vertex_of, place) =
+    let (vertex_of, position_of) =
         (mesh.vertex_of_point(), |point: usize| mesh.frame.to_local(lattice.mm(grid.point(point))));
-    let is_frozen = |point: usize| frozen.is_some_and(|frozen| frozen.points[point]);
+    let is_inactive = |point: usize| inactive.is_some_and(|inactive| inactive.points[point]);
     let touches = |slit: &Slit, point: usize, position: Point3<f32>| {
-        let mut touched = slit.holds(position);
+        let mut touched = slit.contains(position);
         around.of(point, |other| {
-            if vertex_of[other] != NO_VERTEX || is_frozen(other) {
-                touched |= slit.holds(place(other)) || slit.crosses(position, place(other));
+            if vertex_of[other] != NO_VERTEX || is_inactive(other) {
+                touched |= slit.contains(position_of(other)) || slit.crosses(position, position_of(other));
             }
         });
         touched
     };
     let refuse = |points: &mut dyn Iterator<Item = usize>, coarse: bool| {
         let touched = points.flat_map(|point| {
-            let position = place(point);
+            let position = position_of(point);
             let near = slits.iter().enumerate().filter(move |(_, slit)| slit.near(position, margin));
             near.filter(move |(_, slit)| touches(slit, point, position))
                 .map(move |(incision, slit)| (incision, slit.distance(position), position))
@@ -228,9 +229,9 @@ fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshE
         }
     };
     let vertices = || mesh.lattice_index.iter().map(|&point| point as usize);
-    if let Some(frozen) = frozen {
-        let border = vertices().zip(&frozen.border).filter(|(_, border)| **border).map(|(point, _)| point);
-        refuse(&mut border.chain((0..grid.len()).filter(|&point| frozen.points[point])), false)?;
+    if let Some(inactive) = inactive {
+        let border = vertices().zip(&inactive.border).filter(|(_, border)| **border).map(|(point, _)| point);
+        refuse(&mut border.chain((0..grid.len()).filter(|&point| inactive.points[point])), false)?;
     }
     if let Some(planes) = planes {
         refuse(&mut vertices().filter(|&point| !planes.is_fine(grid.point(point))), true)?;

@@ -1,4 +1,4 @@
-//! A grid of points whose cells are split into tetrahedra.
+//! Lattices: grids of points whose cells are split into tetrahedra.
 
 use std::sync::Arc;
 
@@ -10,25 +10,29 @@ use crate::MeshError;
 use crate::grading::Planes;
 use crate::stencil::Stencil;
 
-/// How a cell is split into tetrahedra.
+/// The split of a cell into tetrahedra.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// Six tets around the diagonal from the cell's lowest-index to its highest-index corner (Kuhn).
+    /// Six tets around the diagonal from the corner with the lowest index to the corner with the
+    /// highest index (Kuhn).
     #[default]
     Kuhn6,
-    /// A tet in the middle and one at each of four corners, mirrored in cells whose `i + j + k` is odd.
+    /// One tet in the middle and one at each of four corners, mirrored in cells with odd `i + j +
+    /// k`.
     ///
-    /// Face diagonals join lattice vertices whose `i + j + k` is even.
+    /// All face diagonals join lattice points with even `i + j + k`.
     Five,
 }
 
-/// A lattice: a grid of at least 2×2×2 points, and the split of its cells.
+/// A grid of at least 2×2×2 points whose cells are split into tetrahedra.
 ///
-/// Corners of a cell are numbered `di + 2 dj + 4 dk`; cell `(i, j, k)` has its corner 0 at point `(i, j, k)`.
+/// The corners of a cell are numbered `di + 2 dj + 4 dk`. Corner 0 of the cell `(i, j, k)` is the
+/// point `(i, j, k)`.
 ///
-/// The points lie evenly, or ([`Lattice::graded`]) on planes across each axis that are further apart away from a fine zone.
-/// Cells, tets, neighbors and colors are the same for both; only the places of the points differ.
+/// The points are evenly spaced, or, in a graded lattice ([`Lattice::graded`]), on planes that are
+/// farther apart outside a fine zone. Both kinds have the same cells, tets, neighbors and colors.
+/// Only the positions of the points differ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
     grid: Grid,
@@ -37,23 +41,25 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Most points a lattice may have: they are numbered in 32 bits, and `u32::MAX` means "none".
+    /// Largest number of points. Points have 32-bit indices, and `u32::MAX` means "none".
     pub const MAX_POINTS: usize = (u32::MAX - 1) as usize;
 
-    /// A lattice over the points of `grid`.
+    /// Creates a lattice over the points of `grid`.
     ///
     /// # Errors
-    /// [`MeshError::LatticeSize`] if an axis has fewer than 2 points or there are more than [`Lattice::MAX_POINTS`];
-    /// [`MeshError::LatticeExtent`] if positions or steps vanish or overflow in 32-bit meters.
+    /// [`MeshError::LatticeSize`] if an axis has fewer than 2 points or there are more than
+    /// [`Lattice::MAX_POINTS`]. [`MeshError::LatticeExtent`] if the steps or the extent exceed the
+    /// range of 32-bit meters.
     pub fn new(grid: Grid, split: Split) -> Result<Self, MeshError> {
         Self::check(&grid, grid.shape)?;
         Ok(Self { grid, split, planes: None })
     }
 
-    /// The lattice whose points lie where the planes of `planes` meet; their positions are in steps of `even`.
+    /// Creates a graded lattice. Its points are the intersections of `planes`, whose positions are
+    /// in steps of `even`.
     ///
     /// # Errors
-    /// As [`Lattice::new`], for `even`.
+    /// As [`Lattice::new`].
     pub fn graded(even: Grid, split: Split, planes: Planes) -> Result<Self, MeshError> {
         Self::check(&even, even.shape)?;
         let grid = Grid { shape: planes.shape(), affine: even.affine };
@@ -61,30 +67,35 @@ impl Lattice {
         Ok(Self { grid, split, planes: Some(Arc::new(planes)) })
     }
 
-    /// `reach`: points along each axis if they lay evenly.
-    fn check(grid: &Grid, reach: [usize; 3]) -> Result<(), MeshError> {
+    /// Checks the limits of [`Lattice::new`]. `even_shape` is the number of points along each axis
+    /// of the even lattice.
+    fn check(grid: &Grid, even_shape: [usize; 3]) -> Result<(), MeshError> {
         let shape = grid.shape;
         let points = shape[0].checked_mul(shape[1]).and_then(|n| n.checked_mul(shape[2]));
         if shape.iter().any(|&n| n < 2) || points.is_none_or(|n| n > Self::MAX_POINTS) {
             return Err(MeshError::LatticeSize { shape, max: Self::MAX_POINTS });
         }
         let spacing_mm = grid.affine.spacing_mm();
-        let extent = reach.iter().zip(spacing_mm).map(|(&n, step)| n as f64 * step / 1000.0).sum::<f64>();
-        // Volumes are products of three lengths: keep the cubes of step and extent within f32's normal range.
+        let extent =
+            even_shape.iter().zip(spacing_mm).map(|(&n, step)| n as f64 * step / 1000.0).sum::<f64>();
+        // Volumes are products of three lengths. The cubes of step and extent must be normal f32
+        // numbers.
         let smallest = spacing_mm.iter().fold(f64::INFINITY, |a, &b| a.min(b)) / 1000.0;
-        let holds = |length: f64| (1e-12..=1e12).contains(&length);
-        if !holds(smallest) || !holds(extent) {
+        let in_range = |length: f64| (1e-12..=1e12).contains(&length);
+        if !in_range(smallest) || !in_range(extent) {
             return Err(MeshError::LatticeExtent { spacing_mm, shape });
         }
         Ok(())
     }
 
-    /// The numbering of the points, and the affine map of the finest steps. Where a point lies is [`Lattice::mm`].
+    /// The grid that numbers the points. Its affine map has the steps of the fine zone. Use
+    /// [`Lattice::mm`] for the positions of points, and [`Grid::view`] to view values per point as
+    /// an array.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// World position of a point, mm.
+    /// World position of a point in mm.
     pub fn mm(&self, point: [usize; 3]) -> Point3<f64> {
         match &self.planes {
             None => self.grid.mm(point),
@@ -92,28 +103,30 @@ impl Lattice {
         }
     }
 
-    /// The planes of a graded lattice.
+    /// The planes of a graded lattice. `None` for an even lattice.
     pub fn planes(&self) -> Option<&Planes> {
         self.planes.as_deref()
     }
 
-    /// HU at each point, in the order of the numbering; filtered as [`sample::to_grid`] and [`sample::to_planes`] say.
+    /// Samples a volume at each point, in grid order, with the filter of [`sample::to_grid`] or
+    /// [`sample::to_planes`].
     ///
     /// # Errors
-    /// [`MeshError::File`] if the axes of the lattice are not those of the volume.
+    /// [`MeshError::Volume`] if the axes of the lattice are not those of the volume.
     pub fn sample(&self, volume: &Volume) -> Result<Vec<f32>, MeshError> {
-        Ok(match &self.planes {
-            None => sample::to_grid(volume, &self.grid)?,
-            Some(planes) => sample::to_planes(volume, &self.grid, planes.axes())?,
-        })
+        let hu = match &self.planes {
+            None => sample::to_grid(volume, &self.grid),
+            Some(planes) => sample::to_planes(volume, &self.grid, planes.axes()),
+        };
+        hu.map_err(MeshError::Volume)
     }
 
-    /// The split.
+    /// The split of the cells.
     pub fn split(&self) -> Split {
         self.split
     }
 
-    /// Cells per axis.
+    /// Number of cells along each axis.
     pub fn cells(&self) -> [usize; 3] {
         self.grid.shape.map(|n| n - 1)
     }
@@ -123,15 +136,15 @@ impl Lattice {
         self.cells().iter().product()
     }
 
-    /// Number of tets, tissue or not.
+    /// Number of tets in all cells.
     pub fn tet_count(&self) -> usize {
         self.cell_count() * self.stencil().tets[0].len()
     }
 
     /// The tets of a cell as corner numbers `di + 2 dj + 4 dk`, positively oriented in world space.
     ///
-    /// A tet `(a, b, c, d)` is positive if `(b − a) · ((c − a) × (d − a)) > 0`; for an affine that mirrors, the last two
-    /// corners change places.
+    /// A tet `(a, b, c, d)` is positive if `(b − a) · ((c − a) × (d − a)) > 0`. If the affine map
+    /// mirrors, the last two corners are swapped.
     ///
     /// ```
     /// use cutis_mesh::{Lattice, Split};
@@ -145,13 +158,14 @@ impl Lattice {
         &self.stencil().tets[(i + j + k) & 1]
     }
 
-    /// The point at a corner of a cell.
+    /// The point at a corner of the cell `(i, j, k)`.
     pub fn corner([i, j, k]: [usize; 3], corner: u8) -> [usize; 3] {
         let c = usize::from(corner);
         [i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)]
     }
 
-    /// Longest of the three lattice steps, mm; on a graded lattice of the steps in its fine zone.
+    /// Longest of the three lattice steps in mm. On a graded lattice these are the steps of the
+    /// fine zone.
     pub fn longest_step_mm(&self) -> f64 {
         self.grid.affine.spacing_mm().into_iter().fold(0.0, f64::max)
     }

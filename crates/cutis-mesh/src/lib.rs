@@ -1,6 +1,8 @@
-//! Tetrahedral lattices of CT volumes: meshes of tissue, skin detection, incisions, wound gape, mesh files.
+//! Tetrahedral lattices of CT volumes: meshes of tissue, skin detection, incisions, wound gape and
+//! mesh files.
 //!
-//! Mesh coordinates are local meters in 32 bits, placed by a [`Frame`]; millimeters appear only in names that end in `_mm`.
+//! Mesh coordinates are local meters in 32 bits. A [`Frame`] maps them to world millimeters. Names
+//! of values in millimeters end in `_mm`.
 #![forbid(unsafe_code)]
 
 mod build;
@@ -36,7 +38,7 @@ pub use shell::Shell;
 pub use skin::{Skin, SkinMode, SkinOptions, SkinReport};
 pub use slit::Slit;
 pub use surface::Topology;
-pub use tissue_mask::{Frozen, InactiveSkin, TissueMask};
+pub use tissue_mask::{InactiveSkin, InactiveTissue, TissueMask};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

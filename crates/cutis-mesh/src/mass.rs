@@ -1,4 +1,4 @@
-//! Volumes of tets, shares of edges in them, and lumped masses.
+//! Rest volumes of tets and edges, and lumped masses.
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -6,12 +6,13 @@ use rayon::prelude::*;
 use crate::TetMesh;
 
 impl TetMesh {
-    /// Rest volume of each tet, m³.
+    /// Rest volume of each tet in m³.
     pub fn tet_volumes(&self) -> Vec<f32> {
         self.tets.par_iter().map(|tet| self.volume(tet) as f32).collect()
     }
 
-    /// Each edge's share of the tets around it, m³: a sixth of each. The shares add up to the mesh's volume.
+    /// Volume of each edge in m³: one sixth of each tet around it. The sum is the volume of the
+    /// mesh.
     pub fn edge_volumes(&self) -> Vec<f32> {
         let vertices = self.positions.len();
         let mut starts = vec![0usize; vertices + 1];
@@ -31,9 +32,10 @@ impl TetMesh {
         shares.into_iter().map(|share| share as f32).collect()
     }
 
-    /// Lumped mass of each vertex, kg: a quarter of each tet's mass, whose density comes from the mean HU of its corners.
+    /// Lumped mass of each vertex in kg: one quarter of the mass of each tet around it. The density
+    /// of a tet in kg/m³ is `density_kg_m3` of the mean HU of its corners.
     ///
-    /// A vertex without a tet (in an incision) has mass 0.
+    /// A vertex without tets, as in an incision, has mass 0.
     pub fn masses(&self, density_kg_m3: &dyn Fn(f32) -> f32) -> Vec<f32> {
         let mut masses = vec![0f64; self.positions.len()];
         for tet in &self.tets {

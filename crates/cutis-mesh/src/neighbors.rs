@@ -1,8 +1,8 @@
-//! The lattice points that edges join with a point.
+//! The neighbors of lattice points along lattice edges.
 
 use crate::Lattice;
 
-/// Lattice edges around a point.
+/// Enumerates the neighbors of lattice points.
 pub(crate) struct Neighbors {
     shape: [usize; 3],
     steps: [Vec<([i8; 3], isize)>; 2],
@@ -14,7 +14,8 @@ impl Neighbors {
         let flat = |[i, j, k]: [i8; 3]| {
             i as isize + shape[0] as isize * (j as isize + shape[1] as isize * k as isize)
         };
-        // Diagonals join points of equal parity and every point has the axis steps, so that each step can be walked both ways.
+        // Each step also exists in the opposite direction: diagonals join points of equal parity,
+        // and every point has the axis steps.
         let steps = lattice.stencil().directions.each_ref().map(|directions| {
             let both = directions.iter().flat_map(|d| [d.step, d.step.map(|s| -s)]);
             both.map(|step| (step, flat(step))).collect()
@@ -22,6 +23,7 @@ impl Neighbors {
         Self { shape, steps }
     }
 
+    /// Calls `visit` for each neighbor of a point.
     pub fn of(&self, point: usize, mut visit: impl FnMut(usize)) {
         let [nx, ny, _] = self.shape;
         let at = [point % nx, point / nx % ny, point / (nx * ny)];

@@ -1,25 +1,25 @@
-//! Choosing vertices: by HU, by box, by half-space.
+//! Selection of points and vertices by half-space or box.
 
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{Lattice, MeshError, TetMesh};
 
-/// The side of a plane that its normal points to, in world millimeters.
+/// The half-space on one side of a plane, in world millimeters. The normal points into it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HalfSpace {
-    /// A point of the plane, mm.
+    /// A point of the plane in mm.
     pub point_mm: [f64; 3],
-    /// Points into the half-space; any length but zero.
+    /// Normal of the plane, pointing into the half-space. Its length must not be zero.
     pub normal: [f64; 3],
 }
 
 impl HalfSpace {
-    /// Checks the numbers.
+    /// Checks that all numbers are finite and the normal is not zero.
     ///
     /// # Errors
-    /// [`MeshError::Plane`] if one is not finite or the normal is zero.
+    /// [`MeshError::Plane`] if they are not.
     pub fn validate(&self) -> Result<(), MeshError> {
         let finite = self.point_mm.iter().chain(&self.normal).all(|v| v.is_finite());
         let length = Vector3::from(self.normal).norm();
@@ -29,13 +29,14 @@ impl HalfSpace {
         Err(MeshError::Plane { point_mm: self.point_mm, normal: self.normal })
     }
 
-    /// True if a point lies strictly inside.
+    /// True if a point is strictly inside.
     pub fn contains(&self, mm: Point3<f64>) -> bool {
         (mm - Point3::from(self.point_mm)).dot(&Vector3::from(self.normal)) > 0.0
     }
 }
 
-/// Points that are tissue (not `air`) and in none of the half-spaces cut away.
+/// One flag per lattice point: true if the point is not `air` and in none of the half-spaces
+/// `cut_away`.
 pub(crate) fn present(
     lattice: &Lattice,
     air: &[bool],
@@ -56,12 +57,7 @@ pub(crate) fn present(
 }
 
 impl TetMesh {
-    /// Vertices of at least `hu` (bone, for instance).
-    pub fn vertices_at_least_hu(&self, hu: f32) -> Vec<bool> {
-        self.hu.iter().map(|&value| value >= hu).collect()
-    }
-
-    /// Vertices in the closed box between two corners, mm; the corners may come in any order.
+    /// Selects the vertices in the closed box between two opposite corners in mm, in any order.
     pub fn vertices_in_box_mm(&self, corner: [f64; 3], opposite: [f64; 3]) -> Vec<bool> {
         let within = |axis: usize, v: f64| {
             let (a, b) = (corner[axis], opposite[axis]);
@@ -70,16 +66,17 @@ impl TetMesh {
         self.select_mm(|mm| (0..3).all(|axis| within(axis, mm[axis])))
     }
 
-    /// Vertices strictly inside a half-space.
+    /// Selects the vertices strictly inside a half-space.
     ///
     /// # Errors
-    /// [`MeshError::Plane`] as [`HalfSpace::validate`].
+    /// [`MeshError::Plane`] if the half-space is not valid.
     pub fn vertices_beyond(&self, half_space: &HalfSpace) -> Result<Vec<bool>, MeshError> {
         half_space.validate()?;
         Ok(self.select_mm(|mm| half_space.contains(mm)))
     }
 
-    /// Tests the exact positions of the lattice points, not their 32-bit roundings.
+    /// Selects vertices by the exact positions of their lattice points, not the rounded 32-bit
+    /// positions.
     fn select_mm(&self, inside: impl Fn(Point3<f64>) -> bool) -> Vec<bool> {
         let (lattice, grid) = (&self.lattice, self.lattice.grid());
         self.lattice_index.iter().map(|&point| inside(lattice.mm(grid.point(point as usize)))).collect()

@@ -1,45 +1,55 @@
-//! The layer of tets between the mesh and the air around it, which follows the mesh's motion.
+//! The shell: the layer of tets between the mesh and the surrounding air. It follows the motion of
+//! the mesh.
 //!
-//! Skin thinner than a lattice step, and the outer half-step of all skin, lies in tets with some air corners. They are in no constraint, but a
-//! deformed volume needs them: without them the outermost voxels of the body would stay behind.
+//! Skin thinner than a lattice step, and the outermost half-step of all skin, is in tets that have
+//! air corners. These tets are in no constraint. Resampling a deformed volume needs them, because
+//! otherwise the outermost voxels of the body would not move.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::cells::CornerBits;
 use crate::neighbors::Neighbors;
-use crate::{Cut, Frozen, Lattice, MeshError, NO_VERTEX, TetMesh};
+use crate::{Cut, InactiveTissue, Lattice, MeshError, NO_VERTEX, TetMesh};
 
-/// Tets with one to three air corners and at least one corner in the mesh.
+/// The tets with one to three air corners and at least one corner in the mesh.
 ///
-/// Corners below `first_extra` are mesh vertices; the others are the shell's own, `first_extra + n` at `positions[n]`.
+/// Corners below `first_extra` are mesh vertices. Corner `first_extra + n` is the extra vertex at
+/// `positions[n]`.
 #[derive(Clone, Debug)]
 pub struct Shell {
-    /// Number of mesh vertices, and so the index of the first extra vertex.
+    /// Index of the first extra vertex, equal to the number of mesh vertices.
     pub first_extra: u32,
-    /// Rest positions of the extra vertices, local meters, in lattice order.
+    /// Rest positions of the extra vertices in local meters, in lattice order.
     pub positions: Vec<Point3<f32>>,
-    /// Tets that move along, positively oriented at rest.
+    /// Tets that follow the mesh, positively oriented at rest.
     pub tets: Vec<[u32; 4]>,
-    /// Tets that a slit takes: with a corner in it (removed mesh vertex, or extra vertex in the slit), or with an edge across it.
+    /// Tets that a slit cuts: those with a removed mesh vertex, with an extra vertex in the slit,
+    /// or with an edge through its middle surface.
     pub removed: Vec<[u32; 4]>,
-    /// Extra vertex `n` follows `neighbors[offsets[n]..offsets[n + 1]]`.
+    /// Extra vertex `n` follows the mesh vertices `neighbors[offsets[n]..offsets[n + 1]]`.
     pub offsets: Vec<u32>,
-    /// Mesh vertices.
+    /// The followed mesh vertices of all extra vertices.
     pub neighbors: Vec<u32>,
-    /// Vertices of the body that a region left out and that extra vertex `n` follows besides: they hold it back.
+    /// Number of inactive vertices that extra vertex `n` also follows. These do not move, and so
+    /// reduce its motion.
     pub held_by: Vec<u32>,
 }
 
 impl Shell {
-    /// The shell of a mesh of this lattice. `air` is as for [`TetMesh::build`]; `cut` is what was cut out of the mesh.
+    /// Builds the shell of a mesh. `air` has one flag per lattice point, as in
+    /// [`Tissue`](crate::Tissue). `cut` is the cut of the mesh.
     ///
-    /// An extra vertex follows the mesh vertices that a lattice edge joins with it, except removed ones and those on the other side of a slit.
+    /// An extra vertex follows the mesh vertices to which a lattice edge joins it, except removed
+    /// vertices and vertices on the other side of a slit.
     ///
-    /// Of a mesh within a region ([`TetMesh::frozen`]) the shell is that part of the whole body's shell that can move. What the region left out
-    /// stays, and holds back what follows it, so that where the mesh moves as the whole body would, the shell does too.
+    /// For a mesh of a region ([`TetMesh::inactive`]), the shell is the part of the shell of the
+    /// whole body that can move. Inactive vertices count as followed vertices that do not move.
+    /// Therefore the shell moves like that of the whole body if the mesh does.
     ///
     /// # Errors
-    /// [`MeshError::Length`] if `air` has not one value per lattice point, or `cut` belongs to another mesh.
+    /// [`MeshError::Length`] if `air` does not have one value per lattice point, or if `cut`
+    /// belongs to another mesh. [`MeshError::LatticeSize`] if there are too many vertices for
+    /// 32-bit indices.
     pub fn new(mesh: &TetMesh, air: &[bool], cut: &Cut) -> Result<Self, MeshError> {
         let (grid, lattice) = (mesh.lattice.grid(), &mesh.lattice);
         if air.len() != grid.len() {
@@ -54,18 +64,18 @@ impl Shell {
             });
         }
         let mut vertex_of = mesh.vertex_of_point();
-        let found = match &mesh.frozen {
+        let found = match &mesh.inactive {
             None => {
                 let body: Vec<bool> = vertex_of.iter().map(|&vertex| vertex != NO_VERTEX).collect();
                 mixed_tets(lattice, air, &body, &body)
             }
-            Some(frozen) => {
+            Some(inactive) => {
                 let body: Vec<bool> = vertex_of
                     .iter()
-                    .zip(&frozen.points)
-                    .map(|(&v, &frozen)| v != NO_VERTEX || frozen)
+                    .zip(&inactive.points)
+                    .map(|(&v, &inactive)| v != NO_VERTEX || inactive)
                     .collect();
-                mixed_tets(lattice, air, &body, &moving(mesh, frozen, &body))
+                mixed_tets(lattice, air, &body, &moving(mesh, inactive, &body))
             }
         };
         let mut points: Vec<u32> = found.iter().flatten().copied().collect();
@@ -81,27 +91,29 @@ impl Shell {
         for (n, &point) in points.iter().enumerate() {
             vertex_of[point as usize] = (vertices + n) as u32;
         }
-        let place = |v: u32| match (v as usize).checked_sub(vertices) {
+        let position = |v: u32| match (v as usize).checked_sub(vertices) {
             Some(extra) => positions[extra],
             None => mesh.positions[v as usize],
         };
-        let gone: Vec<bool> = positions.iter().map(|&position| cut.holds(position)).collect();
-        let is_gone = |v: u32| match (v as usize).checked_sub(vertices) {
-            Some(extra) => gone[extra],
+        let in_slit: Vec<bool> = positions.iter().map(|&position| cut.contains(position)).collect();
+        let is_removed = |v: u32| match (v as usize).checked_sub(vertices) {
+            Some(extra) => in_slit[extra],
             None => cut.removed[v as usize],
         };
         let all = found.into_iter().map(|tet| tet.map(|point| vertex_of[point as usize]));
         let (removed, tets) = all.partition(|tet| {
-            tet.iter().any(|&v| is_gone(v))
-                || (0..4).any(|a| (0..a).any(|b| cut.crosses(place(tet[a]), place(tet[b]))))
+            tet.iter().any(|&v| is_removed(v))
+                || (0..4).any(|a| (0..a).any(|b| cut.crosses(position(tet[a]), position(tet[b]))))
         });
         let Followed { offsets, neighbors, held_by } = rows;
         Ok(Self { first_extra: vertices as u32, positions, tets, removed, offsets, neighbors, held_by })
     }
 
-    /// Deformed positions of the extra vertices: rest plus the mean displacement of the vertices each one follows.
+    /// Deformed positions of the extra vertices. Each moves by the mean displacement of the
+    /// vertices that it follows.
     ///
-    /// `rest` and `deformed` hold a position per mesh vertex. A vertex that follows none stays.
+    /// `rest` and `deformed` hold one position per mesh vertex in local meters. An extra vertex
+    /// that follows no vertex does not move.
     ///
     /// # Panics
     /// If there are fewer positions than mesh vertices.
@@ -117,18 +129,20 @@ impl Shell {
     }
 }
 
-/// Points that can move: mesh vertices within the region, and points outside the body that follow one.
-fn moving(mesh: &TetMesh, frozen: &Frozen, body: &[bool]) -> Vec<bool> {
+/// One flag per lattice point: true if the point can move. These are the mesh vertices in the
+/// region and the points outside the body that follow them.
+fn moving(mesh: &TetMesh, inactive: &InactiveTissue, body: &[bool]) -> Vec<bool> {
     let around = Neighbors::new(&mesh.lattice);
     let mut moving = vec![false; body.len()];
-    for (&point, _) in mesh.lattice_index.iter().zip(&frozen.border).filter(|(_, border)| !**border) {
+    for (&point, _) in mesh.lattice_index.iter().zip(&inactive.border).filter(|(_, border)| !**border) {
         moving[point as usize] = true;
         around.of(point as usize, |neighbor| moving[neighbor] |= !body[neighbor]);
     }
     moving
 }
 
-/// Lattice tets with an air corner, a corner in the body, and a corner that can move, as flat lattice indices.
+/// The lattice tets with an air corner, a corner in the body and a corner that can move, as flat
+/// lattice indices.
 fn mixed_tets(lattice: &Lattice, air: &[bool], body: &[bool], moving: &[bool]) -> Vec<[u32; 4]> {
     let (grid, [_, cy, cz]) = (lattice.grid(), lattice.cells());
     let corners = [air, body, moving].map(|points| CornerBits::new(lattice, points));
@@ -152,7 +166,7 @@ fn mixed_tets(lattice: &Lattice, air: &[bool], body: &[bool], moving: &[bool]) -
     found
 }
 
-/// Rows of mesh vertices, one row per extra vertex, and how many frozen ones each follows besides.
+/// The vertices that the extra vertices follow: see the fields of [`Shell`].
 struct Followed {
     offsets: Vec<u32>,
     neighbors: Vec<u32>,
@@ -162,14 +176,15 @@ struct Followed {
 impl Followed {
     fn by(mesh: &TetMesh, cut: &Cut, vertex_of: &[u32], points: &[u32], positions: &[Point3<f32>]) -> Self {
         let around = Neighbors::new(&mesh.lattice);
-        let frozen = |point: usize| mesh.frozen.as_ref().is_some_and(|frozen| frozen.points[point]);
+        let is_inactive =
+            |point: usize| mesh.inactive.as_ref().is_some_and(|inactive| inactive.points[point]);
         let mut rows = Self { offsets: vec![0], neighbors: Vec::new(), held_by: Vec::new() };
         for (&point, &position) in points.iter().zip(positions) {
             let mut held_by = 0;
-            // What a region left out follows nobody.
-            if !frozen(point as usize) {
+            // Inactive vertices follow no vertex.
+            if !is_inactive(point as usize) {
                 around.of(point as usize, |neighbor| match vertex_of[neighbor] {
-                    NO_VERTEX => held_by += u32::from(frozen(neighbor)),
+                    NO_VERTEX => held_by += u32::from(is_inactive(neighbor)),
                     vertex if cut.removed[vertex as usize] => {}
                     vertex if cut.crosses(position, mesh.positions[vertex as usize]) => {}
                     vertex => rows.neighbors.push(vertex),

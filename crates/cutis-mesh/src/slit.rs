@@ -1,18 +1,22 @@
-//! Where an incision lies: a frame on the skin, and the skin's height along it.
+//! The geometry of an incision: its axes on the skin and the height of the skin along it.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::incision::Incision;
-use crate::{Frame, Lattice, MeshError, TetMesh};
+use crate::{Frame, Lattice, MeshError};
 
-/// Most stations and bins along one slit; bounds the work for absurdly long segments.
+/// Largest number of sample points and bins along one slit. It limits the work for very long
+/// segments.
 const MOST_BINS: f64 = 1024.0;
 
-/// An incision placed on the skin of a mesh at rest. All lengths in meters, positions in the mesh's local frame.
+/// An incision placed on the skin at rest. Lengths are in meters, positions in local meters.
 ///
-/// Axes: *along* from start to end; *inward* against the mean outward skin normal near the segment, made orthogonal to it; *lateral* =
-/// inward × along, with the left lip at negative and the right lip at positive lateral coordinate. *Depth* is counted along the inward axis from
-/// the local skin, whose height follows the skin near the slit, so that curved skin is cut evenly.
+/// It has three orthogonal axes. *Along* points from start to end. *Inward* is opposite to the mean
+/// outward normal of the skin near the segment. *Lateral* is inward × along: the left lip has
+/// negative and the right lip positive lateral coordinates.
+///
+/// *Depth* is measured along the inward axis from the local skin. The height of the local skin
+/// varies along the slit, so that curved skin is cut to an even depth.
 #[derive(Clone, Debug)]
 pub struct Slit {
     start: Point3<f64>,
@@ -22,29 +26,33 @@ pub struct Slit {
     pub(crate) length: f64,
     half_width: f64,
     depth: f64,
-    /// How far above the local skin the slit still removes things.
+    /// Height above the local skin up to which the slit removes elements.
     above: f64,
-    /// Height of the skin along the inward axis, relative to the segment, in the middle of equal bins over the length.
+    /// Coordinate of the skin along the inward axis, relative to the segment, in the middle of
+    /// equal bins along it.
     skin: Vec<f64>,
 }
 
-/// Coordinates in the frame of a slit, m.
+/// Coordinates of a point with respect to a slit, in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SlitPoint {
     pub along: f64,
     pub lateral: f64,
-    /// Below the local skin.
+    /// Depth below the local skin.
     pub depth: f64,
 }
 
 impl Slit {
-    /// Places incisions on the skin of a lattice: `skin` holds triangles in flat lattice indices ([`crate::TissueMask::skin`]). No mesh is
-    /// needed, so that what of the body becomes one can depend on where the slits lie. On the mesh of the whole body they are the
-    /// slits of [`crate::Cut::plan`].
+    /// Places incisions on the skin of a lattice. `skin` holds triangles in flat lattice indices
+    /// ([`crate::TissueMask::skin`]).
+    ///
+    /// This needs no mesh, so the region that is meshed can depend on the slits.
     ///
     /// # Errors
-    /// [`MeshError::VertexIndex`] for a triangle of points that are not there, [`MeshError::IncisionSize`], [`MeshError::IncisionOffSkin`]
-    /// and [`MeshError::IncisionThroughSkin`] as they say.
+    /// [`MeshError::VertexIndex`] if a triangle names a point that does not exist.
+    /// [`MeshError::IncisionSize`] if a length, depth or width is not finite and positive.
+    /// [`MeshError::IncisionOffSkin`] if a segment is too far from the skin.
+    /// [`MeshError::IncisionThroughSkin`] if it pierces the skin.
     pub fn on_lattice(
         lattice: &Lattice,
         skin: &[[u32; 3]],
@@ -53,36 +61,22 @@ impl Slit {
         let (grid, frame) = (lattice.grid(), Frame::center_of(lattice.grid()));
         check_indices(skin, grid.len())?;
         let position = |point: u32| frame.to_local(lattice.mm(grid.point(point as usize)));
-        let ground = Ground::new(frame, lattice, skin, &position);
+        let surface = SkinSurface::new(frame, lattice, skin, &position);
         incisions
             .iter()
             .enumerate()
-            .map(|(number, incision)| Self::place(&ground, number, incision))
+            .map(|(number, incision)| Self::place(&surface, number, incision))
             .collect()
     }
 
-    /// The slits of [`Slit::on_lattice`], on a mesh with its skin in mesh vertices.
-    pub(crate) fn on_mesh(
-        mesh: &TetMesh,
-        skin: &[[u32; 3]],
-        incisions: &[Incision],
-    ) -> Result<Vec<Self>, MeshError> {
-        check_indices(skin, mesh.positions.len())?;
-        let position = |vertex: u32| mesh.positions[vertex as usize];
-        let ground = Ground::new(mesh.frame, &mesh.lattice, skin, &position);
-        incisions
-            .iter()
-            .enumerate()
-            .map(|(number, incision)| Self::place(&ground, number, incision))
-            .collect()
-    }
-
-    /// Finds the slit's frame and the skin's height along it.
+    /// Finds the axes of the slit and the height of the skin along it.
     ///
-    /// The segment must come within `reach` = max(depth, a quarter of the length, two lattice steps) of the center of a skin triangle: enough for
-    /// the chord of a strongly curved belly. Along at least half of it there must be skin within reach above or below.
-    pub(crate) fn place(ground: &Ground<'_>, number: usize, cut: &Incision) -> Result<Self, MeshError> {
-        let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - ground.frame.origin_mm) / 1000.0);
+    /// Let `reach` be the largest of the depth, a quarter of the length and two lattice steps. This
+    /// suffices for a segment under strongly curved skin. The segment must come within `reach` of
+    /// the center of a skin triangle. Along at least half of the segment there must be skin within
+    /// `reach` above or below it.
+    fn place(surface: &SkinSurface<'_>, number: usize, cut: &Incision) -> Result<Self, MeshError> {
+        let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - surface.frame.origin_mm) / 1000.0);
         let (start, end) = (local(cut.from_mm), local(cut.to_mm));
         let length = (end - start).norm();
         let sizes = [("length", length * 1000.0), ("depth_mm", cut.depth_mm), ("width_mm", cut.width_mm)];
@@ -91,7 +85,7 @@ impl Slit {
         }
         let along = (end - start) / length;
         let (depth, half_width) = (cut.depth_mm / 1000.0, cut.width_mm / 2000.0);
-        let (step, facets) = (ground.step, &ground.facets);
+        let (step, facets) = (surface.step, &surface.facets);
         let reach = depth.max(length / 4.0).max(2.0 * step);
 
         let from_segment = |facet: &Facet| {
@@ -115,7 +109,8 @@ impl Slit {
         let places = (0..stations).map(|n| start + along * (length * (n as f64 + 0.5) / stations as f64));
         let normal = mean_normal(&near, places, 2.0 * step);
         let outward = normal - along * normal.dot(&along);
-        // An unsteady direction: the skin is steeper than about 84° to the segment, or its two sides face away from each other.
+        // The direction is not reliable if the angle between skin and segment is above about 84°,
+        // or if the normals cancel.
         if outward.norm() < 0.1 {
             return Err(MeshError::IncisionThroughSkin {
                 incision: number,
@@ -128,7 +123,7 @@ impl Slit {
         let lateral = inward.cross(&along);
         let mut slit =
             Self { start, along, lateral, inward, length, half_width, depth, above: reach, skin: Vec::new() };
-        let (heights, on_skin) = slit.heights(ground);
+        let (heights, on_skin) = slit.heights(surface);
         if 2 * on_skin < heights.len() {
             let from = |end: Point3<f64>| {
                 facets.iter().map(|facet| (facet.center - end).norm()).fold(f64::INFINITY, f64::min)
@@ -139,26 +134,27 @@ impl Slit {
         Ok(slit)
     }
 
-    /// Mean height of the skin in bins of about two lattice steps, and in how many of them there is skin. The others take theirs
-    /// from their neighbors.
-    fn heights(&self, ground: &Ground<'_>) -> (Vec<f64>, usize) {
-        let step = ground.step;
+    /// Mean height of the skin in bins of about two lattice steps, and the number of bins with
+    /// skin. The height in a bin without skin is interpolated.
+    fn heights(&self, surface: &SkinSurface<'_>) -> (Vec<f64>, usize) {
+        let step = surface.step;
         let count = (self.length / (2.0 * step)).floor().clamp(1.0, MOST_BINS) as usize;
         let mut bins: Vec<Vec<f64>> = vec![Vec::new(); count];
-        let facing = ground
+        let facing = surface
             .triangles
             .iter()
-            .zip(&ground.facets)
+            .zip(&surface.facets)
             .filter(|(_, facet)| facet.area_vector.dot(&self.inward) < 0.0);
         let mut vertices: Vec<u32> = facing.flat_map(|(triangle, _)| *triangle).collect();
         vertices.sort_unstable();
         vertices.dedup();
         for vertex in vertices {
-            let from_start = (ground.position)(vertex).cast::<f64>() - self.start;
+            let from_start = (surface.position)(vertex).cast::<f64>() - self.start;
             let (s, t, q) =
                 (from_start.dot(&self.along), from_start.dot(&self.lateral), from_start.dot(&self.inward));
-            let beside = t.abs() <= self.half_width + 1.5 * step && (-step..=self.length + step).contains(&s);
-            if beside && q.abs() <= self.above + step {
+            let over_slit =
+                t.abs() <= self.half_width + 1.5 * step && (-step..=self.length + step).contains(&s);
+            if over_slit && q.abs() <= self.above + step {
                 bins[((s / self.length * count as f64).max(0.0) as usize).min(count - 1)].push(q);
             }
         }
@@ -166,12 +162,12 @@ impl Slit {
             .iter_mut()
             .enumerate()
             .filter(|(_, heights)| !heights.is_empty())
-            .map(|(bin, heights)| (bin as f64, steady_mean(heights, 2.0 * step)))
+            .map(|(bin, heights)| (bin as f64, robust_mean(heights, 2.0 * step)))
             .collect();
         ((0..count).map(|bin| interpolate(&known, bin as f64)).collect(), known.len())
     }
 
-    /// Coordinates of a position at rest.
+    /// Coordinates of a rest position.
     pub(crate) fn coordinates(&self, position: Point3<f64>) -> SlitPoint {
         let from_start = position - self.start;
         let along = from_start.dot(&self.along);
@@ -187,25 +183,28 @@ impl Slit {
         }
     }
 
-    /// True in the volume cut out: along the segment, within half the width, down to the depth, and above the skin.
-    pub(crate) fn holds(&self, position: Point3<f32>) -> bool {
+    /// True if a rest position is in the slit: along the segment, within half the width, and not
+    /// below the depth.
+    pub(crate) fn contains(&self, position: Point3<f32>) -> bool {
         let point = self.coordinates(position.cast());
         point.lateral.abs() <= self.half_width && self.in_middle_surface(point)
     }
 
-    /// True if the slit cuts a simplex with these corners at rest: one of them lies in it, or an edge passes through its middle.
-    pub fn takes(&self, corners: &[Point3<f32>]) -> bool {
+    /// True if the slit cuts a simplex with these corners at rest: a corner is in the slit, or an
+    /// edge crosses its middle surface.
+    pub fn cuts(&self, corners: &[Point3<f32>]) -> bool {
         corners
             .iter()
             .enumerate()
-            .any(|(n, &a)| self.holds(a) || corners[n + 1..].iter().any(|&b| self.crosses(a, b)))
+            .any(|(n, &a)| self.contains(a) || corners[n + 1..].iter().any(|&b| self.crosses(a, b)))
     }
 
-    /// True if the straight line between two positions meets the surface in the middle of the slit (lateral = 0).
+    /// True if the straight line between two rest positions crosses the middle surface of the slit
+    /// (lateral = 0).
     pub(crate) fn crosses(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
         let (a, b) = (a.cast::<f64>(), b.cast::<f64>());
         let (left, right) = ((a - self.start).dot(&self.lateral), (b - self.start).dot(&self.lateral));
-        // A position in the surface itself belongs to the right, so that every line has one answer.
+        // A position exactly in the plane counts as right, so that every line has one answer.
         if (left < 0.0) == (right < 0.0) {
             return false;
         }
@@ -217,7 +216,7 @@ impl Slit {
         (0.0..=self.length).contains(&point.along) && (-self.above..=self.depth).contains(&point.depth)
     }
 
-    /// True if a position is within `margin` of the box around everything the slit can touch.
+    /// True if a rest position is within `margin` of the box around the slit.
     pub(crate) fn near(&self, position: Point3<f32>, margin: f64) -> bool {
         let point = self.coordinates(position.cast());
         (-margin..=self.length + margin).contains(&point.along)
@@ -225,7 +224,7 @@ impl Slit {
             && (-self.above - margin..=self.depth + margin).contains(&point.depth)
     }
 
-    /// Distance from a position at rest to the surface in the middle of the slit, m.
+    /// Distance in m from a rest position to the middle surface of the slit.
     pub fn distance(&self, position: Point3<f32>) -> f64 {
         let point = self.coordinates(position.cast());
         let beyond = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
@@ -233,23 +232,23 @@ impl Slit {
         Vector3::new(s, point.lateral, d).norm()
     }
 
-    /// Length of the segment, m.
+    /// Length of the segment in m.
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// Unit vector from start to end.
+    /// Unit vector from the start to the end of the segment.
     pub fn along(&self) -> Vector3<f64> {
         self.along
     }
 
-    /// The point of the skin above the middle of the slit, local meters, at rest.
+    /// The point of the skin above the middle of the slit at rest, in local meters.
     pub fn middle(&self) -> Point3<f64> {
         let height = self.skin.get(self.skin.len() / 2).copied().unwrap_or(0.0);
         self.start + self.along * (self.length / 2.0) + self.inward * height
     }
 
-    /// Unit vector across the slit, from the left lip to the right one.
+    /// Unit vector across the slit, from the left to the right lip.
     pub fn lateral(&self) -> Vector3<f64> {
         self.lateral
     }
@@ -260,18 +259,18 @@ impl Slit {
     }
 }
 
-/// The skin that slits are placed on.
-pub(crate) struct Ground<'a> {
+/// The skin on which slits are placed.
+pub(crate) struct SkinSurface<'a> {
     frame: Frame,
-    /// Longest lattice step, m.
+    /// Longest lattice step in m.
     step: f64,
     triangles: &'a [[u32; 3]],
-    /// Place of a corner at rest, local meters.
+    /// Rest position of a corner in local meters.
     position: &'a dyn Fn(u32) -> Point3<f32>,
     facets: Vec<Facet>,
 }
 
-impl<'a> Ground<'a> {
+impl<'a> SkinSurface<'a> {
     pub fn new(
         frame: Frame,
         lattice: &Lattice,
@@ -283,7 +282,7 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// A skin triangle's center, and its outward normal times its area.
+/// Center and area vector (outward normal times area) of a skin triangle.
 pub(crate) struct Facet {
     center: Point3<f64>,
     pub area_vector: Vector3<f64>,
@@ -299,7 +298,7 @@ impl Facet {
     }
 }
 
-/// Refuses triangles of vertices that are not there.
+/// Returns an error if a triangle names a vertex that does not exist.
 pub(crate) fn check_indices(triangles: &[[u32; 3]], vertices: usize) -> Result<(), MeshError> {
     let outside = |triangle: &[u32; 3]| triangle.iter().copied().find(|&vertex| vertex as usize >= vertices);
     match triangles.iter().enumerate().find_map(|(n, triangle)| Some((n, outside(triangle)?))) {
@@ -310,9 +309,10 @@ pub(crate) fn check_indices(triangles: &[[u32; 3]], vertices: usize) -> Result<(
     }
 }
 
-/// Mean over places of the area-weighted normal of the skin that is closest to each place, give or take `spread`.
+/// Mean of the skin normals at some places. The normal at a place is the area-weighted mean of the
+/// triangles whose distance is at most `spread` above the smallest distance.
 ///
-/// Its length is below 1 where normals differ, and near 0 where they cancel.
+/// The result is shorter than 1 if normals differ, and near 0 if they cancel.
 fn mean_normal(facets: &[&Facet], places: impl Iterator<Item = Point3<f64>>, spread: f64) -> Vector3<f64> {
     let (mut sum, mut count) = (Vector3::zeros(), 0.0);
     for place in places {
@@ -330,8 +330,9 @@ fn mean_normal(facets: &[&Facet], places: impl Iterator<Item = Point3<f64>>, spr
     if count > 0.0 { sum / count } else { sum }
 }
 
-/// Mean of the values within `spread` of the median: a second surface above or below does not pull it away.
-fn steady_mean(values: &mut [f64], spread: f64) -> f64 {
+/// Mean of the values within `spread` of the median, so that a second surface above or below has no
+/// influence.
+fn robust_mean(values: &mut [f64], spread: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let median = values[values.len() / 2];
     let close = values.iter().filter(|v| (*v - median).abs() <= spread);
@@ -339,7 +340,8 @@ fn steady_mean(values: &mut [f64], spread: f64) -> f64 {
     sum / count
 }
 
-/// Piecewise linear through `known` (ascending), constant beyond its ends, 0 without any.
+/// Piecewise linear interpolation of `known` (ascending). It is constant beyond the ends, and 0
+/// without values.
 fn interpolate(known: &[(f64, f64)], at: f64) -> f64 {
     let next = known.partition_point(|(x, _)| *x < at);
     match (next.checked_sub(1).and_then(|n| known.get(n)), known.get(next)) {

@@ -1,4 +1,5 @@
-//! What is the same in every cell of a lattice: tets, their neighbors across faces, edge directions.
+//! Tables that are the same for every cell of a lattice: tets, their neighbors across faces, and
+//! edge directions.
 
 use std::sync::LazyLock;
 
@@ -7,37 +8,40 @@ use crate::Split;
 /// The tet on the other side of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Neighbor {
-    /// Cell offset; zero for a tet of the same cell.
+    /// Offset of its cell. Zero for a tet of the same cell.
     pub offset: [i8; 3],
-    /// Which tet of that cell.
+    /// Number of the tet within that cell.
     pub tet: u8,
-    /// Corner of that cell which the face does not have.
+    /// The corner of the tet that is not in the face, as a corner number of that cell.
     pub opposite: u8,
 }
 
-/// An edge that starts at a point, towards a point of higher flat index.
+/// A direction of edges from a point to a point of higher flat index.
 #[derive(Clone, Debug)]
 pub(crate) struct Direction {
     pub step: [i8; 3],
     /// Number of the direction within the split, for colors.
     pub number: u16,
-    /// Cells around the edge, as offsets from its first point, and which of their tets have the edge.
+    /// Cells around the edge, as offsets from its first point, each with a mask of its tets that
+    /// have the edge.
     pub cells: Vec<([i8; 3], u8)>,
 }
 
-/// Tables of one split and handedness. Index `[parity]` is `(i + j + k) & 1` of the cell or point.
+/// Tables for one split and handedness. The index `[parity]` is `(i + j + k) & 1` of the cell or
+/// point.
 #[derive(Debug)]
 pub(crate) struct Stencil {
     pub tets: [Vec<[u8; 4]>; 2],
-    /// Corners present (bit per corner) → tets whose four corners are present (bit per tet).
+    /// `[parity][corners]`: mask of the tets whose four corners are all in the mask `corners`.
     pub kept: [[u8; 256]; 2],
-    /// Tets present → corners they use.
+    /// `[parity][tets]`: mask of the corners of the tets in the mask `tets`.
     pub corners: [[u8; 64]; 2],
-    /// Corners that are air → number of tets with 0, 1, 2, 3, 4 air corners.
+    /// `[parity][air]`: number of tets with 0, 1, 2, 3 and 4 corners in the mask `air`.
     pub air_corners: [[[u8; 5]; 256]; 2],
-    /// `[tet][f]`: the neighbor across the face opposite to the tet's corner `f`.
+    /// `[parity][tet][f]`: the neighbor across the face opposite to corner `f` of the tet.
     pub neighbors: [Vec<[Neighbor; 4]>; 2],
-    /// By parity of the edge's first point, ascending in flat index of the second point.
+    /// `[parity]` of the first point: the directions, ascending by the flat index of the second
+    /// point.
     pub directions: [Vec<Direction>; 2],
 }
 
@@ -88,13 +92,13 @@ impl Stencil {
     }
 }
 
-/// One tet per order in which the three axes are walked from corner 0 to corner 7; orders ascending.
+/// One tet for each order of the three axis steps from corner 0 to corner 7, in ascending order.
 fn kuhn6() -> Vec<[u8; 4]> {
     let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     orders.iter().map(|[a, b, _]| [0, 1 << a, 1 << a | 1 << b, 7]).collect()
 }
 
-/// The middle tet, then the four at its faces. `mirror` is 0 or 7.
+/// The middle tet and the four tets at its faces. `mirror` is 0 or 7.
 fn five(mirror: u8) -> Vec<[u8; 4]> {
     let middle = [0, 3, 5, 6].map(|corner| corner ^ mirror);
     let at_corner = |apex: u8| [apex, apex ^ 1, apex ^ 2, apex ^ 4];
@@ -116,7 +120,7 @@ fn neighbors(tets: &[Vec<[u8; 4]>; 2], parity: usize) -> Vec<[Neighbor; 4]> {
     let across = |tet: usize, f: usize| {
         let own = tets[parity][tet];
         let face: Vec<[i8; 3]> = (0..4).filter(|&v| v != f).map(|v| place(own[v])).collect();
-        // A face whose three corners agree on an axis lies between two cells.
+        // A face whose three corners have the same coordinate along an axis is between two cells.
         let plane = (0..3).find(|&axis| face.iter().all(|p| p[axis] == face[0][axis]));
         let mut offset = [0i8; 3];
         if let Some(axis) = plane {
@@ -185,7 +189,7 @@ fn directions(tets: &[Vec<[u8; 4]>; 2]) -> [Vec<Direction>; 2] {
     found
 }
 
-/// Sorts steps as the flat index does: `k`, then `j`, then `i`.
+/// A sort key that orders steps by their flat index: by `k`, then `j`, then `i`.
 fn flat_order([i, j, k]: [i8; 3]) -> i32 {
     i32::from(i) + 4 * i32::from(j) + 16 * i32::from(k)
 }

@@ -1,4 +1,4 @@
-//! Triangulated surfaces: the faces of a mesh, and what a set of triangles is topologically.
+//! Triangulated surfaces: the boundary faces of meshes, and the topology of triangle sets.
 
 use rayon::prelude::*;
 
@@ -6,15 +6,17 @@ use crate::cells::CellMasks;
 use crate::stencil::Neighbor;
 use crate::{Lattice, TetMesh};
 
-/// The face of a positive tet opposite to its corner `f`, in the order that is counter-clockwise seen from outside.
+/// The face opposite to corner `f` of a positive tet, with its corners counterclockwise as seen
+/// from outside.
 ///
-/// In a positive tet `(a, b, c, d)` the face `b, c, d` has its normal away from `a`.
+/// In a positive tet `(a, b, c, d)` the normal of the face `b, c, d` points away from `a`.
 pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 impl TetMesh {
-    /// The faces that belong to exactly one of the mesh's tets, oriented outward, in the order of the tets.
+    /// The faces that belong to exactly one tet of the mesh, in the order of the tets.
     ///
-    /// Seen from outside, the three vertices run counter-clockwise in world space.
+    /// They are oriented outwards: as seen from outside, the three vertices are counterclockwise in
+    /// world space.
     pub fn boundary(&self) -> Vec<[u32; 3]> {
         let (masks, vertex_of) = (self.cell_masks(), self.vertex_of_point());
         let grid = self.lattice.grid();
@@ -30,17 +32,18 @@ impl TetMesh {
     }
 }
 
-/// Calls `visit(cell, tet, f, neighbor)` for each tet in a layer and each of its faces `f` across which `masks` has no tet.
+/// Calls `visit(cell, tet, f, neighbor)` for each tet in a layer and each of its faces `f` without
+/// a tet of `masks` on the other side.
 fn open_faces(masks: &CellMasks, k: usize, mut visit: impl FnMut([usize; 3], &[u8; 4], usize, &Neighbor)) {
-    let ways = |parity: usize| -> Vec<[(isize, u8); 4]> {
-        let way = |n: &Neighbor| (masks.delta(n.offset), 1 << n.tet);
-        masks.stencil.neighbors[parity].iter().map(|faces| faces.each_ref().map(way)).collect()
+    let across = |parity: usize| -> Vec<[(isize, u8); 4]> {
+        let neighbor = |n: &Neighbor| (masks.delta(n.offset), 1 << n.tet);
+        masks.stencil.neighbors[parity].iter().map(|faces| faces.each_ref().map(neighbor)).collect()
     };
-    let ways = [ways(0), ways(1)];
+    let across = [across(0), across(1)];
     masks.for_layer(k, |cell, flat, mask| {
         let parity = cell.iter().sum::<usize>() & 1;
         for (t, tet) in masks.stencil.tets[parity].iter().enumerate().filter(|(t, _)| mask >> t & 1 == 1) {
-            for (f, (delta, bit)) in ways[parity][t].iter().enumerate() {
+            for (f, (delta, bit)) in across[parity][t].iter().enumerate() {
                 if masks.bytes[flat.wrapping_add_signed(*delta)] & bit == 0 {
                     visit(cell, tet, f, &masks.stencil.neighbors[parity][t][f]);
                 }
@@ -49,14 +52,16 @@ fn open_faces(masks: &CellMasks, k: usize, mut visit: impl FnMut([usize; 3], &[u
     });
 }
 
-/// A face of a lattice tet, with its three points as flat lattice indices.
+/// A face of a lattice tet.
 pub(crate) struct LatticeFace {
+    /// The three points as flat lattice indices, oriented outwards.
     pub triangle: [u32; 3],
-    /// The lattice point of the tet on the other side that the face does not have.
+    /// The lattice point of the tet on the other side that is not in the face.
     pub opposite: usize,
 }
 
-/// Faces between a tet in `masks` and a tet that is not, outward oriented; faces on the box of the lattice are left out.
+/// The faces between a tet in `masks` and a tet that is not in it. Faces on the box of the lattice
+/// are not included.
 pub(crate) fn faces(lattice: &Lattice, masks: &CellMasks) -> Vec<LatticeFace> {
     let (grid, cells) = (lattice.grid(), lattice.cells());
     let layer = |k: usize| {
@@ -73,7 +78,7 @@ pub(crate) fn faces(lattice: &Lattice, masks: &CellMasks) -> Vec<LatticeFace> {
     (0..cells[2]).into_par_iter().flat_map_iter(layer).collect()
 }
 
-/// The neighboring cell, if it is within the lattice.
+/// The cell of a neighbor, if it is within the lattice.
 pub(crate) fn step(cell: [usize; 3], neighbor: &Neighbor, cells: [usize; 3]) -> Option<[usize; 3]> {
     let mut to = cell;
     for axis in 0..3 {
@@ -85,23 +90,23 @@ pub(crate) fn step(cell: [usize; 3], neighbor: &Neighbor, cells: [usize; 3]) -> 
     Some(to)
 }
 
-/// What a set of triangles is as a surface.
+/// Topology of a set of triangles.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
-    /// Distinct vertices of the triangles.
+    /// Number of distinct vertices.
     pub vertices: usize,
-    /// Edges of exactly one triangle, each as its two vertices, lower first.
+    /// Edges of exactly one triangle, each with the lower vertex first.
     pub open_edges: Vec<[u32; 2]>,
     /// Number of edges of more than two triangles.
     pub non_manifold_edges: usize,
-    /// Parts that share no vertex with each other.
+    /// Number of parts that share no vertex.
     pub components: usize,
-    /// Vertices − edges + triangles: 2 for a sphere.
+    /// Vertices − edges + triangles. It is 2 for a sphere.
     pub euler_characteristic: i64,
 }
 
 impl Topology {
-    /// Of triangles that are all different.
+    /// Computes the topology of distinct triangles.
     pub fn of(triangles: &[[u32; 3]]) -> Self {
         let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]].map(|[p, q]| [p.min(q), p.max(q)]);
         let mut edges: Vec<[u32; 2]> = triangles.iter().flat_map(sides).collect();

@@ -1,4 +1,4 @@
-//! Which tets of a lattice are the body, told for the whole of it; and meshes of all or of a part of that body.
+//! The body as a set of lattice tets, and meshes of the whole body or of a region.
 
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -8,7 +8,8 @@ use crate::cells::{CellMasks, CornerBits};
 use crate::select::present;
 use crate::{Lattice, MeshError, Skin, TetMesh, Tissue, component, edges};
 
-/// The body of a lattice, before anything of it is left out.
+/// The body: the tissue tets of a lattice. It is the input for meshes of the whole body or of a
+/// region.
 #[derive(Clone)]
 pub struct TissueMask {
     lattice: Lattice,
@@ -18,27 +19,40 @@ pub struct TissueMask {
     dropped_tets: usize,
 }
 
-/// What a region left out of a mesh: it never moves, and is in no constraint.
+/// The tissue outside the region of a mesh. It never moves and is in no constraint.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frozen {
-    /// Per lattice point: a vertex of the whole body that the mesh does not have.
+pub struct InactiveTissue {
+    /// One flag per lattice point: true if it is a vertex of the body but not of the mesh.
     pub points: Vec<bool>,
-    /// Per mesh vertex: outside the region, and there only because a tet reaches across its border. Such vertices must be held.
+    /// One flag per mesh vertex: true if it is outside the region. Such a vertex belongs to a tet
+    /// that reaches across the border of the region. It must be fixed.
     pub border: Vec<bool>,
-    /// Vertices left out.
+    /// Number of vertices that are not in the mesh.
     pub vertices: usize,
-    /// Edges left out.
+    /// Number of edges that are not in the mesh.
     pub edges: usize,
-    /// Tets left out.
+    /// Number of tets that are not in the mesh.
     pub tets: usize,
 }
 
 impl TissueMask {
-    /// Keeps the tets whose four corners are tissue; of them the largest part, if so asked.
+    /// Finds the tets with four tissue corners, and optionally their largest component.
+    ///
+    /// ```
+    /// use cutis_mesh::{Lattice, Split, Tissue, TissueMask};
+    /// use cutis_volume::{Affine, Grid};
+    /// let grid = Grid { shape: [3, 3, 3], affine: Affine::from_spacing([2.0; 3], [0.0; 3])? };
+    /// let lattice = Lattice::new(grid, Split::Kuhn6)?;
+    /// let tissue = Tissue { air: &[false; 27], cut_away: &[], largest_component: true };
+    /// let mesh = TissueMask::find(&lattice, &tissue)?.mesh(&[40.0; 27])?;
+    /// assert_eq!((mesh.positions.len(), mesh.edges.len(), mesh.tets.len()), (27, 98, 48));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
-    /// [`MeshError::Length`] if `tissue.air` has not one value per lattice point, [`MeshError::Plane`] for a bad half-space,
-    /// [`MeshError::NoTissue`] if no tet is kept.
+    /// [`MeshError::Length`] if `tissue.air` does not have one value per lattice point.
+    /// [`MeshError::Plane`] if a half-space is not valid. [`MeshError::NoTissue`] if there is no
+    /// such tet.
     pub fn find(lattice: &Lattice, tissue: &Tissue<'_>) -> Result<Self, MeshError> {
         let present = present(lattice, tissue.air, tissue.cut_away)?;
         let all = CellMasks::of_points(lattice, &present);
@@ -61,34 +75,37 @@ impl TissueMask {
         Ok(Self { lattice: lattice.clone(), masks, vertices, components, dropped_tets })
     }
 
-    /// The lattice.
+    /// The lattice of the body.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
-    /// Per lattice point: a vertex of the body.
+    /// One flag per lattice point: true if it is a vertex of the body.
     pub fn vertices(&self) -> &[bool] {
         &self.vertices
     }
 
-    /// Per lattice point: a vertex of the body at a position (world mm) that is chosen.
+    /// One flag per lattice point: true if it is a vertex of the body and `chosen` is true for its
+    /// position in world mm.
     pub fn vertices_where(&self, chosen: impl Fn(Point3<f64>) -> bool + Sync) -> Vec<bool> {
         let grid = self.lattice.grid();
         let vertex = |(point, &vertex): (usize, &bool)| vertex && chosen(self.lattice.mm(grid.point(point)));
         self.vertices.par_iter().enumerate().map(vertex).collect()
     }
 
-    /// Face-connected components among the tissue tets, before any was dropped; 1 where they were not told apart.
+    /// Number of face-connected components of the tissue, before the smaller ones were dropped. It
+    /// is 1 if components were not searched for.
     pub fn components(&self) -> usize {
         self.components
     }
 
-    /// Tissue tets that were dropped with the smaller components.
+    /// Number of tissue tets in the components that were dropped.
     pub fn dropped_tets(&self) -> usize {
         self.dropped_tets
     }
 
-    /// Skin triangles all of whose points are vertices of the body, in lattice indices, and how many others there are.
+    /// The skin triangles whose points are all vertices of the body, in flat lattice indices, and
+    /// the number of other triangles.
     pub fn skin(&self, skin: &Skin) -> (Vec<[u32; 3]>, usize) {
         let of_body = |point: &u32| self.vertices.get(*point as usize).copied().unwrap_or(false);
         let triangles: Vec<[u32; 3]> =
@@ -97,16 +114,21 @@ impl TissueMask {
         (triangles, others)
     }
 
-    /// The mesh of the whole body. `hu` holds a value per lattice point, in grid order.
+    /// Builds the mesh of the whole body. `hu` holds one value per lattice point, in grid order.
     ///
     /// # Errors
-    /// [`MeshError::Length`] for an array of another length, [`MeshError::NotFinite`] for a HU value of a vertex that is NaN or infinite.
+    /// [`MeshError::Length`] if `hu` does not have one value per lattice point.
+    /// [`MeshError::NotFinite`] if the HU value of a vertex is NaN or infinite.
     pub fn mesh(&self, hu: &[f32]) -> Result<TetMesh, MeshError> {
         TetMesh::from_masks(self, hu, &self.masks)
     }
 
-    /// The mesh of a region: the tets with at least one corner `inside` (a flag per lattice point, in grid order). Only these are ever
-    /// listed. [`TetMesh::frozen`] tells what was left out, and which vertices lie outside and must be held.
+    /// Builds the mesh of a region: the tets with at least one corner `inside`. `inside` has one
+    /// flag per lattice point, in grid order.
+    ///
+    /// [`TetMesh::inactive`] describes the tissue that is not in the mesh, and the mesh vertices
+    /// outside the region, which must be fixed. Memory and time depend only on the region, except
+    /// for flags per lattice point.
     ///
     /// # Errors
     /// As [`TissueMask::mesh`], and [`MeshError::RegionEmpty`] if no vertex of the body is inside.
@@ -123,7 +145,7 @@ impl TissueMask {
         let mut mesh = TetMesh::from_masks(self, hu, &masks)?;
         let mut points = self.vertices.clone();
         mesh.lattice_index.iter().for_each(|&point| points[point as usize] = false);
-        mesh.frozen = Some(Frozen {
+        mesh.inactive = Some(InactiveTissue {
             border: mesh.lattice_index.iter().map(|&point| !inside[point as usize]).collect(),
             vertices: points.iter().filter(|&&point| point).count(),
             edges: edges::count(grid, &self.masks, &self.vertices) - mesh.edges.len(),
@@ -134,31 +156,39 @@ impl TissueMask {
     }
 }
 
-/// The skin that a region left out, for those who want to see the whole body.
+/// The skin outside the region of a mesh. It does not move, but pictures and mesh files of the
+/// whole body show it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InactiveSkin {
-    /// Corners below the mesh's number of vertices are mesh vertices; the others are `positions`, counted from there.
+    /// Triangles. Let `n` be the number of mesh vertices. Corners below `n` are mesh vertices, and
+    /// corner `n + m` is at `positions[m]`.
     pub triangles: Vec<[u32; 3]>,
-    /// Local meters, in lattice order.
+    /// Positions of the vertices that are not in the mesh, in local meters and lattice order.
     pub positions: Vec<Point3<f32>>,
     /// Flat index of the lattice point of each position.
     pub lattice_index: Vec<u32>,
 }
 
 impl TetMesh {
-    /// Divides a skin of the whole body (lattice indices, as [`TissueMask::skin`] gives it): triangles that can move, in mesh vertices, and
-    /// the others, all of whose corners are frozen or held by a region. Without a region all of them can move.
+    /// Divides the skin of the whole body, given in lattice indices by [`TissueMask::skin`], into
+    /// triangles that can move and triangles that cannot.
+    ///
+    /// The first are returned in mesh vertices. A triangle cannot move if all of its corners are
+    /// outside the region. Without a region all triangles can move.
+    ///
+    /// # Panics
+    /// If a triangle names a point that is not in the lattice.
     pub fn divide_skin(&self, skin: &[[u32; 3]]) -> (Vec<[u32; 3]>, InactiveSkin) {
         let vertex_of = self.vertex_of_point();
         let on_mesh = |triangle: &[u32; 3]| triangle.map(|point| vertex_of[point as usize]);
-        let Some(frozen) = &self.frozen else {
+        let Some(inactive) = &self.inactive else {
             return (skin.iter().map(on_mesh).collect(), InactiveSkin::default());
         };
-        let free = |&vertex: &u32| !frozen.border[vertex as usize];
+        let free = |&vertex: &u32| !inactive.border[vertex as usize];
         let moves = |corners: [u32; 3]| !corners.contains(&NO_VERTEX) && corners.iter().any(free);
-        let (moving, still): (Vec<[u32; 3]>, Vec<[u32; 3]>) =
+        let (moving, fixed): (Vec<[u32; 3]>, Vec<[u32; 3]>) =
             skin.iter().copied().partition(|triangle| moves(on_mesh(triangle)));
-        let mut points: Vec<u32> = still.iter().flatten().copied().collect();
+        let mut points: Vec<u32> = fixed.iter().flatten().copied().collect();
         points.retain(|&point| vertex_of[point as usize] == NO_VERTEX);
         points.sort_unstable();
         points.dedup();
@@ -167,15 +197,15 @@ impl TetMesh {
             NO_VERTEX => (vertices + points.partition_point(|&other| other < point)) as u32,
             vertex => vertex,
         };
-        let place = |&point: &u32| self.frame.to_local(self.lattice.mm(grid.point(point as usize)));
-        let triangles = still.iter().map(|triangle| triangle.map(corner)).collect();
-        let positions = points.iter().map(place).collect();
-        let still = InactiveSkin { triangles, positions, lattice_index: points };
-        (moving.iter().map(on_mesh).collect(), still)
+        let position = |&point: &u32| self.frame.to_local(self.lattice.mm(grid.point(point as usize)));
+        let triangles = fixed.iter().map(|triangle| triangle.map(corner)).collect();
+        let positions = points.iter().map(position).collect();
+        let inactive_skin = InactiveSkin { triangles, positions, lattice_index: points };
+        (moving.iter().map(on_mesh).collect(), inactive_skin)
     }
 }
 
-/// Drops the tets without a corner inside.
+/// Removes the tets without a corner inside.
 fn keep_touched(lattice: &Lattice, masks: &mut CellMasks, inside: &[bool]) {
     let corners = CornerBits::new(lattice, inside);
     let [_, cy, cz] = masks.shape;

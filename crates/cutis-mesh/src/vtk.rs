@@ -1,7 +1,9 @@
-//! VTU (tets or triangles) and VTP (triangles) files, for ParaView, PyVista and 3D Slicer.
+//! Writes VTU files (tets or triangles) and VTP files (triangles) for ParaView, PyVista and 3D
+//! Slicer.
 //!
-//! XML with appended raw little-endian data: `Float32` points in world mm, `UInt32` connectivity, `UInt64` block lengths. The frame the
-//! coordinates are in stands in the field data as `SPACE` (3D Slicer reads it).
+//! The files are XML with appended raw little-endian data: `Float32` points in world mm, `UInt32`
+//! connectivity and `UInt64` block lengths. The field data `SPACE` names the world frame of the
+//! coordinates. 3D Slicer reads it.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -16,32 +18,34 @@ use crate::{Frame, MeshError};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Space {
-    /// Left, posterior, superior: 3D Slicer's and DICOM's. The first two coordinates are the negatives of RAS.
+    /// Left, posterior, superior: the frame of 3D Slicer and DICOM. The first two coordinates are
+    /// the negatives of those in RAS.
     #[default]
     Lps,
-    /// Right, anterior, superior: NIfTI's, and ours inside.
+    /// Right, anterior, superior: the frame of NIfTI and of Cutis.
     Ras,
 }
 
-/// Values at the points; one per position. The name carries the unit: `hu`, `displacement_mm`.
+/// A named array with one value per position. The name should include the unit: `hu`,
+/// `displacement_mm`.
 #[derive(Clone, Copy, Debug)]
 pub struct PointData<'a> {
-    /// Letters, digits, `_`, `-` and `.`.
+    /// Name of the array: letters, digits, `_`, `-` and `.`.
     pub name: &'a str,
     /// The values.
     pub values: PointValues<'a>,
 }
 
-/// One value or vector per position.
+/// One number or vector per position.
 #[derive(Clone, Copy, Debug)]
 pub enum PointValues<'a> {
     /// Numbers.
     Scalars(&'a [f32]),
-    /// Vectors in RAS+ axes; turned into the space of the file.
+    /// Vectors in RAS+ axes. They are converted to the space of the file.
     Vectors(&'a [[f32; 3]]),
 }
 
-/// Cells over the positions.
+/// The cells of a mesh file, as indices of positions.
 #[derive(Clone, Copy, Debug)]
 pub enum Cells<'a> {
     /// Tetrahedra.
@@ -50,12 +54,12 @@ pub enum Cells<'a> {
     Triangles(&'a [[u32; 3]]),
 }
 
-/// What is written. Positions that no cell uses are left out, with their data.
+/// The content of a mesh file. Positions that no cell uses are not written, nor are their values.
 #[derive(Clone, Copy, Debug)]
 pub struct Piece<'a> {
-    /// Where the positions lie in the world.
+    /// Frame of the positions.
     pub frame: &'a Frame,
-    /// Local meters.
+    /// Positions in local meters.
     pub positions: &'a [Point3<f32>],
     /// The cells.
     pub cells: Cells<'a>,
@@ -65,7 +69,7 @@ pub struct Piece<'a> {
 
 /// Writes an unstructured grid (`.vtu`) of tets or triangles.
 ///
-/// The file appears under its name once it is complete.
+/// The file appears under its name when it is complete.
 ///
 /// ```
 /// use cutis_mesh::{Frame, vtk};
@@ -82,43 +86,44 @@ pub struct Piece<'a> {
 /// ```
 ///
 /// # Errors
-/// [`MeshError::VertexIndex`], [`MeshError::PointData`] or [`MeshError::ArrayName`] for a piece that does not fit together,
-/// [`MeshError::TooManyCells`] beyond 32-bit offsets, [`MeshError::File`] or [`MeshError::Write`] for what the file system says.
+/// [`MeshError::VertexIndex`], [`MeshError::PointData`] or [`MeshError::ArrayName`] if the piece is
+/// not consistent. [`MeshError::TooManyCells`] if the offsets exceed 32 bits. [`MeshError::Volume`]
+/// or [`MeshError::Write`] if the file cannot be written.
 pub fn write_vtu(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), MeshError> {
-    File::new(path, space, piece, Kind::UnstructuredGrid)?.write()
+    MeshFile::new(path, space, piece, Format::UnstructuredGrid)?.write()
 }
 
 /// Writes a surface (`.vtp`) of triangles.
 ///
 /// # Errors
-/// As [`write_vtu`], and [`MeshError::NotASurface`] for tets.
+/// As [`write_vtu`], and [`MeshError::NotASurface`] if the cells are tets.
 pub fn write_vtp(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), MeshError> {
     if let Cells::Tets(_) = piece.cells {
         return Err(MeshError::NotASurface { path: path.to_path_buf() });
     }
-    File::new(path, space, piece, Kind::PolyData)?.write()
+    MeshFile::new(path, space, piece, Format::PolyData)?.write()
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum Format {
     UnstructuredGrid,
     PolyData,
 }
 
-/// A checked piece, its points numbered.
-struct File<'a> {
+/// A checked piece that is ready to be written.
+struct MeshFile<'a> {
     path: &'a Path,
     space: Space,
     piece: &'a Piece<'a>,
-    kind: Kind,
+    format: Format,
     connectivity: &'a [u32],
     corners: usize,
-    /// Positions that are written, ascending.
+    /// Indices of the positions to write, ascending.
     used: Vec<u32>,
 }
 
-impl<'a> File<'a> {
-    fn new(path: &'a Path, space: Space, piece: &'a Piece<'a>, kind: Kind) -> Result<Self, MeshError> {
+impl<'a> MeshFile<'a> {
+    fn new(path: &'a Path, space: Space, piece: &'a Piece<'a>, format: Format) -> Result<Self, MeshError> {
         let (connectivity, corners) = match piece.cells {
             Cells::Tets(tets) => (bytemuck::cast_slice(tets), 4),
             Cells::Triangles(triangles) => (bytemuck::cast_slice(triangles), 3),
@@ -163,7 +168,7 @@ impl<'a> File<'a> {
             }
         }
         let used = (0..points as u32).filter(|&point| is_used[point as usize]).collect();
-        Ok(Self { path, space, piece, kind, connectivity, corners, used })
+        Ok(Self { path, space, piece, format, connectivity, corners, used })
     }
 
     fn write(&self) -> Result<(), MeshError> {
@@ -180,9 +185,9 @@ impl<'a> File<'a> {
 
     fn header(&self, out: &mut impl Write) -> io::Result<()> {
         let (points, cells) = (self.used.len(), self.connectivity.len() / self.corners);
-        let (kind, name) = match self.kind {
-            Kind::UnstructuredGrid => ("UnstructuredGrid", "Cells"),
-            Kind::PolyData => ("PolyData", "Polys"),
+        let (element, name) = match self.format {
+            Format::UnstructuredGrid => ("UnstructuredGrid", "Cells"),
+            Format::PolyData => ("PolyData", "Polys"),
         };
         let space = match self.space {
             Space::Lps => "LPS",
@@ -190,9 +195,9 @@ impl<'a> File<'a> {
         };
         let codes: Vec<String> = space.bytes().chain([0]).map(|byte| byte.to_string()).collect();
         let mut offset = 0usize;
-        let mut array = |kind: &str, name: &str, components: usize, count: usize, size: usize| {
+        let mut array = |data_type: &str, name: &str, components: usize, count: usize, size: usize| {
             let tag = format!(
-                r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="appended" offset="{offset}"/>"#
+                r#"<DataArray type="{data_type}" Name="{name}" NumberOfComponents="{components}" format="appended" offset="{offset}"/>"#
             );
             offset += 8 + count * components * size;
             tag
@@ -200,20 +205,20 @@ impl<'a> File<'a> {
         writeln!(out, r#"<?xml version="1.0"?>"#)?;
         writeln!(
             out,
-            r#"<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
+            r#"<VTKFile type="{element}" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
         )?;
-        writeln!(out, "<{kind}>\n<FieldData>")?;
+        writeln!(out, "<{element}>\n<FieldData>")?;
         writeln!(
             out,
             r#"<Array type="String" Name="SPACE" NumberOfTuples="1" format="ascii">{}</Array>"#,
             codes.join(" ")
         )?;
         writeln!(out, "</FieldData>")?;
-        match self.kind {
-            Kind::UnstructuredGrid => {
+        match self.format {
+            Format::UnstructuredGrid => {
                 writeln!(out, r#"<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">"#)?;
             }
-            Kind::PolyData => writeln!(
+            Format::PolyData => writeln!(
                 out,
                 r#"<Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{cells}">"#
             )?,
@@ -226,13 +231,13 @@ impl<'a> File<'a> {
         writeln!(out, "</PointData>\n<Points>\n{}\n</Points>", array("Float32", "Points", 3, points, 4))?;
         writeln!(out, "<{name}>\n{}", array("UInt32", "connectivity", 1, self.connectivity.len(), 4))?;
         writeln!(out, "{}", array("UInt32", "offsets", 1, cells, 4))?;
-        if self.kind == Kind::UnstructuredGrid {
+        if self.format == Format::UnstructuredGrid {
             writeln!(out, "{}", array("UInt8", "types", 1, cells, 1))?;
         }
-        write!(out, "</{name}>\n</Piece>\n</{kind}>\n<AppendedData encoding=\"raw\">\n_")
+        write!(out, "</{name}>\n</Piece>\n</{element}>\n<AppendedData encoding=\"raw\">\n_")
     }
 
-    /// The arrays, in the order of the header, each behind its length in bytes.
+    /// Writes the arrays in the order of the header, each after its length in bytes.
     fn blocks(&self, out: &mut impl Write) -> io::Result<()> {
         let (points, cells) = (self.used.len(), self.connectivity.len() / self.corners);
         let length = |out: &mut dyn Write, bytes: usize| out.write_all(&(bytes as u64).to_le_bytes());
@@ -266,7 +271,7 @@ impl<'a> File<'a> {
             .try_for_each(|&point| out.write_all(&number[point as usize].to_le_bytes()))?;
         length(out, 4 * cells)?;
         (1..=cells).try_for_each(|cell| out.write_all(&((cell * self.corners) as u32).to_le_bytes()))?;
-        if self.kind == Kind::UnstructuredGrid {
+        if self.format == Format::UnstructuredGrid {
             // VTK_TRIANGLE is 5, VTK_TETRA is 10.
             let code = if self.corners == 3 { 5 } else { 10 };
             length(out, cells)?;

@@ -68,7 +68,7 @@ impl Body {
         let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
         drop(hu);
         if mesh.dropped_tets > 0 {
-            let frozen = mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets);
+            let frozen = mesh.inactive.as_ref().map_or(0, |frozen| frozen.tets);
             warnings.push(format!(
                 "{} of {} tissue tetrahedra lie apart from the largest part and were left out (tissue.keep = \"largest\")",
                 mesh.dropped_tets,
@@ -120,7 +120,7 @@ impl Body {
     /// Which vertices the scene fixes, those on the border of its region included.
     pub(crate) fn fixed(&self, loaded: &LoadedScene) -> Result<Vec<bool>, Error> {
         let (mesh, section) = (&self.mesh, &loaded.scene.fixed);
-        let beyond = mesh.frozen.as_ref().map(|frozen| frozen.border.clone());
+        let beyond = mesh.inactive.as_ref().map(|frozen| frozen.border.clone());
         let mut fixed = beyond.unwrap_or_else(|| vec![false; mesh.positions.len()]);
         let mut add =
             |which: Vec<bool>| fixed.iter_mut().zip(which).for_each(|(fixed, other)| *fixed |= other);

@@ -65,7 +65,7 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
         colors.insert(Distance::NAME.into(), groups.len());
     }
     if let Some(volume) = &scene.constraints.volume {
-        let groups = Groups::from_colors(&mesh.tet_classes(&mesh.tets))?;
+        let groups = Groups::from_colors(&mesh.tet_colors(&mesh.tets))?;
         builder = add_volume(builder, volume, compliant, mesh, &groups)
             .map_err(loaded.blame("constraints.volume"))?;
         colors.insert(Volume::NAME.into(), groups.len());
@@ -83,7 +83,7 @@ pub(crate) fn build(loaded: &LoadedScene, body: &Body) -> Result<Dynamics, Error
         .filter(|_| formulation == FormulationChoice::Xpbd && !body.skin.is_empty());
     let skin_rate = skin_rate.map(|stc| skin_rate_of(body, stc, &inverse_masses));
     if formulation == FormulationChoice::Vbd {
-        builder = builder.vertex_groups(Groups::from_colors(&mesh.vertex_classes())?);
+        builder = builder.vertex_groups(Groups::from_colors(&mesh.vertex_colors())?);
     }
     for (n, handle) in scene.handle.iter().enumerate() {
         let radius_m = handle.radius_mm / 1000.0;

@@ -163,7 +163,7 @@ impl Error {
             | Self::Chain(_)
             | Self::Coloring(_) => true,
             Self::SceneSection { source, .. } => source.is_bad_input(),
-            Self::Volume(e) | Self::Mesh(MeshError::File(e)) => {
+            Self::Volume(e) | Self::Mesh(MeshError::Volume(e)) => {
                 !matches!(e, VolumeError::Io { action: "write" | "create", .. })
             }
             Self::Mesh(e) => !matches!(e, MeshError::Write { .. }),

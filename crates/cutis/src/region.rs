@@ -147,7 +147,7 @@ pub(crate) fn check_handles(loaded: &LoadedScene, mesh: &TetMesh) -> Result<(), 
         );
         Err(key(loaded, name, &zone.map(shown).unwrap_or_default(), &why))
     };
-    if let Some(frozen) = &mesh.frozen {
+    if let Some(frozen) = &mesh.inactive {
         let zone = section.region.as_ref().and_then(|region| region.zone());
         let border = mesh.positions.iter().zip(&frozen.border).filter(|(_, border)| **border);
         let beyond = frozen.points.iter().enumerate().filter(|(_, frozen)| **frozen);
@@ -173,7 +173,7 @@ impl Body {
     /// Largest displacement of a vertex that shares a tetrahedron with one that the region holds, mm: what of the motion
     /// arrives where the region ends. None without a region that leaves something out.
     pub(crate) fn border_displacement_mm(&self, deformed: &[Point3<f32>]) -> Option<f64> {
-        let frozen = self.mesh.frozen.as_ref().filter(|frozen| frozen.tets > 0)?;
+        let frozen = self.mesh.inactive.as_ref().filter(|frozen| frozen.tets > 0)?;
         let at_border = |tet: &&[u32; 4]| tet.iter().any(|&v| frozen.border[v as usize]);
         let moved =
             |&v: &u32| f64::from((deformed[v as usize] - self.mesh.positions[v as usize]).norm()) * 1e3;
@@ -190,7 +190,7 @@ impl Body {
 /// What a region and a graded lattice leave out, in words. `memory` is what the solver takes.
 pub(crate) fn left_out(body: &Body, memory: &[MemoryPart], lines: &mut Vec<String>) {
     let mesh = &body.mesh;
-    if let Some(frozen) = mesh.frozen.as_ref().filter(|frozen| frozen.tets > 0) {
+    if let Some(frozen) = mesh.inactive.as_ref().filter(|frozen| frozen.tets > 0) {
         let kept_and_left = |part: &str| match part {
             "vertices" => (mesh.positions.len(), frozen.vertices),
             "distance" => (mesh.edges.len(), frozen.edges),
@@ -226,7 +226,7 @@ pub(crate) fn left_out(body: &Body, memory: &[MemoryPart], lines: &mut Vec<Strin
 
 /// A region that saves nothing is worth a note.
 pub(crate) fn idle(body: &Body) -> Option<String> {
-    let frozen = body.mesh.frozen.as_ref()?;
+    let frozen = body.mesh.inactive.as_ref()?;
     (frozen.tets == 0).then(|| "lattice.region holds the whole body: it leaves nothing out".to_owned())
 }
 

@@ -2,7 +2,7 @@
 
 use cutis_coloring::Groups;
 use cutis_constraints::{Distance, Scalar, Volume, distance_compliance, volume_compliance};
-use cutis_mesh::{Lattice, Split, TetMesh, Tissue};
+use cutis_mesh::{Lattice, Split, Tissue, TissueMask};
 use cutis_newton::{Minimum, Options, Problem};
 use cutis_solver::{Stiffness, System, SystemBuilder, Values};
 use cutis_volume::{Affine, Grid};
@@ -68,7 +68,7 @@ impl Beam {
         let lattice = Lattice::new(grid, Split::Kuhn6)?;
         let count = lattice.grid().len();
         let tissue = Tissue { air: &vec![false; count], cut_away: &[], largest_component: false };
-        let mesh = TetMesh::build(&lattice, &vec![0.0; count], &tissue)?;
+        let mesh = TissueMask::find(&lattice, &tissue)?.mesh(&vec![0.0; count])?;
         let column = |v: usize| mesh.point(v as u32)[0];
         let volume = |volumes: Vec<f32>| volumes.into_iter().map(|v| f64::from(v) * scale.powi(3)).collect();
         Ok(Self {
@@ -81,7 +81,7 @@ impl Beam {
             held: (0..count).map(|v| column(v) == 0).collect(),
             end: (0..count as u32).filter(|&v| column(v as usize) == cells[0]).collect(),
             edge_groups: Groups::from_colors(&mesh.edge_colors(&mesh.edges))?,
-            tet_groups: Groups::from_colors(&mesh.tet_classes(&mesh.tets))?,
+            tet_groups: Groups::from_colors(&mesh.tet_colors(&mesh.tets))?,
             edges: mesh.edges,
             tets: mesh.tets,
         })

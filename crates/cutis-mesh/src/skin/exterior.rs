@@ -1,4 +1,4 @@
-//! The body's faces towards outside air.
+//! The exterior skin: the faces of the body towards outside air.
 
 use crate::Lattice;
 use crate::cells::CellMasks;
@@ -6,15 +6,16 @@ use crate::component;
 use crate::neighbors::Neighbors;
 use crate::surface::faces;
 
-/// The exterior skin, and how well it covers the surface between tissue and outside air.
+/// The exterior skin, with flags from which the report computes its coverage.
 pub(super) struct Exterior {
-    /// Flat lattice indices, outward oriented.
+    /// Triangles in flat lattice indices, oriented outwards.
     pub triangles: Vec<[u32; 3]>,
-    /// Per point: reached from the lateral sides of the box.
+    /// One flag per point: true if it is reached from the lateral sides of the box.
     pub outside: Vec<bool>,
-    /// Per point: a vertex of the body, or tissue of no other component that a lattice edge joins with one.
+    /// One flag per point: true if it is a vertex of the body, or tissue in no tet that a lattice
+    /// edge joins to such a vertex.
     pub attached: Vec<bool>,
-    /// Face-connected components of all-tissue tets.
+    /// Number of face-connected components of the tets with four tissue corners.
     pub bodies: usize,
 }
 
@@ -55,13 +56,14 @@ pub(super) fn find(
     }
 }
 
-/// The index axis whose step is closest in direction to the world's third axis.
+/// The index axis whose direction is closest to the third world axis (head to foot).
 fn head_foot_axis(lattice: &Lattice) -> usize {
     let cosine = |axis: usize| lattice.grid().affine.step_mm(axis).normalize().z.abs();
     (0..3).fold(2, |best, axis| if cosine(axis) > cosine(best) { axis } else { best })
 }
 
-/// Points reached from the seeds over lattice edges between points that may be entered.
+/// Points that are reached from the seeds along lattice edges between points for which `enter` is
+/// true.
 fn flood(lattice: &Lattice, seeds: impl Iterator<Item = usize>, enter: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut reached = vec![false; lattice.grid().len()];
     let mut stack = Vec::new();

@@ -1,4 +1,4 @@
-//! Skin detection: which triangles of the lattice are skin.
+//! Skin detection: selects the lattice triangles that are skin.
 
 mod exterior;
 mod paper;
@@ -8,54 +8,66 @@ use serde::{Deserialize, Serialize};
 
 pub use report::SkinReport;
 
-use crate::build::NO_VERTEX;
 use crate::cells::CellMasks;
 use crate::select::{HalfSpace, present};
 use crate::surface::faces;
-use crate::{Lattice, MeshError, TetMesh};
+use crate::{Lattice, MeshError};
 
-/// What counts as skin. Lattice points in `cut_away` half-spaces count as air in every mode.
+/// The rule by which triangles are skin. In every mode, lattice points in `cut_away` half-spaces
+/// count as air.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SkinMode {
-    /// The rule of the STC paper (Algorithm 2), taken literally: a tet with exactly one air corner gives the triangle of its other three
-    /// corners. Triangles that two tets give are kept once.
+    /// The literal rule of the STC paper (Algorithm 2): a tet with exactly one air corner gives the
+    /// triangle of its other three corners. A triangle given by two tets is kept once.
     ///
-    /// This holds both sides of the scanner table, the lungs and the bowel. It is the `Boundary` mode's surface plus stray sheets: triangles
-    /// between two tets neither of which is all tissue, as where tissue is one vertex thick.
+    /// The result includes both sides of the scanner table, the lungs and the bowel. It is the
+    /// surface of the `Boundary` mode plus stray sheets. A stray sheet is a triangle between two
+    /// tets that both have an air corner, for example where tissue is one vertex thick.
     Paper,
-    /// Every face between an all-tissue tet and another tet. Faces on the box of the lattice, where the scan ends, are not skin.
+    /// Every face between a tet with four tissue corners and another tet. Faces on the box of the
+    /// lattice, where the scan ends, are not skin.
     Boundary,
     /// The faces of the body that touch outside air.
     ///
-    /// *Body*: the largest face-connected component of all-tissue tets. *Outside*: points reached from the lateral sides of the box over
-    /// lattice edges, through air and through the other components (a scanner table does not shade the back that lies on it).
-    /// Lattice edges are the right neighborhood here: the air points and edges left over by the tissue's complex are connected exactly
-    /// where the space around that complex is. The flood does not start at the first and last slice, which open lungs and bowel.
+    /// The *body* is the largest face-connected component of tets with four tissue corners. A point
+    /// is *outside* if it can be reached from the lateral sides of the box along lattice edges,
+    /// through air and through the other components. Therefore the back of a patient who lies on
+    /// the scanner table is skin.
+    ///
+    /// Lattice edges are the correct neighborhood, because air points are connected along them
+    /// exactly where the space around the tissue is connected. The search does not start at the
+    /// first and last slice, where the scan cuts open the lungs and the bowel.
     #[default]
     Exterior,
 }
 
-/// Choices beside the mode.
+/// Options of skin detection besides the mode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SkinOptions {
-    /// Half-spaces that count as air; a plane between a body and the board it lies on, for instance.
+    /// Half-spaces that count as air, for example below a plane between a body and the board it
+    /// lies on.
     pub cut_away: Vec<HalfSpace>,
-    /// Index axis (0, 1 or 2) along which the scan cuts through the body, so that its two end faces do not count as outside.
-    /// `None`: the axis closest to the world's head–foot axis.
+    /// Index axis (0, 1 or 2) along which the scan ends cut through the body. The two end faces do
+    /// not count as outside. `None` selects the axis closest to the head–foot axis of the world.
     pub through_axis: Option<usize>,
 }
 
-/// Skin triangles of a lattice.
+/// The skin triangles of a lattice.
 #[derive(Clone, Debug)]
 pub struct Skin {
-    /// Flat lattice indices, counter-clockwise seen from the air; each triangle once, in lattice order.
+    /// Triangles in flat lattice indices, counterclockwise as seen from the air. Each occurs once,
+    /// in lattice order.
     pub triangles: Vec<[u32; 3]>,
-    /// What was found.
+    /// Counts and quality of the skin.
     pub report: SkinReport,
 }
 
-/// Finds the skin of a lattice whose points are `air` or tissue (in grid order).
+/// Detects the skin of a lattice. `air` has one flag per lattice point, in grid order.
+///
+/// [`TissueMask::skin`](crate::TissueMask::skin) and
+/// [`TetMesh::divide_skin`](crate::TetMesh::divide_skin) convert the triangles to vertices of a
+/// mesh.
 ///
 /// ```
 /// use cutis_mesh::{Lattice, SkinMode, SkinOptions, Split, skin};
@@ -70,8 +82,8 @@ pub struct Skin {
 /// ```
 ///
 /// # Errors
-/// [`MeshError::Length`] if `air` has not one value per lattice point, [`MeshError::Plane`] for a bad half-space, [`MeshError::Axis`] for
-/// a through axis above 2.
+/// [`MeshError::Length`] if `air` does not have one value per lattice point. [`MeshError::Plane`]
+/// if a half-space is not valid. [`MeshError::Axis`] if the through axis is above 2.
 pub fn detect(
     lattice: &Lattice,
     air: &[bool],
@@ -95,16 +107,4 @@ pub fn detect(
     let considered = considered.unwrap_or(triangles.len());
     let report = report::report(lattice, mode, &tissue, &triangles, considered, &literal, &exterior);
     Ok(Skin { triangles, report })
-}
-
-impl Skin {
-    /// The triangles in the vertices of a mesh of the same lattice, and how many were left out because the mesh lacks one of their vertices.
-    pub fn on_mesh(&self, mesh: &TetMesh) -> (Vec<[u32; 3]>, usize) {
-        let vertex_of = mesh.vertex_of_point();
-        let vertex = |point: u32| vertex_of.get(point as usize).copied().unwrap_or(NO_VERTEX);
-        let triangles: Vec<[u32; 3]> =
-            self.triangles.iter().map(|t| t.map(vertex)).filter(|t| !t.contains(&NO_VERTEX)).collect();
-        let dropped = self.triangles.len() - triangles.len();
-        (triangles, dropped)
-    }
 }

@@ -1,4 +1,5 @@
-//! The literal rule: a tet with exactly one air corner gives the triangle of its other three corners.
+//! The literal rule of the paper: a tet with exactly one air corner gives the triangle of its other
+//! three corners.
 
 use rayon::prelude::*;
 
@@ -6,13 +7,13 @@ use crate::Lattice;
 use crate::cells::CornerBits;
 use crate::surface::{FACES, step};
 
-/// What the literal rule meets.
-pub(super) struct Count {
-    /// Tets with 0, 1, 2, 3 and 4 air corners.
+/// Counts of tets by their number of air corners.
+pub(super) struct AirCorners {
+    /// Number of tets with 0, 1, 2, 3 and 4 air corners.
     pub air_vertex_histogram: [usize; 5],
 }
 
-pub(super) fn count(lattice: &Lattice, tissue: &[bool]) -> Count {
+pub(super) fn count(lattice: &Lattice, tissue: &[bool]) -> AirCorners {
     let [_, cy, cz] = lattice.cells();
     let corners = CornerBits::new(lattice, tissue);
     let layer = |k: usize| {
@@ -26,10 +27,11 @@ pub(super) fn count(lattice: &Lattice, tissue: &[bool]) -> Count {
         histogram
     };
     let add = |a: [usize; 5], b: [usize; 5]| std::array::from_fn(|n| a[n] + b[n]);
-    Count { air_vertex_histogram: (0..cz).into_par_iter().map(layer).reduce(|| [0; 5], add) }
+    AirCorners { air_vertex_histogram: (0..cz).into_par_iter().map(layer).reduce(|| [0; 5], add) }
 }
 
-/// Each triangle once: of two tets that give the same one, the first in lattice order gives it its orientation.
+/// The triangles of the literal rule, each once. If two tets give the same triangle, the first tet
+/// in lattice order sets its orientation.
 pub(super) fn triangles(lattice: &Lattice, tissue: &[bool]) -> Vec<[u32; 3]> {
     let (grid, cells, stencil) = (lattice.grid(), lattice.cells(), lattice.stencil());
     let corners = CornerBits::new(lattice, tissue);
@@ -46,13 +48,14 @@ pub(super) fn triangles(lattice: &Lattice, tissue: &[bool]) -> Vec<[u32; 3]> {
                     let mut air = (0..4).filter(|&v| bits >> tet[v] & 1 == 0);
                     let (Some(f), None) = (air.next(), air.next()) else { continue };
                     let neighbor = &stencil.neighbors[parity][t][f];
-                    let given_before = step(cell, neighbor, cells).is_some_and(|other| {
+                    let found_before = step(cell, neighbor, cells).is_some_and(|other| {
                         let opposite = grid.index(Lattice::corner(other, neighbor.opposite));
                         !tissue[opposite]
                             && (grid.index(other), usize::from(neighbor.tet)) < (grid.index(cell), t)
                     });
-                    if !given_before {
-                        // The air is on the tet's own side of the face.
+                    if !found_before {
+                        // The air corner is on the side of this tet, so the face is oriented
+                        // towards it.
                         let [a, b, c] = FACES[f].map(|v| grid.index(Lattice::corner(cell, tet[v])) as u32);
                         out.push([a, c, b]);
                     }

@@ -1,10 +1,10 @@
-//! What a detected skin is worth: counts, topology, enclosed share, coverage.
+//! Counts and quality of a detected skin: topology, enclosed share and coverage.
 
 use serde::{Deserialize, Serialize};
 
 use super::SkinMode;
 use super::exterior::Exterior;
-use super::paper::Count;
+use super::paper::AirCorners;
 use crate::Lattice;
 use crate::neighbors::Neighbors;
 use crate::surface::Topology;
@@ -12,39 +12,43 @@ use crate::surface::Topology;
 /// Counts and quality of a detected skin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SkinReport {
-    /// How it was detected.
+    /// Mode of the detection.
     pub mode: SkinMode,
-    /// Points of the lattice.
+    /// Number of lattice points.
     pub vertices: usize,
-    /// Tets of the lattice, tissue or not.
+    /// Number of lattice tets.
     pub tets: usize,
-    /// Tets with 0, 1, 2, 3 and 4 air corners.
+    /// Number of tets with 0, 1, 2, 3 and 4 air corners.
     pub air_vertex_histogram: [usize; 5],
-    /// Triangles found, each counted once.
+    /// Number of skin triangles.
     pub triangles: usize,
-    /// Triangles that the literal rule gives twice: the tets with one air corner, less the different triangles they give. 0 in the other modes,
-    /// which find each triangle once.
+    /// Number of triangles that two tets give by the literal rule. 0 in the other modes, which find
+    /// each triangle once.
     pub duplicates: usize,
-    /// Edges of exactly one triangle.
+    /// Number of edges of exactly one triangle.
     pub open_edges: usize,
-    /// Those of them that lie in a side of the lattice's box, where the scan ends.
+    /// Number of open edges that are in a side of the box of the lattice, where the scan ends.
     pub open_edges_on_box: usize,
-    /// Edges of more than two triangles.
+    /// Number of edges of more than two triangles.
     pub non_manifold_edges: usize,
-    /// Parts of the skin that share no vertex.
+    /// Number of parts of the skin that share no vertex.
     pub components: usize,
-    /// Vertices − edges + triangles of the skin: 2 for a closed surface without handles.
+    /// Vertices − edges + triangles. It is 2 for a closed surface without handles.
     pub euler_characteristic: i64,
-    /// Face-connected components of all-tissue tets; the largest is the body.
+    /// Number of face-connected components of the tets with four tissue corners. The largest is the
+    /// body.
     pub bodies: usize,
-    /// Share of triangles that are not the body's exterior skin: lungs, bowel, table. Among the triangles of the mode; in `exterior` mode, which
-    /// has none, among those of the `boundary` mode. 0 if there are none.
+    /// Share of the triangles that are not exterior skin: lungs, bowel and table. In the `exterior`
+    /// mode, which has no such triangles, it refers to the triangles of the `boundary` mode. 0 if
+    /// there are no triangles.
     pub enclosed_share: f64,
-    /// How much of the iso-surface between tissue and outside air has skin on it, from 0 to 1.
+    /// Share of the iso-surface between tissue and outside air that has skin, from 0 to 1.
     ///
-    /// The iso-surface crosses the lattice edges that join an outside air point with a tissue point. Of those whose tissue point is a vertex of
-    /// the body, or is next to one and in no tet, this is the share whose tissue point is a vertex of the skin. What is missing is thinner
-    /// than a lattice step. 1 if there is no such edge.
+    /// The iso-surface crosses the lattice edges between an outside air point and a tissue point.
+    /// Of these edges, those count whose tissue point is a vertex of the body, or is next to such a
+    /// vertex and in no tet. The coverage is the share of them whose tissue point is a vertex of
+    /// the skin. Uncovered tissue is thinner than a lattice step. The coverage is 1 if there is no
+    /// such edge.
     pub coverage: f64,
 }
 
@@ -54,11 +58,11 @@ pub(super) fn report(
     tissue: &[bool],
     triangles: &[[u32; 3]],
     considered: usize,
-    literal: &Count,
+    literal: &AirCorners,
     exterior: &Exterior,
 ) -> SkinReport {
     let topology = Topology::of(triangles);
-    let emitted = if mode == SkinMode::Paper { literal.air_vertex_histogram[1] } else { triangles.len() };
+    let found = if mode == SkinMode::Paper { literal.air_vertex_histogram[1] } else { triangles.len() };
     let share = |part: usize, whole: usize| if whole == 0 { None } else { Some(part as f64 / whole as f64) };
     SkinReport {
         mode,
@@ -66,7 +70,7 @@ pub(super) fn report(
         tets: lattice.tet_count(),
         air_vertex_histogram: literal.air_vertex_histogram,
         triangles: triangles.len(),
-        duplicates: emitted - triangles.len(),
+        duplicates: found - triangles.len(),
         open_edges: topology.open_edges.len(),
         open_edges_on_box: topology.open_edges.iter().filter(|edge| on_box(lattice, edge)).count(),
         non_manifold_edges: topology.non_manifold_edges,
@@ -78,7 +82,7 @@ pub(super) fn report(
     }
 }
 
-/// True if both ends lie in one side of the box.
+/// True if both ends are in the same side of the box.
 fn on_box(lattice: &Lattice, edge: &[u32; 2]) -> bool {
     let [p, q] = edge.map(|point| lattice.grid().point(point as usize));
     let shape = lattice.grid().shape;

@@ -171,8 +171,8 @@ fn sizes(body: &Body, removed: usize, fixed: usize) -> Sizes {
         skin_triangles: body.skin.len(),
         removed_vertices: removed,
         fixed_vertices: fixed,
-        frozen_vertices: mesh.frozen.as_ref().map_or(0, |frozen| frozen.vertices),
-        frozen_tets: mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets),
+        frozen_vertices: mesh.inactive.as_ref().map_or(0, |frozen| frozen.vertices),
+        frozen_tets: mesh.inactive.as_ref().map_or(0, |frozen| frozen.tets),
     }
 }
 

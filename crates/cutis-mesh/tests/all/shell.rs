@@ -1,11 +1,11 @@
-//! The shell of mixed tets follows the mesh, and leaves slits open.
+//! Tests that the shell follows the mesh and leaves slits open.
 
 use std::collections::BTreeSet;
 
-use cutis_mesh::{Cut, Incision, Shell, SkinMode, SkinOptions, Split, TetMesh, skin};
+use cutis_mesh::{Incision, Shell, SkinMode, SkinOptions, Split, TetMesh, skin};
 use nalgebra::{Point3, Vector3};
 
-use crate::oracle::{air, all_tets, lattice, mesh, sorted};
+use crate::oracle::{air, all_tets, lattice, mesh, plan, skin_on_mesh, sorted};
 
 fn ball() -> (TetMesh, Vec<[u32; 3]>, Vec<bool>) {
     let lattice = lattice([17, 17, 17], [-2.0, 2.0, 2.0], Split::Kuhn6);
@@ -13,11 +13,11 @@ fn ball() -> (TetMesh, Vec<[u32; 3]>, Vec<bool>) {
     let air = air(&lattice, |p| (Point3::from(p) - middle).norm() <= 11.0);
     let skin = skin::detect(&lattice, &air, SkinMode::Exterior, &SkinOptions::default()).unwrap();
     let mesh = mesh(&lattice, &air);
-    let triangles = skin.on_mesh(&mesh).0;
+    let triangles = skin_on_mesh(&mesh, &skin).0;
     (mesh, triangles, air)
 }
 
-/// Lattice points of shell vertices.
+/// The lattice point of a vertex of the shell.
 fn point(mesh: &TetMesh, shell: &Shell, v: u32) -> usize {
     let position = match v.checked_sub(shell.first_extra) {
         Some(extra) => shell.positions[extra as usize],
@@ -28,9 +28,9 @@ fn point(mesh: &TetMesh, shell: &Shell, v: u32) -> usize {
 }
 
 #[test]
-fn shell_is_all_mixed_tets_that_touch_the_mesh() {
+fn shell_has_all_tets_between_mesh_and_air() {
     let (mesh, triangles, air) = ball();
-    let shell = Shell::new(&mesh, &air, &Cut::plan(&mesh, &triangles, &[]).unwrap()).unwrap();
+    let shell = Shell::new(&mesh, &air, &plan(&mesh, &triangles, &[]).unwrap()).unwrap();
     let expected: BTreeSet<[usize; 4]> = all_tets(&mesh.lattice)
         .into_iter()
         .filter(|tet| (1..=3).contains(&tet.iter().filter(|&&p| air[p]).count()))
@@ -44,7 +44,7 @@ fn shell_is_all_mixed_tets_that_touch_the_mesh() {
     let extras: BTreeSet<u32> =
         shell.tets.iter().flatten().copied().filter(|&v| v >= shell.first_extra).collect();
     assert_eq!(extras.len(), shell.positions.len());
-    // Everybody follows somebody, and a rigid motion is followed exactly.
+    // Every extra vertex follows a mesh vertex, and follows a translation exactly.
     assert!(shell.offsets.windows(2).all(|w| w[0] < w[1]));
     let shift = Vector3::new(0.25, -0.5, 0.125);
     let moved: Vec<Point3<f32>> = mesh.positions.iter().map(|p| p + shift).collect();
@@ -55,16 +55,16 @@ fn shell_is_all_mixed_tets_that_touch_the_mesh() {
 }
 
 #[test]
-fn slit_opens_the_shell_and_nothing_is_followed_across_it() {
+fn slits_open_the_shell_and_no_vertex_follows_across_them() {
     let (mut mesh, mut triangles, air) = ball();
     let top = mesh.lattice.grid().mm([8, 8, 8]) + Vector3::new(0.0, 0.0, 11.0);
     let (from, to) = (top - Vector3::new(7.0, 0.5, 0.0), top + Vector3::new(7.0, -0.5, 0.0));
     let slit = Incision { from_mm: from.into(), to_mm: to.into(), depth_mm: 6.0, width_mm: 0.5 };
-    let cut = Cut::plan(&mesh, &triangles, &[slit]).unwrap();
+    let cut = plan(&mesh, &triangles, &[slit]).unwrap();
     cut.apply(&mut mesh, &mut triangles);
     let shell = Shell::new(&mesh, &air, &cut).unwrap();
     assert!(!shell.removed.is_empty() && !shell.tets.is_empty());
-    // Pull the two sides apart near the slit: shell vertices go with their own side, none stays in between.
+    // Pull the two sides of the slit apart. Each shell vertex moves with its own side.
     let y = |p: &Point3<f32>| mesh.frame.to_mm(*p).y - top.y + 0.5;
     let pulled: Vec<Point3<f32>> =
         mesh.positions.iter().map(|p| p + Vector3::new(0.0, 0.01 * y(p).signum() as f32, 0.0)).collect();
@@ -82,6 +82,6 @@ fn slit_opens_the_shell_and_nothing_is_followed_across_it() {
         }
     }
     assert!(checked > 10);
-    let other = Cut::plan(&ball().0, &ball().1, &[]).unwrap();
+    let other = plan(&ball().0, &ball().1, &[]).unwrap();
     assert!(Shell::new(&mesh, &air[1..], &other).is_err());
 }

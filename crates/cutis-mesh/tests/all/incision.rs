@@ -1,11 +1,11 @@
-//! Incisions: what they remove, that the lips are apart, and what the gape measures.
+//! Tests of incisions: the removed elements, the separation of the lips, and the gape.
 
 use std::collections::BTreeSet;
 
-use cutis_mesh::{Cut, Incision, Lattice, MeshError, SkinMode, SkinOptions, Split, TetMesh, skin};
+use cutis_mesh::{Cut, Incision, Lattice, MeshError, SkinMode, SkinOptions, Slit, Split, TetMesh, skin};
 use nalgebra::{Point3, Vector3};
 
-use crate::oracle::{air, lattice, mesh};
+use crate::oracle::{air, lattice, mesh, plan, skin_on_mesh};
 
 /// A block of 60 × 40 × 20 mm whose upper face is the skin at z = 20.
 fn block(step: f64, split: Split) -> (TetMesh, Vec<[u32; 3]>) {
@@ -20,9 +20,9 @@ fn block(step: f64, split: Split) -> (TetMesh, Vec<[u32; 3]>) {
 fn body(lattice: &Lattice, is_tissue: impl Fn([f64; 3]) -> bool) -> (TetMesh, Vec<[u32; 3]>) {
     let air = air(lattice, is_tissue);
     let mesh = mesh(lattice, &air);
-    // The block is closed, and so are its ends in z.
+    // The boundary mode also gives the ends of the block in z.
     let skin = skin::detect(lattice, &air, SkinMode::Boundary, &SkinOptions::default()).unwrap();
-    let (triangles, dropped) = skin.on_mesh(&mesh);
+    let (triangles, dropped) = skin_on_mesh(&mesh, &skin);
     assert_eq!(dropped, 0);
     (mesh, triangles)
 }
@@ -31,7 +31,7 @@ fn incision(from_mm: [f64; 3], to_mm: [f64; 3], depth_mm: f64, width_mm: f64) ->
     Incision { from_mm, to_mm, depth_mm, width_mm }
 }
 
-/// Vertices reached from a vertex over tets whose corners all satisfy a condition.
+/// Vertices reached from a vertex through tets whose corners all satisfy a condition.
 fn reached(mesh: &TetMesh, start: u32, within: impl Fn(Point3<f64>) -> bool) -> BTreeSet<u32> {
     let usable: Vec<&[u32; 4]> = mesh
         .tets
@@ -53,11 +53,11 @@ fn reached(mesh: &TetMesh, start: u32, within: impl Fn(Point3<f64>) -> bool) -> 
 }
 
 #[test]
-fn removes_exactly_the_slit_and_parts_its_lips() {
+fn removed_vertices_are_those_in_the_slit() {
     for split in [Split::Kuhn6, Split::Five] {
         let (mesh, triangles) = block(2.0, split);
-        let cut = Cut::plan(&mesh, &triangles, &[incision([20.0, 20.0, 20.0], [40.0, 20.0, 20.0], 6.5, 4.5)])
-            .unwrap();
+        let cut =
+            plan(&mesh, &triangles, &[incision([20.0, 20.0, 20.0], [40.0, 20.0, 20.0], 6.5, 4.5)]).unwrap();
         for (v, &removed) in cut.removed.iter().enumerate() {
             let mm = mesh.frame.to_mm(mesh.positions[v]);
             let inside = (19.99..=40.01).contains(&mm.x) && (mm.y - 20.0).abs() < 2.26 && mm.z >= 13.4;
@@ -68,13 +68,16 @@ fn removes_exactly_the_slit_and_parts_its_lips() {
         assert_eq!(opened.tets.len() + removed.tets.len(), mesh.tets.len());
         assert_eq!(opened.edges.len() + removed.edges.len(), mesh.edges.len());
         assert_eq!(skin.len() + removed.triangles, triangles.len());
-        let gone = |v: &u32| cut.removed[*v as usize];
-        assert!(!opened.tets.iter().flatten().any(gone) && !opened.edges.iter().flatten().any(gone));
-        assert!(!skin.iter().flatten().any(gone));
-        // What is left is a mesh: its edges are those of its tets, so that each has a share of volume, and its surface is closed.
+        let is_removed = |v: &u32| cut.removed[*v as usize];
+        assert!(
+            !opened.tets.iter().flatten().any(is_removed) && !opened.edges.iter().flatten().any(is_removed)
+        );
+        assert!(!skin.iter().flatten().any(is_removed));
+        // The rest is a valid mesh: each edge has a volume, and the surface is closed.
         assert!(opened.edge_volumes().iter().all(|&share| share > 0.0));
         assert_eq!(cutis_mesh::Topology::of(&opened.boundary()).open_edges.len(), 0);
-        // Width 4.5 mm at rows 2 mm apart: rows 18, 20 and 22 go, the lips are rows 16 and 24.
+        // The width is 4.5 mm and the rows are 2 mm apart. Rows 18, 20 and 22 are removed, and rows
+        // 16 and 24 are the lips.
         let gape = cut.gapes[0].measure(&mesh.positions);
         assert!((gape.mean_mm - 8.0).abs() < 1e-4 && (gape.mid_mm - 8.0).abs() < 1e-4, "{gape:?}");
         assert!((gape.mean_distance_mm - 8.0).abs() < 0.3, "{gape:?}");
@@ -85,7 +88,7 @@ fn removes_exactly_the_slit_and_parts_its_lips() {
 }
 
 #[test]
-fn lips_are_apart_however_thin_or_oblique_the_slit() {
+fn lips_of_thin_and_oblique_slits_are_separate() {
     let (mesh, triangles) = block(2.0, Split::Kuhn6);
     for (from, to) in
         [([12.0, 20.0], [48.0, 20.0]), ([12.3, 12.1], [47.7, 28.9]), ([20.0, 8.0], [39.0, 33.0])]
@@ -95,8 +98,9 @@ fn lips_are_apart_however_thin_or_oblique_the_slit() {
         let lateral = Vector3::z().cross(&along);
         for width in [0.01, 1.0, 3.0] {
             let (mut opened, mut skin) = (mesh.clone(), triangles.clone());
-            let cut = Cut::plan(&mesh, &triangles, &[incision(from, to, 8.0, width)]).unwrap();
-            // In a window well inside the slit, the two sides have nothing in common. Before the cut they have.
+            let cut = plan(&mesh, &triangles, &[incision(from, to, 8.0, width)]).unwrap();
+            // In a window inside the slit, the two sides are not connected. Before the cut they
+            // are.
             let window = |mm: Point3<f64>| {
                 let from_start = mm - Point3::from(from);
                 let s = from_start.dot(&along);
@@ -109,7 +113,7 @@ fn lips_are_apart_however_thin_or_oblique_the_slit() {
             assert!(!reached(&mesh, start, window).is_disjoint(&other));
             cut.apply(&mut opened, &mut skin);
             assert!(reached(&opened, start, window).is_disjoint(&other), "{from:?} {to:?} {width}");
-            // Whatever is not removed hangs on a tet, and every edge on a tet of some volume.
+            // Each vertex that is not removed has a tet, and each edge has a volume.
             let masses = opened.masses(&|_| 1000.0);
             assert!(cut.removed.iter().zip(&masses).all(|(&removed, &mass)| removed == (mass == 0.0)));
             assert!(opened.edge_volumes().iter().all(|&share| share > 0.0));
@@ -123,14 +127,14 @@ fn lips_are_apart_however_thin_or_oblique_the_slit() {
 #[test]
 fn gape_is_the_lateral_opening() {
     let (mesh, triangles) = block(2.0, Split::Kuhn6);
-    let cut =
-        Cut::plan(&mesh, &triangles, &[incision([15.0, 20.0, 20.0], [45.0, 20.0, 20.0], 8.0, 3.0)]).unwrap();
+    let cut = plan(&mesh, &triangles, &[incision([15.0, 20.0, 20.0], [45.0, 20.0, 20.0], 8.0, 3.0)]).unwrap();
     let gape = &cut.gapes[0];
     let rest = gape.measure(&mesh.positions);
     let side = cut.slits[0].lateral().cast::<f32>();
     let along = Vector3::new(1.0, 0.0, 0.0);
     let right: BTreeSet<u32> = gape.right().iter().copied().collect();
-    // The right lip opens by 6 mm in the middle, less towards the ends, and slides along by 2 mm.
+    // The right lip opens by 6 mm in the middle and less towards the ends, and slides along the
+    // slit by 2 mm.
     let moved: Vec<Point3<f32>> = mesh
         .positions
         .iter()
@@ -146,7 +150,7 @@ fn gape_is_the_lateral_opening() {
     let mean = now.mean_mm - rest.mean_mm;
     assert!(mean > 2.5 && mean < 4.0, "{rest:?} {now:?}");
     assert!(now.mid_distance_mm > now.mid_mm + 0.1);
-    // A body that moves as a whole does not gape.
+    // A translation of the whole body does not change the gape.
     let shifted: Vec<Point3<f32>> =
         mesh.positions.iter().map(|p| p + Vector3::new(0.01, 0.02, 0.03)).collect();
     let shift = gape.measure(&shifted);
@@ -155,22 +159,24 @@ fn gape_is_the_lateral_opening() {
 
 #[test]
 fn curved_skin_is_cut_to_an_even_depth() {
-    // A cylinder along x of radius 40 mm around (0, 0), cut across its axis over an arc of some 60°: the chord dips far below the skin.
+    // A cylinder along x with a radius of 40 mm, cut across its axis over an arc of 60°. The chord
+    // is far below the skin.
     let lattice = lattice([12, 49, 49], [2.0; 3], Split::Kuhn6);
     let (cy, cz) = (28.0, 58.0);
     let radius = |p: [f64; 3]| ((p[1] - cy).powi(2) + (p[2] - cz).powi(2)).sqrt();
     let (mesh, triangles) = body(&lattice, |p| radius(p) <= 40.0);
     let (sin, cos) = (30f64.to_radians().sin(), 30f64.to_radians().cos());
     let end = |sign: f64| [41.0, cy + sign * 40.0 * sin, cz + 40.0 * cos];
-    let cut = Cut::plan(&mesh, &triangles, &[incision(end(-1.0), end(1.0), 8.0, 5.0)]).unwrap();
+    let cut = plan(&mesh, &triangles, &[incision(end(-1.0), end(1.0), 8.0, 5.0)]).unwrap();
     let mut deepest = f64::INFINITY;
     for (v, _) in cut.removed.iter().enumerate().filter(|(_, removed)| **removed) {
         deepest = deepest.min(radius(mesh.frame.to_mm(mesh.positions[v]).into()));
     }
-    // Depth is measured straight down, so that at 30° it is 8·cos 30° across the skin, and the lattice rounds.
+    // Depth is measured along one axis, so at 30° it is 8·cos 30° mm across the skin. The lattice
+    // rounds it.
     assert!(deepest > 40.0 - 8.0 - 2.5 && deepest < 40.0 - 8.0 + 2.5, "{deepest}");
-    // Along the whole arc the skin itself is gone.
-    let gone: Vec<f64> = cut
+    // The skin is removed along the whole arc.
+    let removed_skin: Vec<f64> = cut
         .removed
         .iter()
         .enumerate()
@@ -179,7 +185,10 @@ fn curved_skin_is_cut_to_an_even_depth() {
         .filter(|mm| radius((*mm).into()) > 37.5)
         .map(|mm| mm.y - cy)
         .collect();
-    assert!((-18..=18).all(|y| gone.iter().any(|g| (g - f64::from(y)).abs() <= 2.0)), "{gone:?}");
+    assert!(
+        (-18..=18).all(|y| removed_skin.iter().any(|at| (at - f64::from(y)).abs() <= 2.0)),
+        "{removed_skin:?}"
+    );
     assert!(cut.gapes[0].measure(&mesh.positions).bins >= 10);
 }
 
@@ -188,14 +197,14 @@ fn several_incisions_each_have_their_gape() {
     let (mesh, triangles) = block(2.0, Split::Kuhn6);
     let first = incision([10.0, 12.0, 20.0], [30.0, 12.0, 20.0], 6.0, 1.0);
     let second = incision([40.0, 10.0, 20.0], [40.0, 30.0, 20.0], 6.0, 7.0);
-    let cut = Cut::plan(&mesh, &triangles, &[first, second]).unwrap();
+    let cut = plan(&mesh, &triangles, &[first, second]).unwrap();
     let gapes: Vec<f64> = cut.gapes.iter().map(|gape| gape.measure(&mesh.positions).mean_mm).collect();
-    // A slit through the row at y = 12 takes that row; columns 38, 40 and 42 lie within 3.5 mm of x = 40.
+    // The first slit removes the row at y = 12. Columns 38, 40 and 42 are within 3.5 mm of x = 40.
     assert!((gapes[0] - 4.0).abs() < 1e-3 && (gapes[1] - 8.0).abs() < 1e-3, "{gapes:?}");
     let at = |x: f64, y: f64, z: f64| mesh.frame.to_local(Point3::new(x, y, z));
     assert!((cut.distance_mm(at(20.0, 15.0, 18.0)) - 3.0).abs() < 1e-4);
     assert!((cut.distance_mm(at(40.0, 33.0, 18.0)) - 3.0).abs() < 1e-4);
-    let none = Cut::plan(&mesh, &triangles, &[]).unwrap();
+    let none = plan(&mesh, &triangles, &[]).unwrap();
     let (mut same, mut skin) = (mesh.clone(), triangles.clone());
     assert_eq!(none.apply(&mut same, &mut skin), cutis_mesh::Removed::default());
     assert!(
@@ -204,10 +213,10 @@ fn several_incisions_each_have_their_gape() {
 }
 
 #[test]
-fn unusable_incisions_are_refused_by_name() {
+fn invalid_incisions_are_refused() {
     let (mesh, triangles) = block(2.0, Split::Kuhn6);
     let (a, b) = ([20.0, 20.0, 20.0], [40.0, 20.0, 20.0]);
-    let refuse = |one: Incision| Cut::plan(&mesh, &triangles, &[incision(a, b, 6.0, 4.0), one]).unwrap_err();
+    let refuse = |one: Incision| plan(&mesh, &triangles, &[incision(a, b, 6.0, 4.0), one]).unwrap_err();
     for (depth, width, key) in [
         (0.0, 4.0, "depth_mm"),
         (-1.0, 4.0, "depth_mm"),
@@ -227,7 +236,8 @@ fn unusable_incisions_are_refused_by_name() {
         matches!(off, MeshError::IncisionOffSkin { distance_mm, .. } if (distance_mm - 50.0).abs() < 1.0),
         "{off}"
     );
-    // One end on the skin, the other far beyond the block: most of the segment runs through air.
+    // One end is on the skin, the other far outside the block. Most of the segment runs through
+    // air.
     let mostly_off = refuse(incision([50.0, 20.0, 20.0], [150.0, 20.0, 20.0], 6.0, 4.0));
     assert!(
         matches!(mostly_off, MeshError::IncisionOffSkin { distance_mm, .. } if distance_mm > 80.0),
@@ -239,24 +249,26 @@ fn unusable_incisions_are_refused_by_name() {
     assert!(matches!(empty, MeshError::IncisionEmpty { .. }), "{empty}");
     let all = refuse(incision(a, b, 6.0, 400.0));
     assert!(matches!(all, MeshError::IncisionWithoutLips { left: 0, right: 0, .. }), "{all}");
-    // An absurd length is refused too, without taking for ever.
-    let long = Cut::plan(&mesh, &triangles, &[incision([-1e12, 20.0, 20.0], [1e12, 20.0, 20.0], 6.0, 4.0)]);
+    // A huge length is refused in short time.
+    let long = plan(&mesh, &triangles, &[incision([-1e12, 20.0, 20.0], [1e12, 20.0, 20.0], 6.0, 4.0)]);
     assert!(long.is_err());
-    let bad = Cut::plan(&mesh, &[[0, 1, u32::MAX]], &[]).unwrap_err();
-    assert!(matches!(bad, MeshError::VertexIndex { position: 0, vertex: u32::MAX, .. }));
-    assert!(matches!(
-        Cut::plan(&mesh, &[], &[incision(a, b, 6.0, 4.0)]),
-        Err(MeshError::IncisionOffSkin { .. })
-    ));
+    let wrong_index = [[0, 1, u32::MAX]];
+    for error in [
+        Cut::of_slits(&mesh, &wrong_index, Vec::new()).unwrap_err(),
+        Slit::on_lattice(&mesh.lattice, &wrong_index, &[]).unwrap_err(),
+    ] {
+        assert!(matches!(error, MeshError::VertexIndex { position: 0, vertex: u32::MAX, .. }), "{error}");
+    }
+    assert!(matches!(plan(&mesh, &[], &[incision(a, b, 6.0, 4.0)]), Err(MeshError::IncisionOffSkin { .. })));
 }
 
 #[test]
-fn vertices_left_without_a_tet_are_removed() {
-    // Two slits that cross at a sharp angle: near the crossing, every tet between them goes.
+fn vertices_without_a_tet_are_removed() {
+    // Two slits cross at a sharp angle. Near the crossing they remove every tet between them.
     let (mesh, triangles) = block(2.0, Split::Kuhn6);
     let rising = incision([10.0, 17.0, 20.0], [50.0, 23.0, 20.0], 8.0, 0.1);
     let falling = incision([10.0, 23.0, 20.0], [50.0, 17.0, 20.0], 8.0, 0.1);
-    let cut = Cut::plan(&mesh, &triangles, &[rising, falling]).unwrap();
+    let cut = plan(&mesh, &triangles, &[rising, falling]).unwrap();
     let (mut opened, mut skin) = (mesh.clone(), triangles.clone());
     cut.apply(&mut opened, &mut skin);
     let masses = opened.masses(&|_| 1000.0);

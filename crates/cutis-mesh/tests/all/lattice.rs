@@ -1,13 +1,15 @@
-//! Lattices and tissue meshes against brute force.
+//! Compares lattices and tissue meshes with brute force.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cutis_mesh::{HalfSpace, Lattice, MeshError, SkinMode, SkinOptions, Split, TetMesh, Tissue, skin};
+use cutis_mesh::{
+    HalfSpace, Lattice, MeshError, SkinMode, SkinOptions, Split, TetMesh, Tissue, TissueMask, skin,
+};
 use cutis_volume::{Affine, Grid};
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
-use crate::oracle::{air, all_tets, lattice, mesh, random_body, set, sorted, tets_of_faces};
+use crate::oracle::{air, all_tets, build, lattice, mesh, random_body, set, sorted, tets_of_faces};
 
 fn volume(mesh: &TetMesh, tet: &[u32; 4]) -> f64 {
     let [a, b, c, d] = tet.map(|v| mesh.positions[v as usize].cast::<f64>());
@@ -37,10 +39,9 @@ fn largest(tets: &[[usize; 4]]) -> (BTreeSet<[usize; 4]>, usize) {
 proptest! {
     #[test]
     fn mesh_equals_brute_force((lattice, air) in random_body(), only_largest: bool) {
-        let tissue = Tissue { air: &air, cut_away: &[], largest_component: only_largest };
         let hu: Vec<f32> = (0..air.len()).map(|n| n as f32).collect();
         let mut kept: Vec<_> = all_tets(&lattice).into_iter().filter(|t| t.iter().all(|&p| !air[p])).collect();
-        let mesh = match TetMesh::build(&lattice, &hu, &tissue) {
+        let mesh = match build(&lattice, &hu, &air, only_largest) {
             Ok(mesh) => mesh,
             Err(MeshError::NoTissue { tissue_vertices, .. }) => {
                 prop_assert!(kept.is_empty());
@@ -55,12 +56,12 @@ proptest! {
             prop_assert_eq!(mesh.dropped_tets, kept.len() - best.len());
             kept.retain(|tet| best.contains(&sorted(*tet)));
         }
-        // Same tets, in the same order, positive.
+        // The same tets in the same order, positively oriented.
         let points = |v: u32| mesh.lattice_index[v as usize] as usize;
         let found: Vec<[usize; 4]> = mesh.tets.iter().map(|tet| tet.map(points)).collect();
         prop_assert_eq!(&found, &kept);
         prop_assert!(mesh.tets.iter().all(|tet| volume(&mesh, tet) > 0.0));
-        // The vertices used, ascending, each with its own HU.
+        // The used vertices, ascending, each with its HU.
         let used: BTreeSet<usize> = kept.iter().flatten().copied().collect();
         prop_assert!(mesh.lattice_index.iter().map(|&p| p as usize).eq(used));
         prop_assert!(mesh.lattice_index.iter().zip(&mesh.hu).all(|(&p, &hu)| hu == p as f32));
@@ -71,7 +72,7 @@ proptest! {
         };
         let edges: BTreeSet<[u32; 2]> = mesh.tets.iter().flat_map(pairs).collect();
         prop_assert!(mesh.edges.iter().copied().eq(edges));
-        // The faces of exactly one tet, once each.
+        // The faces of exactly one tet, each once.
         let once: BTreeSet<_> =
             tets_of_faces(&kept).into_iter().filter(|(_, owners)| owners.len() == 1).map(|(face, _)| face).collect();
         let boundary: Vec<[u32; 3]> = mesh.boundary().iter().map(|t| t.map(|v| mesh.lattice_index[v as usize])).collect();
@@ -80,30 +81,28 @@ proptest! {
     }
 
     #[test]
-    fn colors_share_no_vertex((lattice, air) in random_body()) {
-        let tissue = Tissue { air: &air, cut_away: &[], largest_component: false };
-        let Ok(mesh) = TetMesh::build(&lattice, &vec![0.0; air.len()], &tissue) else { return Ok(()) };
+    fn elements_of_one_color_share_no_vertex((lattice, air) in random_body()) {
+        let Ok(mesh) = build(&lattice, &vec![0.0; air.len()], &air, false) else { return Ok(()) };
         let (most_edges, most_tets) = if lattice.split() == Split::Kuhn6 { (14, 24) } else { (18, 40) };
         let mut seen = BTreeSet::new();
         for (edge, color) in mesh.edges.iter().zip(mesh.edge_colors(&mesh.edges)) {
             prop_assert!(color < most_edges && edge.iter().all(|&v| seen.insert((color, v))));
         }
         seen.clear();
-        for (tet, color) in mesh.tets.iter().zip(mesh.tet_classes(&mesh.tets)) {
+        for (tet, color) in mesh.tets.iter().zip(mesh.tet_colors(&mesh.tets)) {
             prop_assert!(color < most_tets && tet.iter().all(|&v| seen.insert((color, v))));
         }
     }
 
     #[test]
-    fn shares_and_masses_add_up((lattice, air) in random_body()) {
-        let tissue = Tissue { air: &air, cut_away: &[], largest_component: false };
-        let Ok(mesh) = TetMesh::build(&lattice, &vec![0.0; air.len()], &tissue) else { return Ok(()) };
+    fn edge_volumes_and_masses_add_up((lattice, air) in random_body()) {
+        let Ok(mesh) = build(&lattice, &vec![0.0; air.len()], &air, false) else { return Ok(()) };
         let total: f64 = mesh.tet_volumes().iter().map(|&v| f64::from(v)).sum();
         let shares: f64 = mesh.edge_volumes().iter().map(|&v| f64::from(v)).sum();
         let masses: f64 = mesh.masses(&|_| 1000.0).iter().map(|&m| f64::from(m)).sum();
         prop_assert!((shares / total - 1.0).abs() < 1e-5 && (masses / (1000.0 * total) - 1.0).abs() < 1e-5);
         prop_assert!(mesh.edge_volumes().iter().all(|&share| share > 0.0));
-        // The divergence theorem: the boundary, oriented outward, encloses the volume.
+        // By the divergence theorem, the outward oriented boundary encloses the volume.
         let corner = |v: u32| mesh.positions[v as usize].coords.cast::<f64>();
         let enclosed: f64 =
             mesh.boundary().iter().map(|&[a, b, c]| corner(a).dot(&corner(b).cross(&corner(c))) / 6.0).sum();
@@ -123,7 +122,7 @@ fn whole_lattice_has_the_volume_of_its_box() {
 }
 
 #[test]
-fn frame_goes_there_and_back() {
+fn frame_maps_to_the_world_and_back() {
     let lattice = lattice([5, 4, 6], [-2.0, 3.0, 2.5], Split::Kuhn6);
     let mesh = mesh(&lattice, &[false; 120]);
     for (position, &point) in mesh.positions.iter().zip(&mesh.lattice_index) {
@@ -134,72 +133,67 @@ fn frame_goes_there_and_back() {
 }
 
 #[test]
-fn densities_come_from_the_mean_hu() {
+fn density_of_a_tet_is_that_of_its_mean_hu() {
     let lattice = lattice([2, 2, 2], [10.0; 3], Split::Kuhn6);
-    let tissue = Tissue { air: &[false; 8], cut_away: &[], largest_component: true };
     let hu: Vec<f32> = (0..8).map(|n| 100.0 * n as f32).collect();
-    let mesh = TetMesh::build(&lattice, &hu, &tissue).unwrap();
+    let mesh = build(&lattice, &hu, &[false; 8], true).unwrap();
     let sixth = 1e-6 / 6.0;
     let mean = |tet: &[u32; 4]| tet.iter().map(|&v| hu[v as usize]).sum::<f32>() / 4.0;
     let expected: f32 = mesh.tets.iter().map(|tet| sixth * mean(tet)).sum();
     let found: f32 = mesh.masses(&|hu| hu).iter().sum();
     assert!((found / expected - 1.0).abs() < 1e-5, "{found} {expected}");
-    // Corner 0 is in all six tets, corner 1 in two of them.
+    // Corner 0 belongs to all six tets, corner 1 to two of them.
     let masses = mesh.masses(&|_| 1000.0);
     assert!((masses[0] / masses[1] - 3.0).abs() < 1e-4);
 }
 
 #[test]
-fn cut_planes_and_selections() {
+fn cut_planes_and_selections_choose_the_right_vertices() {
     let lattice = lattice([9, 9, 9], [2.0; 3], Split::Kuhn6);
     let everything = vec![false; 729];
     let plane = HalfSpace { point_mm: [0.0, -12.5, 0.0], normal: [0.0, -3.0, 0.0] };
     let tissue = Tissue { air: &everything, cut_away: &[plane], largest_component: true };
-    let mesh = TetMesh::build(&lattice, &vec![40.0; 729], &tissue).unwrap();
-    // Points at y = −20, −18, … −4; those below −12.5 go, five of nine rows stay.
+    let mesh = TissueMask::find(&lattice, &tissue).unwrap().mesh(&vec![40.0; 729]).unwrap();
+    // Points at y = −20, −18, … −4; the cut removes those below −12.5, and five of nine rows stay.
     assert_eq!(mesh.positions.len(), 9 * 5 * 9);
     assert!(mesh.vertices_beyond(&plane).unwrap().iter().all(|beyond| !beyond));
     let count = |selected: Vec<bool>| selected.iter().filter(|&&s| s).count();
     assert_eq!(count(mesh.vertices_in_box_mm([30.0, -4.0, 10.0], [34.0, -8.0, 10.0])), 3 * 3);
     assert_eq!(count(mesh.vertices_in_box_mm([34.0, -8.0, 10.0], [30.0, -4.0, 10.0])), 3 * 3);
-    assert_eq!(count(mesh.vertices_at_least_hu(40.0)), mesh.positions.len());
-    assert_eq!(count(mesh.vertices_at_least_hu(40.5)), 0);
     let bad = HalfSpace { normal: [0.0; 3], ..plane };
     assert!(matches!(mesh.vertices_beyond(&bad), Err(MeshError::Plane { .. })));
     let nowhere = HalfSpace { point_mm: [f64::NAN, 0.0, 0.0], ..plane };
     let tissue = Tissue { air: &everything, cut_away: &[nowhere], largest_component: true };
-    assert!(matches!(TetMesh::build(&lattice, &vec![40.0; 729], &tissue), Err(MeshError::Plane { .. })));
+    assert!(matches!(TissueMask::find(&lattice, &tissue), Err(MeshError::Plane { .. })));
 }
 
 #[test]
-fn bad_input_is_refused() {
+fn invalid_input_is_refused() {
     let affine = Affine::from_spacing([1.0; 3], [0.0; 3]).unwrap();
-    let refuse = |shape| Lattice::new(Grid { shape, affine }, Split::Kuhn6).unwrap_err().to_string();
-    assert!(refuse([1, 5, 5]).contains("[1, 5, 5]"));
-    assert!(refuse([0, 5, 5]).contains("at least 2"));
-    assert!(refuse([32767, 32767, 32767]).contains("32767"));
-    assert!(refuse([usize::MAX, usize::MAX, 3]).contains("at most"));
+    let refuse_shape = |shape| Lattice::new(Grid { shape, affine }, Split::Kuhn6).unwrap_err().to_string();
+    assert!(refuse_shape([1, 5, 5]).contains("[1, 5, 5]"));
+    assert!(refuse_shape([0, 5, 5]).contains("at least 2"));
+    assert!(refuse_shape([32767, 32767, 32767]).contains("32767"));
+    assert!(refuse_shape([usize::MAX, usize::MAX, 3]).contains("at most"));
     let tiny = Affine::from_spacing([1e-60, 1.0, 1.0], [0.0; 3]).unwrap();
     let lattice_of = |affine| Lattice::new(Grid { shape: [3, 3, 3], affine }, Split::Kuhn6);
     assert!(matches!(lattice_of(tiny), Err(MeshError::LatticeExtent { .. })));
 
     let lattice = lattice_of(affine).unwrap();
-    let build = |hu: &[f32], air: &[bool]| {
-        TetMesh::build(&lattice, hu, &Tissue { air, cut_away: &[], largest_component: true }).unwrap_err()
-    };
+    let refuse = |hu: &[f32], air: &[bool]| build(&lattice, hu, air, true).unwrap_err();
     assert!(matches!(
-        build(&[0.0; 26], &[false; 27]),
+        refuse(&[0.0; 26], &[false; 27]),
         MeshError::Length { array: "hu", expected: 27, found: 26 }
     ));
-    assert!(matches!(build(&[0.0; 27], &[false; 28]), MeshError::Length { array: "air", found: 28, .. }));
+    assert!(matches!(refuse(&[0.0; 27], &[false; 28]), MeshError::Length { array: "air", found: 28, .. }));
     let mut hu = [0.0; 27];
     hu[5] = f32::NAN;
-    assert!(matches!(build(&hu, &[false; 27]), MeshError::NotFinite { point: [2, 1, 0], .. }));
-    assert!(matches!(build(&[0.0; 27], &[true; 27]), MeshError::NoTissue { tissue_vertices: 0, .. }));
+    assert!(matches!(refuse(&hu, &[false; 27]), MeshError::NotFinite { point: [2, 1, 0], .. }));
+    assert!(matches!(refuse(&[0.0; 27], &[true; 27]), MeshError::NoTissue { tissue_vertices: 0, .. }));
 }
 
 #[test]
-fn scaled_and_turned_lattices_stay_positive() {
+fn scaled_and_rotated_lattices_have_positive_tets() {
     for scale in [1e-3, 1.0, 1e3] {
         let (s, c) = (scale * 0.6, scale * 0.8);
         let rows =
@@ -217,7 +211,7 @@ fn scaled_and_turned_lattices_stay_positive() {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let lattice = lattice([33, 30, 37], [2.0, 2.0, 3.0], Split::Kuhn6);
-    // Blobs and holes of a few steps.
+    // Tissue with holes a few steps wide.
     let wave = |p: [f64; 3]| (p[0] / 7.0).sin() + (p[1] / 5.0).cos() + (p[2] / 9.0).sin();
     let air = air(&lattice, |p| wave(p) > -0.4);
     let run = |threads: usize| {

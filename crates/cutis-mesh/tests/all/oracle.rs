@@ -1,27 +1,51 @@
-//! Slow and plain: tets enumerated one by one, faces matched in maps. And small scenes for the other tests.
+//! Slow and simple reference implementations, and helpers that several tests share.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cutis_mesh::{Lattice, Split, TetMesh, Tissue};
+use cutis_mesh::{Cut, Incision, Lattice, MeshError, Skin, Slit, Split, TetMesh, Tissue, TissueMask};
 use cutis_volume::{Affine, Grid};
 use proptest::prelude::*;
 
-/// A lattice with the given steps, mirrored where a step is negative.
+/// A lattice with the given steps. A negative step mirrors an axis.
 pub fn lattice(shape: [usize; 3], step_mm: [f64; 3], split: Split) -> Lattice {
     let affine = Affine::from_spacing(step_mm, [30.0, -20.0, 10.0]).unwrap();
     Lattice::new(Grid { shape, affine }, split).unwrap()
 }
 
-/// Air flags from a test of the lattice points.
+/// Air flags from a condition on the positions of the lattice points.
 pub fn air(lattice: &Lattice, is_tissue: impl Fn([f64; 3]) -> bool) -> Vec<bool> {
     let grid = lattice.grid();
     (0..grid.len()).map(|point| !is_tissue(grid.mm(grid.point(point)).into())).collect()
 }
 
-/// A mesh of everything that is not air, at 40 HU.
+/// The mesh of all tissue, or of its largest component.
+pub fn build(
+    lattice: &Lattice,
+    hu: &[f32],
+    air: &[bool],
+    largest_component: bool,
+) -> Result<TetMesh, MeshError> {
+    TissueMask::find(lattice, &Tissue { air, cut_away: &[], largest_component })?.mesh(hu)
+}
+
+/// The mesh of all tissue, at 40 HU.
 pub fn mesh(lattice: &Lattice, air: &[bool]) -> TetMesh {
-    let tissue = Tissue { air, cut_away: &[], largest_component: false };
-    TetMesh::build(lattice, &vec![40.0; air.len()], &tissue).unwrap()
+    build(lattice, &vec![40.0; air.len()], air, false).unwrap()
+}
+
+/// The skin triangles in vertices of a mesh, and the number of triangles with points outside the
+/// mesh.
+pub fn skin_on_mesh(mesh: &TetMesh, skin: &Skin) -> (Vec<[u32; 3]>, usize) {
+    let is_vertex = |point: &u32| mesh.lattice_index.binary_search(point).is_ok();
+    let on_mesh: Vec<[u32; 3]> =
+        skin.triangles.iter().filter(|triangle| triangle.iter().all(is_vertex)).copied().collect();
+    (mesh.divide_skin(&on_mesh).0, skin.triangles.len() - on_mesh.len())
+}
+
+/// Places incisions on the skin of a mesh (mesh vertices) and plans their cut.
+pub fn plan(mesh: &TetMesh, triangles: &[[u32; 3]], incisions: &[Incision]) -> Result<Cut, MeshError> {
+    let skin: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| mesh.lattice_index[v as usize])).collect();
+    Cut::of_slits(mesh, triangles, Slit::on_lattice(&mesh.lattice, &skin, incisions)?)
 }
 
 /// Every tet of a lattice, in flat indices.
@@ -45,7 +69,7 @@ pub fn sorted<const N: usize>(mut simplex: [usize; N]) -> [usize; N] {
     simplex
 }
 
-/// Face → the tets that have it, each with its corner opposite to the face.
+/// The tets of each face, each with its corner opposite to the face.
 pub fn tets_of_faces(tets: &[[usize; 4]]) -> BTreeMap<[usize; 3], Vec<(usize, usize)>> {
     let mut faces: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (n, tet) in tets.iter().enumerate() {
@@ -58,12 +82,12 @@ pub fn tets_of_faces(tets: &[[usize; 4]]) -> BTreeMap<[usize; 3], Vec<(usize, us
     faces
 }
 
-/// Sorted triangles.
+/// The set of sorted triangles.
 pub fn set(triangles: &[[u32; 3]]) -> BTreeSet<[usize; 3]> {
     triangles.iter().map(|t| sorted(t.map(|v| v as usize))).collect()
 }
 
-/// Directed edges, each with how often it occurs.
+/// Directed edges with their number of occurrences.
 pub fn directed_edges(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], usize> {
     let mut edges = BTreeMap::new();
     for &[a, b, c] in triangles {
@@ -74,7 +98,7 @@ pub fn directed_edges(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], usize> {
     edges
 }
 
-/// Lattices of up to 6 points per axis, both splits and handednesses, with random air.
+/// Random lattices of 2 to 5 points per axis, with both splits and handednesses and random air.
 pub fn random_body() -> impl Strategy<Value = (Lattice, Vec<bool>)> {
     let shape = [2..6usize, 2..6usize, 2..6usize];
     (shape, any::<bool>(), any::<bool>(), 0.05..0.95f64).prop_flat_map(|(shape, five, mirrored, share)| {

@@ -1,4 +1,4 @@
-//! Mesh files: layout of the appended data, frames, and refusals.
+//! Tests of mesh files: layout of the appended data, world frames, and refused input.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use nalgebra::Point3;
 const FRAME: Frame = Frame { origin_mm: Point3::new(100.0, 200.0, 300.0) };
 
 fn positions() -> Vec<Point3<f32>> {
-    // Vertex 1 is in no cell.
+    // No cell uses vertex 1.
     [[0.0, 0.0, 0.0], [9.0, 9.0, 9.0], [0.01, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.03]]
         .map(Point3::from)
         .to_vec()
 }
 
-/// The header, and the appended array of a name as bytes.
+/// The header, and the bytes of the appended array with a name.
 fn array(path: &Path, name: &str) -> (String, Vec<u8>) {
     let bytes = std::fs::read(path).unwrap();
     let mark = b"encoding=\"raw\">\n_";
@@ -37,7 +37,7 @@ fn numbers(bytes: &[u8]) -> Vec<u32> {
 }
 
 #[test]
-fn tets_in_both_frames() {
+fn tets_are_written_in_both_world_frames() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tissue.vtu");
     let (positions, hu) = (positions(), [1.0, 2.0, 3.0, 4.0, 5.0]);
@@ -69,7 +69,7 @@ fn tets_in_both_frames() {
 }
 
 #[test]
-fn triangles_in_both_formats() {
+fn triangles_are_written_in_both_formats() {
     let folder = tempfile::tempdir().unwrap();
     let positions = positions();
     let triangles = [[4, 2, 3], [0, 3, 2]];
@@ -87,7 +87,7 @@ fn triangles_in_both_formats() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_leaves_no_file() {
+fn inconsistent_input_is_refused_and_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.vtp");
     let positions = positions();
@@ -106,11 +106,11 @@ fn what_does_not_fit_is_refused_and_leaves_no_file() {
     let nowhere = folder.path().join("missing/a.vtp");
     let piece = Piece { frame: &FRAME, positions: &positions, cells, data: &[] };
     assert!(write_vtp(&nowhere, Space::Ras, &piece).unwrap_err().to_string().contains("missing"));
-    // A full disk.
+    // A folder that cannot hold files.
     if Path::new("/dev/full").exists() {
         assert!(matches!(
             write_vtp(Path::new("/dev/full/a.vtp"), Space::Ras, &piece),
-            Err(MeshError::File(_))
+            Err(MeshError::Volume(_))
         ));
     }
 }

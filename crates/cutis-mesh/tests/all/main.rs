@@ -1,4 +1,5 @@
-//! Tests of lattices, meshes, skins, incisions and mesh files, against brute force and known answers.
+//! Tests of lattices, meshes, skins, incisions and mesh files, against brute force and known
+//! results.
 
 mod files;
 mod graded;

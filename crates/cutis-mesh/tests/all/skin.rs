@@ -1,11 +1,14 @@
-//! Skin detection: the identity of the literal rule on random volumes, and surfaces that are known.
+//! Tests of skin detection: an identity of the literal rule on random volumes, and surfaces of
+//! known topology.
 
 use std::collections::BTreeSet;
 
 use cutis_mesh::{HalfSpace, MeshError, Skin, SkinMode, SkinOptions, Split, Topology, skin};
 use proptest::prelude::*;
 
-use crate::oracle::{air, all_tets, directed_edges, lattice, mesh, random_body, set, sorted, tets_of_faces};
+use crate::oracle::{
+    air, all_tets, directed_edges, lattice, mesh, random_body, set, skin_on_mesh, sorted, tets_of_faces,
+};
 
 fn detect(lattice: &cutis_mesh::Lattice, air: &[bool], mode: SkinMode) -> Skin {
     skin::detect(lattice, air, mode, &SkinOptions::default()).unwrap()
@@ -16,9 +19,10 @@ fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
 }
 
 proptest! {
-    /// The literal rule = boundary of the all-tissue tets, less the faces on the box, plus stray sheets.
+    /// The literal rule gives the boundary of the tets with four tissue corners, without faces on
+    /// the box, plus stray sheets.
     #[test]
-    fn literal_rule_is_boundary_plus_stray_sheets((lattice, air) in random_body()) {
+    fn literal_rule_gives_boundary_plus_stray_sheets((lattice, air) in random_body()) {
         let tets = all_tets(&lattice);
         let is_tissue = |tet: &[usize; 4]| tet.iter().all(|&p| !air[p]);
         let (mut boundary, mut sheets, mut twice) = (BTreeSet::new(), BTreeSet::new(), 0);
@@ -41,13 +45,14 @@ proptest! {
         prop_assert_eq!(set(&paper.triangles), &boundary | &sheets);
         prop_assert_eq!(paper.triangles.len(), boundary.len() + sheets.len());
         prop_assert_eq!(paper.report.duplicates, twice);
-        // The histogram, tet by tet.
+        // The histogram, counted tet by tet.
         let mut histogram = [0; 5];
         tets.iter().for_each(|tet| histogram[tet.iter().filter(|&&p| air[p]).count()] += 1);
         prop_assert_eq!(paper.report.air_vertex_histogram, histogram);
-        // Without sheets every open edge lies on the box.
+        // Without sheets every open edge is on the box.
         prop_assert_eq!(found.report.open_edges, found.report.open_edges_on_box);
-        // The exterior is a part of the boundary, and its enclosed share says how much is left.
+        // The exterior is a subset of the boundary, and the enclosed share is the share of the
+        // rest.
         let exterior = detect(&lattice, &air, SkinMode::Exterior);
         prop_assert!(set(&exterior.triangles).is_subset(&boundary));
         let share = 1.0 - exterior.triangles.len() as f64 / boundary.len().max(1) as f64;
@@ -55,7 +60,7 @@ proptest! {
         prop_assert!((0.0..=1.0).contains(&exterior.report.coverage));
     }
 
-    /// Seen from the air, triangles run counter-clockwise: the tissue tet behind has its fourth corner below.
+    /// The normal of each triangle points to an air corner of one of its tets.
     #[test]
     fn triangles_face_the_air((lattice, air) in random_body()) {
         let faces = tets_of_faces(&all_tets(&lattice));
@@ -87,11 +92,11 @@ fn sphere_has_a_closed_exterior() {
         );
         assert_eq!((report.euler_characteristic, report.bodies), (2, 1));
         assert_eq!((report.enclosed_share, report.coverage), (0.0, 1.0));
-        // Oriented: every edge is walked once in each direction.
+        // The surface is oriented: each edge occurs once in each direction.
         let edges = directed_edges(&skin.triangles);
         assert!(edges.iter().all(|(&[a, b], &count)| count == 1 && edges[&[b, a]] == 1));
-        // And outward.
-        let (on_mesh, dropped) = skin.on_mesh(&mesh(&lattice, &air));
+        // The orientation is outward: the enclosed volume is positive.
+        let (on_mesh, dropped) = skin_on_mesh(&mesh(&lattice, &air), &skin);
         assert_eq!((on_mesh.len(), dropped), (skin.triangles.len(), 0));
         let at = |p: u32| lattice.grid().mm(lattice.grid().point(p as usize)).coords;
         let volume: f64 = skin.triangles.iter().map(|&[a, b, c]| at(a).dot(&at(b).cross(&at(c))) / 6.0).sum();
@@ -104,7 +109,8 @@ fn sphere_has_a_closed_exterior() {
 fn sphere_within_a_sphere_gives_one_component() {
     let lattice = lattice([41, 41, 41], [1.0; 3], Split::Kuhn6);
     let middle: [f64; 3] = lattice.grid().mm([20, 20, 20]).into();
-    // A thick shell around a small ball, then a thin shell around a large one: the body is another one, the skin is one sphere either way.
+    // A thick shell around a small ball, then a thin shell around a large ball. The body is the
+    // shell or the ball. The skin is one sphere in both cases.
     for (outer, hollow, inner, shell_is_body) in [(18.2, 12.3, 6.2, true), (18.2, 15.7, 13.4, false)] {
         let air = air(&lattice, |p| {
             let r = distance(p, middle);
@@ -125,7 +131,7 @@ fn sphere_within_a_sphere_gives_one_component() {
     }
 }
 
-/// A chest: a box of tissue through all slices with a lung open at both ends, on a table.
+/// A chest on a table: a box of tissue through all slices, with a lung that is open at both ends.
 fn chest(p: [f64; 3]) -> bool {
     let body = (8.0..=32.0).contains(&p[0]) && (10.0..=30.0).contains(&p[1]);
     let lung = (14.0..=26.0).contains(&p[0]) && (15.0..=25.0).contains(&p[1]);
@@ -139,7 +145,7 @@ fn chest_lattice() -> cutis_mesh::Lattice {
 }
 
 #[test]
-fn outside_air_does_not_come_in_through_the_end_slices() {
+fn outside_air_does_not_enter_through_the_end_slices() {
     let lattice = chest_lattice();
     let air = air(&lattice, chest);
     let skin = detect(&lattice, &air, SkinMode::Exterior);
@@ -148,23 +154,25 @@ fn outside_air_does_not_come_in_through_the_end_slices() {
         x == 8.0 || x == 32.0 || y == 10.0 || y == 30.0
     };
     assert!(skin.triangles.iter().flatten().all(on_wall));
-    // Four walls of 11 cells' height, two triangles a cell; the table is another body.
+    // Four walls that are 11 cells high, with two triangles per cell. The table is another
+    // component.
     assert_eq!(skin.triangles.len(), 2 * 11 * (24 + 20 + 24 + 20));
     assert_eq!((skin.report.bodies, skin.report.coverage), (2, 1.0));
     assert_eq!(skin.report.open_edges, skin.report.open_edges_on_box);
-    // Control: with another axis said to be the scan's, the end slices count as outside and the lung floods.
+    // Control: with another through axis, the end slices count as outside, and the lung becomes
+    // outside air.
     let options = SkinOptions { through_axis: Some(0), ..SkinOptions::default() };
     let flooded = skin::detect(&lattice, &air, SkinMode::Exterior, &options).unwrap();
     assert!(flooded.triangles.len() > skin.triangles.len());
-    let nonsense = SkinOptions { through_axis: Some(3), ..SkinOptions::default() };
+    let invalid = SkinOptions { through_axis: Some(3), ..SkinOptions::default() };
     assert!(matches!(
-        skin::detect(&lattice, &air, SkinMode::Paper, &nonsense),
+        skin::detect(&lattice, &air, SkinMode::Paper, &invalid),
         Err(MeshError::Axis { axis: 3 })
     ));
 }
 
 #[test]
-fn a_cut_plane_parts_the_body_from_a_board_it_lies_on() {
+fn a_cut_plane_separates_the_body_from_a_board_under_it() {
     let lattice = chest_lattice();
     let body = |p: [f64; 3]| (8.0..=32.0).contains(&p[0]) && (10.0..=30.0).contains(&p[1]);
     let air = air(&lattice, |p| body(p) || (4.0..=10.0).contains(&p[1]));
@@ -172,8 +180,8 @@ fn a_cut_plane_parts_the_body_from_a_board_it_lies_on() {
     assert_ne!(detect(&lattice, &air, SkinMode::Exterior).triangles.len(), walls);
     let below = HalfSpace { point_mm: [0.0, 10.5, 0.0], normal: [0.0, -1.0, 0.0] };
     let options = SkinOptions { cut_away: vec![below], ..SkinOptions::default() };
-    let parted = skin::detect(&lattice, &air, SkinMode::Exterior, &options).unwrap();
-    assert_eq!(parted.triangles.len(), walls);
+    let separated = skin::detect(&lattice, &air, SkinMode::Exterior, &options).unwrap();
+    assert_eq!(separated.triangles.len(), walls);
 }
 
 #[test]
