@@ -1,7 +1,9 @@
-//! Time of one sweep over all edges and over all tetrahedra of a Kuhn lattice, as a rate of constraints.
+//! Time of one sweep over all edges and over all tetrahedra of a Kuhn lattice, as constraints per
+//! second.
 //!
-//! `cargo bench -p cutis-solver-cpu`; with `CUTIS_BENCH_LARGE=1` on 129×129×76 vertices instead of 65×65×38. The frame
-//! time holds one sweep and the two passes over the vertices.
+//! Run `cargo bench -p cutis-solver-cpu`. With `CUTIS_BENCH_LARGE=1` the lattice has 129×129×76
+//! vertices instead of 65×65×38. The time of a frame includes one sweep and the two passes over the
+//! vertices.
 #![allow(missing_docs)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -16,44 +18,39 @@ fn builder(lattice: &Kuhn) -> SystemBuilder<f32> {
     SystemBuilder::new(&lattice.positions, &masses).expect("a valid lattice")
 }
 
-fn edges(lattice: &Kuhn) -> System<f32> {
+fn with_edges(builder: SystemBuilder<f32>, lattice: &Kuhn, stiffness: Stiffness<f32>) -> SystemBuilder<f32> {
     let groups = Groups::from_colors(&lattice.edge_colors).expect("few constraints");
-    builder(lattice)
-        .add_from_rest::<Distance, 2>(&lattice.edges, &Default::default(), Stiffness::pbd(1.0), &groups)
+    builder
+        .add_from_rest::<Distance, 2>(&lattice.edges, &Default::default(), stiffness, &groups)
         .expect("valid edges")
-        .build()
+}
+
+fn with_tets(builder: SystemBuilder<f32>, lattice: &Kuhn, stiffness: Stiffness<f32>) -> SystemBuilder<f32> {
+    let groups = Groups::from_colors(&lattice.tet_colors).expect("few constraints");
+    builder
+        .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), stiffness, &groups)
+        .expect("valid tetrahedra")
+}
+
+fn edges(lattice: &Kuhn) -> System<f32> {
+    with_edges(builder(lattice), lattice, Stiffness::pbd(1.0)).build()
 }
 
 fn tets(lattice: &Kuhn) -> System<f32> {
-    let groups = Groups::from_colors(&lattice.tet_colors).expect("few constraints");
-    builder(lattice)
-        .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), Stiffness::pbd(1.0), &groups)
-        .expect("valid tetrahedra")
-        .build()
+    with_tets(builder(lattice), lattice, Stiffness::pbd(1.0)).build()
 }
 
 fn both(lattice: &Kuhn) -> System<f32> {
-    let edges = Groups::from_colors(&lattice.edge_colors).expect("few constraints");
-    let tets = Groups::from_colors(&lattice.tet_colors).expect("few constraints");
-    builder(lattice)
-        .add_from_rest::<Distance, 2>(
-            &lattice.edges,
-            &Default::default(),
-            Stiffness::compliance(1e-4),
-            &edges,
-        )
-        .expect("valid edges")
-        .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), Stiffness::compliance(1e-7), &tets)
-        .expect("valid tetrahedra")
-        .build()
+    let edges = with_edges(builder(lattice), lattice, Stiffness::compliance(1e-4));
+    with_tets(edges, lattice, Stiffness::compliance(1e-7)).build()
 }
 
 fn sweeps(criterion: &mut Criterion) {
     let large = std::env::var_os("CUTIS_BENCH_LARGE").is_some();
     let lattice = Kuhn::new(if large { [129, 129, 76] } else { [65, 65, 38] }, 0.1);
-    type Kind = (&'static str, fn(&Kuhn) -> System<f32>, usize);
-    let kinds: [Kind; 2] = [("edges", edges, lattice.edges.len()), ("tets", tets, lattice.tets.len())];
-    for (name, system, count) in kinds {
+    type Case = (&'static str, fn(&Kuhn) -> System<f32>, usize);
+    let cases: [Case; 2] = [("edges", edges, lattice.edges.len()), ("tets", tets, lattice.tets.len())];
+    for (name, system, count) in cases {
         let mut group = criterion.benchmark_group(name);
         group.throughput(Throughput::Elements(count as u64)).sample_size(20);
         for threads in [1, 2] {
@@ -76,7 +73,7 @@ fn sweeps(criterion: &mut Criterion) {
     }
 }
 
-/// One iteration of vertex block descent over a body of edges and tetrahedra; per vertex.
+/// Time of one iteration of vertex block descent over edges and tetrahedra, as vertices per second.
 fn descent(criterion: &mut Criterion) {
     let large = std::env::var_os("CUTIS_BENCH_LARGE").is_some();
     let lattice = Kuhn::new(if large { [129, 129, 76] } else { [65, 65, 38] }, 0.1);

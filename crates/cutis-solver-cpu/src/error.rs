@@ -1,28 +1,28 @@
-//! What can go wrong when the backend starts.
+//! Errors when the backend starts.
 
 use cutis_solver::SolverError;
 
-/// Why a [`SolverCpu`](crate::SolverCpu) could not be made.
+/// An error in the construction of a [`SolverCpu`](crate::SolverCpu).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CpuError {
-    /// The settings do not fit the system.
+    /// The settings or the system are invalid.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// A number of threads that makes no sense.
+    /// The number of threads is out of range.
     #[error("threads is {threads}; expected 1 to {highest}")]
     Threads {
-        /// What was asked for.
+        /// The requested number.
         threads: usize,
-        /// The most that is allowed.
+        /// The largest allowed number.
         highest: usize,
     },
-    /// The operating system refused the threads.
+    /// The operating system could not start the threads.
     #[error("{threads} threads could not be started: {reason}")]
     ThreadPool {
-        /// How many were asked for.
+        /// The requested number.
         threads: usize,
-        /// What the thread pool said.
+        /// The error of the thread pool.
         reason: String,
     },
 }

@@ -1,9 +1,10 @@
 //! Multi-threaded CPU backend.
 //!
-//! [`SolverCpu`] runs the same [`Simulation`](cutis_solver::Simulation) as the reference solver and spreads every
-//! pass over threads: vertices in blocks, and the constraints of one color in chunks of a fixed size. Constraints of
-//! one color share no vertex, so that the order among them does not matter: the result is the same bit for bit for
-//! any number of threads, and equal to the reference in the same precision. Nothing is allocated inside a step.
+//! [`SolverCpu`] runs the same [`Simulation`](cutis_solver::Simulation) as the reference solver and
+//! distributes every pass over threads: vertices in blocks, and the constraints of one color in
+//! chunks of a fixed size. Constraints of one color share no vertex, so that their order does not
+//! matter. The result has the same bits for any number of threads, and they are those of the
+//! reference solver in the same precision. A step allocates no memory.
 #![forbid(unsafe_code)]
 
 mod error;

@@ -1,35 +1,29 @@
-//! How passes are spread over threads.
+//! Distribution of passes over threads.
 
 use cutis_constraints::Scalar;
-use cutis_solver::{Colored, ColoredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
+use cutis_solver::{Colored, ColoredVertices, ConstraintColor, Execute, Vertex, VertexBlock, VertexColor};
 use rayon::prelude::*;
 
-/// Vertices that a thread takes at a time.
+/// Number of vertices that a thread processes at a time.
 const BLOCK: usize = 8192;
 
-/// Executes passes on the threads of the pool that the caller runs in, or alone when `threads` is 1.
+/// Executes passes on the threads of the current pool, or on the calling thread if `threads` is 1.
 pub(crate) struct Parallel {
     pub(crate) threads: usize,
 }
 
 impl<T: Scalar> Execute<T> for Parallel {
     fn vertices(&self, block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync)) {
-        if self.threads == 1 { pass(block) } else { spread(block, pass) }
+        if self.threads == 1 { pass(block) } else { split(block, pass) }
     }
 
-    fn sweep(
-        &self,
-        sweep: Sweep,
-        set: &dyn ConstraintSet<T>,
-        vertices: &mut [Vertex<T>],
-        step: Step<T>,
-        multipliers: &mut [T],
-    ) {
-        let color = Colored::new(vertices, set, sweep.color, step, multipliers);
+    fn project(&self, color: ConstraintColor<'_, T>) {
+        let color = Colored::new(color);
         fan_out(self.threads.min(color.chunks()), &|| while color.project_next_chunk() {});
     }
 
-    fn color_pass(&self, color: ColoredVertices<'_, T>) {
+    fn descend(&self, color: VertexColor<'_, T>) {
+        let color = ColoredVertices::new(color);
         fan_out(self.threads.min(color.chunks()), &|| while color.move_next_chunk() {});
     }
 
@@ -43,17 +37,17 @@ impl<T: Scalar> Execute<T> for Parallel {
     }
 }
 
-/// Halves the block until its parts are small, and lets idle threads take the halves.
-fn spread<T: Scalar>(block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync)) {
+/// Halves the block until its parts are small. Idle threads take the halves.
+fn split<T: Scalar>(block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync)) {
     if block.len() <= BLOCK {
         return pass(block);
     }
     let middle = block.len().div_ceil(BLOCK) / 2 * BLOCK;
     let (first, second) = block.split_at(middle);
-    rayon::join(|| spread(first, pass), || spread(second, pass));
+    rayon::join(|| split(first, pass), || split(second, pass));
 }
 
-/// Lets `threads` threads run `work`, which returns when there is nothing left to take.
+/// Runs `work` on `threads` threads. `work` returns when no chunk is left.
 fn fan_out(threads: usize, work: &(dyn Fn() + Sync)) {
     if threads <= 1 {
         return work();

@@ -1,4 +1,4 @@
-//! The solver of this backend: a simulation and, if more than one thread is asked for, its own pool.
+//! The solver of this backend: a simulation and, for more than one thread, a thread pool.
 
 use cutis_constraints::Scalar;
 use cutis_solver::{Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed};
@@ -8,10 +8,10 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::CpuError;
 use crate::parallel::Parallel;
 
-/// More threads than this are a mistake in the input, not a machine.
-const MOST_THREADS: usize = 1024;
+/// Largest accepted number of threads. A larger number is most likely a mistake in the input.
+const MAX_THREADS: usize = 1024;
 
-/// The multi-threaded solver.
+/// The multi-threaded solver. Its results do not depend on the number of threads.
 pub struct SolverCpu<T: Scalar> {
     simulation: Simulation<T>,
     threads: usize,
@@ -19,17 +19,19 @@ pub struct SolverCpu<T: Scalar> {
 }
 
 impl<T: Scalar> SolverCpu<T> {
-    /// A solver for `system` on `threads` threads, by default as many as the machine runs at once. With one thread
-    /// there is no pool: the caller's thread does the work.
+    /// Builds a solver for `system` with `threads` threads. `None` uses as many threads as the
+    /// machine runs in parallel. With one thread there is no pool, and the calling thread does the
+    /// work.
     ///
     /// # Errors
-    /// Settings that cannot be used, a kind with a stiffness of the other formulation, no thread or too many.
+    /// Returns the errors of [`Simulation::new`], [`CpuError::Threads`] for no thread or too many,
+    /// and [`CpuError::ThreadPool`] if the operating system cannot start the threads.
     pub fn new(system: System<T>, settings: Settings, threads: Option<usize>) -> Result<Self, CpuError> {
         let simulation = Simulation::new(system, settings)?;
-        let available = || std::thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS);
+        let available = || std::thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);
         let threads = threads.unwrap_or_else(available);
-        if !(1..=MOST_THREADS).contains(&threads) {
-            return Err(CpuError::Threads { threads, highest: MOST_THREADS });
+        if !(1..=MAX_THREADS).contains(&threads) {
+            return Err(CpuError::Threads { threads, highest: MAX_THREADS });
         }
         let pool = match threads {
             1 => None,
@@ -38,12 +40,12 @@ impl<T: Scalar> SolverCpu<T> {
         Ok(Self { simulation, threads, pool })
     }
 
-    /// Threads that work on a step.
+    /// Returns the number of threads.
     pub fn threads(&self) -> usize {
         self.threads
     }
 
-    /// Runs frames on the threads of the pool, by what `wrap` makes of their execution.
+    /// Runs frames on the threads of the pool. `wrap` may add timing to the executor.
     fn run<E: Execute<T>>(
         &mut self,
         frames: usize,

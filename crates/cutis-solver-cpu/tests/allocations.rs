@@ -1,5 +1,5 @@
-//! Nothing is allocated inside a step, and what is left out has no storage. A binary of its own: it counts every
-//! allocation of the process.
+//! A step allocates no memory, and absent parts of a scene take none. This test has its own binary,
+//! because it counts every allocation of the process.
 
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,16 +14,16 @@ static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
 struct Counting;
 
-// SAFETY: passes every call on to the system's allocator unchanged.
+// SAFETY: every call is forwarded unchanged to the system's allocator.
 #[allow(unsafe_code)]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller's contract is that of the system's allocator.
         unsafe { SystemAllocator.alloc(layout) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller's contract is that of the system's allocator.
         unsafe { SystemAllocator.dealloc(pointer, layout) }
     }
 }
@@ -58,7 +58,7 @@ fn settings(iterations: u32) -> Settings {
     Settings { formulation: Formulation::Xpbd, iterations, ..Settings::default() }
 }
 
-/// Allocations of `steps` calls of `step`, after a first one.
+/// Returns the number of allocations of `steps` calls of `step`, after a first call.
 fn allocations(solver: &mut dyn Solver<f32>, steps: usize) -> usize {
     solver.step(1).unwrap();
     let before = ALLOCATIONS.load(Ordering::Relaxed);
@@ -68,9 +68,9 @@ fn allocations(solver: &mut dyn Solver<f32>, steps: usize) -> usize {
     ALLOCATIONS.load(Ordering::Relaxed) - before
 }
 
-/// One test, so that no other one allocates meanwhile.
+/// This is a single test, so that no other test allocates at the same time.
 #[test]
-fn a_scene_pays_only_for_what_it_names() {
+fn steps_allocate_nothing_and_memory_is_only_for_parts_in_use() {
     for iterations in [1, 2] {
         let mut reference = SolverReference::new(body(true), settings(iterations)).unwrap();
         assert_eq!(allocations(&mut reference, 3), 0);
@@ -84,7 +84,7 @@ fn a_scene_pays_only_for_what_it_names() {
         let mut solver = SolverCpu::new(body(true), descent, Some(threads)).unwrap();
         assert_eq!(allocations(&mut solver, 3), 0, "descent, {threads} threads");
     }
-    // The control: the counter counts.
+    // Control: the counter counts an allocation.
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     drop(std::hint::black_box(vec![1u8]));
     assert!(ALLOCATIONS.load(Ordering::Relaxed) > before);
@@ -99,7 +99,7 @@ fn a_scene_pays_only_for_what_it_names() {
     let descending = SolverReference::new(body(true), descent).unwrap();
     assert_eq!(descending.bytes().last().map(|part| part.name), Some("incidences"));
 
-    // Four numbers, three and three of a vertex; indices, length and color offsets of a spring.
+    // A vertex has 4 + 3 + 3 numbers. A spring has two indices and a length, plus the color offsets.
     let lattice = Kuhn::new([30, 20, 20], 0.1);
     let solver = SolverReference::new(body(false), settings(1)).unwrap();
     let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();

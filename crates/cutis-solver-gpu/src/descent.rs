@@ -256,6 +256,6 @@ fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u3
 
 /// The struct `Descent` of the shaders.
 fn settings_of(step: &DescentStep<f32>) -> [f32; 8] {
-    let DescentStep { h, fall, inverse_h_squared, relaxation } = *step;
-    [fall.x, fall.y, fall.z, h, inverse_h_squared, relaxation, 0.0, 0.0]
+    let DescentStep { h, gravity_h_squared: g, inverse_h_squared, relaxation } = *step;
+    [g.x, g.y, g.z, h, inverse_h_squared, relaxation, 0.0, 0.0]
 }

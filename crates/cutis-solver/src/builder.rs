@@ -1,4 +1,4 @@
-//! Building a system: everything is checked here, so that nothing has to be checked in a step.
+//! Construction of a system. All input is checked here, so that a step needs no checks.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -14,39 +14,42 @@ use crate::{Handle, KinematicHandle, SolverError, Stiffness, System, Vertex};
 /// Collects vertices, kinds of constraints and handles into a [`System`].
 pub struct SystemBuilder<T: Scalar> {
     system: System<T>,
-    held: HashSet<u32>,
+    /// Vertices that a handle moves.
+    kinematic: HashSet<u32>,
 }
 
 impl<T: Scalar> SystemBuilder<T> {
-    /// Starts with positions in meters and inverse masses in 1/kg (0 = fixed), one of each per vertex. Their number
-    /// type may differ from the solver's.
+    /// Starts a system with positions in meters and inverse masses in 1/kg (0 = fixed), one of
+    /// each per vertex. Their number type may differ from the solver's.
     ///
-    /// A body that lies farther from zero than its own extent (along an axis) is moved there, so that single
-    /// precision is not spent on the distance; [`System::positions`] gives the caller's coordinates back exactly.
+    /// Along each axis on which the body lies farther from zero than its own extent, the solver
+    /// subtracts the center of the body, so that single precision is not lost to the distance.
+    /// [`System::positions`] returns the caller's coordinates exactly.
     ///
     /// # Errors
-    /// Lengths that differ, more than `u32::MAX` vertices, a coordinate that is not finite, an inverse mass that is
-    /// negative or not finite.
+    /// Returns an error for arrays of different lengths, more than `u32::MAX` vertices, a
+    /// coordinate that is not finite, or an inverse mass that is negative or not finite.
     pub fn new<S: Scalar, M: Scalar>(
         positions: &[Point3<S>],
         inverse_masses: &[M],
     ) -> Result<Self, SolverError> {
-        Self::about(origin_of(positions), positions, inverse_masses)
+        Self::with_origin(origin_of(positions), positions, inverse_masses)
     }
 
-    /// As [`new`](Self::new), but the body stays where it is, however far that may be. For a part of a body: it is
-    /// stepped with the same bits as in the whole one, and a saved state can be gone on from with the same bits.
+    /// Starts a system as [`new`](Self::new) does, but never subtracts a center. Use it for a part
+    /// of a body: the part then steps with the same bits as within the whole body, and a run that
+    /// is continued from a saved state has the bits of an uninterrupted run.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Returns the errors of [`new`](Self::new).
     pub fn in_place<S: Scalar, M: Scalar>(
         positions: &[Point3<S>],
         inverse_masses: &[M],
     ) -> Result<Self, SolverError> {
-        Self::about(Vector3::zeros(), positions, inverse_masses)
+        Self::with_origin(Vector3::zeros(), positions, inverse_masses)
     }
 
-    fn about<S: Scalar, M: Scalar>(
+    fn with_origin<S: Scalar, M: Scalar>(
         origin: Vector3<f64>,
         positions: &[Point3<S>],
         inverse_masses: &[M],
@@ -91,13 +94,13 @@ impl<T: Scalar> SystemBuilder<T> {
             handles: Vec::new(),
             vertex_groups: None,
         };
-        Ok(Self { system, held: HashSet::new() })
+        Ok(Self { system, kinematic: HashSet::new() })
     }
 
-    /// Velocities at the start in m/s, one per vertex. Without this call all are zero.
+    /// Sets the initial velocities in m/s, one per vertex. Without this call all are zero.
     ///
     /// # Errors
-    /// A wrong length, or a velocity that is not finite.
+    /// Returns an error for a wrong length or a velocity that is not finite.
     pub fn velocities(mut self, velocities: &[Vector3<T>]) -> Result<Self, SolverError> {
         let (found, expected) = (velocities.len(), self.system.vertices.len());
         if found != expected {
@@ -108,12 +111,14 @@ impl<T: Scalar> SystemBuilder<T> {
         Ok(self)
     }
 
-    /// Adds all constraints of the kind `C`: vertices and parameters of each, their stiffness and their groups. Kinds
-    /// are projected in the order in which they are added.
+    /// Adds all constraints of the kind `C`, with the vertices and parameters of each constraint,
+    /// their stiffness and their color groups. The solver projects kinds in the order in which
+    /// they are added.
     ///
     /// # Errors
-    /// Lengths that differ, a vertex that does not exist or appears twice in a constraint, a parameter that is not
-    /// finite, a stiffness out of range, groups that do not fit.
+    /// Returns an error for arrays of different lengths, a vertex that does not exist or appears
+    /// twice in a constraint, a parameter that is not finite, a stiffness out of range, or groups
+    /// in which two constraints of one color share a vertex.
     pub fn add<C: Constraint<N>, const N: usize>(
         mut self,
         indices: &[[u32; N]],
@@ -126,11 +131,12 @@ impl<T: Scalar> SystemBuilder<T> {
         Ok(self)
     }
 
-    /// The same with parameters taken from the positions given to [`new`](Self::new).
+    /// Adds constraints as [`add`](Self::add) does, with parameters computed from the positions
+    /// that were given to [`new`](Self::new).
     ///
     /// # Errors
-    /// As for [`add`](Self::add), and [`SolverError::RestShape`] for a rest shape without size. A rest size of zero that
-    /// is wanted, as of a spring of length zero, is given to [`add`](Self::add).
+    /// Returns the errors of [`add`](Self::add), and [`SolverError::RestShape`] for a rest shape
+    /// of size zero. For a spring of length zero on purpose, use [`add`](Self::add).
     pub fn add_from_rest<C: Constraint<N>, const N: usize>(
         self,
         indices: &[[u32; N]],
@@ -142,49 +148,52 @@ impl<T: Scalar> SystemBuilder<T> {
         let mut params = Vec::with_capacity(indices.len());
         for (constraint, tuple) in indices.iter().enumerate() {
             let mut x = [Point3::origin(); N];
-            for (place, &vertex) in x.iter_mut().zip(tuple) {
+            for (corner, &vertex) in x.iter_mut().zip(tuple) {
                 let (kind, vertex_count) = (C::NAME, vertices.len());
                 let error = SolverError::VertexOutOfRange { kind, constraint, vertex, vertex_count };
-                *place = vertices.get(vertex as usize).ok_or(error)?.position();
+                *corner = vertices.get(vertex as usize).ok_or(error)?.position();
             }
-            let of_rest = C::from_rest(&x, material);
-            if C::rest_size(&of_rest) == T::zero() {
+            let rest_params = C::from_rest(&x, material);
+            if C::rest_size(&rest_params) == T::zero() {
                 let (kind, vertices) = (C::NAME, tuple.to_vec());
                 return Err(SolverError::RestShape { kind, constraint, vertices });
             }
-            params.push(of_rest);
+            params.push(rest_params);
         }
         self.add::<C, N>(indices, &params, stiffness, groups)
     }
 
-    /// Groups of the vertices for [`Formulation::Vbd`](crate::Formulation::Vbd), where the caller knows better ones than
-    /// greedy coloring finds, for example those of a lattice in closed form. Vertices that do not move may be among them. They are
-    /// checked when a solver is made; other formulations do not look at them.
+    /// Sets color groups of the vertices for [`Formulation::Vbd`](crate::Formulation::Vbd). Use it
+    /// where better groups are known than greedy coloring finds, for example those of a lattice in
+    /// closed form. The groups may contain vertices that do not move. They are checked when a
+    /// solver is built. Other formulations ignore them.
     pub fn vertex_groups(mut self, groups: Groups) -> Self {
         self.system.vertex_groups = Some(Arc::new(groups));
         self
     }
 
-    /// Adds a handle; its vertices leave the dynamics.
+    /// Adds a handle. Its vertices become kinematic: they follow the handle's path and ignore
+    /// forces.
     ///
     /// # Errors
-    /// A vertex that does not exist or is moved by a handle already, a path or a time that is not finite, a negative
-    /// time.
+    /// Returns an error for a vertex that does not exist or belongs to another handle, a path or
+    /// duration that is not finite, or a negative duration.
     pub fn handle(mut self, handle: Handle) -> Result<Self, SolverError> {
         let System { vertices, handles, .. } = &mut self.system;
-        let held = KinematicHandle::new(handles.len(), handle, vertices, &mut self.held)?;
-        handles.push(held);
+        let handle = KinematicHandle::new(handles.len(), handle, vertices, &mut self.kinematic)?;
+        handles.push(handle);
         Ok(self)
     }
 
-    /// The finished system.
+    /// Returns the finished system.
     pub fn build(self) -> System<T> {
         self.system
     }
 }
 
-/// Center of the bounding box along the axes where it is farther from zero than the box is long, zero along the
-/// others. Then subtracting it is exact in the number type of the positions (Sterbenz), and so is adding it again.
+/// Returns the center of the bounding box along each axis on which the center is farther from zero
+/// than the box is long, and zero along the other axes. Subtracting such a center is exact in the
+/// number type of the positions (Sterbenz's lemma), and so is adding it again.
 fn origin_of<S: Scalar>(positions: &[Point3<S>]) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| {
         let values = positions.iter().map(|position| position[axis].to_f64());

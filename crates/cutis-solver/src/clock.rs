@@ -1,23 +1,23 @@
-//! Simulated time: frames done, and substeps done of the next one.
+//! Simulated time, counted in whole frames and substeps.
 
 use crate::Settings;
 
-/// How far a simulation has come.
+/// Number of frames and substeps that a simulation has completed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clock {
-    /// Whole frames.
+    /// Completed frames.
     pub frame: u64,
-    /// Substeps of the frame after those.
+    /// Completed substeps of the current frame.
     pub substep: u32,
 }
 
 impl Clock {
-    /// Simulated time in seconds.
+    /// Returns the simulated time in seconds.
     pub fn time_s(&self, settings: &Settings) -> f64 {
         self.frame as f64 * settings.dt_s + f64::from(self.substep) * settings.substep_s()
     }
 
-    /// One substep later.
+    /// Advances the clock by one substep.
     pub fn tick(&mut self, settings: &Settings) {
         self.substep += 1;
         if self.substep == settings.substeps {

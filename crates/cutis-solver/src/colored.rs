@@ -1,16 +1,18 @@
-//! The only unsafe code: several threads move the vertices of one color at the same time.
+//! The only unsafe code of the project: several threads move the vertices of one color.
 //!
-//! Why that is sound. (1) A batch checks at build that each index is below the number of vertices, and
-//! `Groups::verify` that no two constraints of one color share a vertex; its fields are private and never change.
-//! (2) [`Colored`] borrows the vertices mutably for its whole life, so that nobody else reads or moves them.
-//! (3) A chunk is a range of one color, taken from an atomic counter that only grows: each constraint is handed
-//! out once. So two threads never touch the same vertex or the same multiplier.
+//! Soundness for constraints: (1) A batch checks when it is built that each index is below the
+//! number of vertices, and `Groups::verify` checks that no two constraints of one color share a
+//! vertex. The fields of a batch are private and never change. (2) [`Colored`] borrows the vertices
+//! mutably for its whole lifetime, so that no other code reads or moves them. (3) A chunk is a range
+//! of one color, and an atomic counter that only grows hands out each chunk once. So two threads
+//! never access the same vertex or the same multiplier.
 //!
-//! For groups of vertices the same holds. (1) A `Descent` and the system that it was made from lie in one
-//! `Simulation`; its incidences are those of the system's kinds, and `Groups::verify_vertices` has checked that no two vertices of
-//! a color are in one constraint, and that each is named once. (2) [`ColoredVertices`] borrows the system mutably for its
-//! whole life. (3) A chunk is handed out once; who has it moves its vertices, and reads those that are in constraints with
-//! them, which nobody moves meanwhile.
+//! Soundness for vertices: (1) A `Descent` and the system that it was built from are owned by one
+//! `Simulation`. Its incidences are those of the system's kinds. `Groups::verify_vertices` checks
+//! that no two vertices of a color are in one constraint, and that each vertex occurs once.
+//! (2) [`ColoredVertices`] borrows the system mutably for its whole lifetime. (3) Each chunk is
+//! handed out once. The thread that takes it moves the vertices of the chunk and reads the vertices
+//! that share a constraint with them. No other thread moves those meanwhile.
 #![allow(unsafe_code)]
 
 use std::marker::PhantomData;
@@ -20,16 +22,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
-use crate::batch::{Load, Store};
-use crate::{ColorPass, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexForce};
+use crate::batch::{ConstraintChunk, Load, Store, VertexChunk};
+use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
 
-/// Constraints that a thread takes at a time. Fixed; results do not depend on it.
+/// Number of constraints of a chunk. It is fixed, and results do not depend on it.
 const CHUNK: usize = 1024;
 
 /// One color of one kind, shared between the threads that project it.
 ///
 /// ```
-/// # use cutis_solver::{Colored, Stiffness, Step, SystemBuilder};
+/// # use cutis_solver::{Colored, ConstraintColor, Stiffness, Step, SystemBuilder};
 /// # use cutis_constraints::Distance;
 /// # use nalgebra::Point3;
 /// # let positions = [Point3::new(0.0, 0.0, 0.0), Point3::new(1.1, 0.0, 0.0)];
@@ -38,7 +40,9 @@ const CHUNK: usize = 1024;
 /// # let mut system = SystemBuilder::<f64>::new(&positions, &[0.0, 1.0])?
 /// #     .add::<Distance, 2>(&spring, &[[1.0]], Stiffness::pbd(1.0), &groups)?.build();
 /// let (vertices, kinds) = system.projection_parts();
-/// let color = Colored::new(vertices, &*kinds[0], 0, Step::Pbd, &mut []);
+/// let (set, step) = (&*kinds[0], Step::Pbd);
+/// let color = ConstraintColor { set, color: 0, vertices, step, multipliers: &mut [] };
+/// let color = Colored::new(color);
 /// std::thread::scope(|scope| {
 ///     for _ in 0..2 {
 ///         scope.spawn(|| while color.project_next_chunk() {});
@@ -57,27 +61,23 @@ pub struct Colored<'a, T: Scalar> {
     borrow: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: sharing a `Colored` only lets threads take distinct chunks (see the top of the file), which touch distinct
-// vertices and multipliers; `T` is plain data that may be used from any thread.
+// SAFETY: threads that share a `Colored` can only take distinct chunks, which access distinct
+// vertices and multipliers (see the top of the file). `T` is plain data that any thread may use.
 unsafe impl<T: Scalar> Sync for Colored<'_, T> {}
 
 impl<'a, T: Scalar> Colored<'a, T> {
-    /// Prepares `color` of `set`. `multipliers` holds one number per constraint of the whole set, or none.
+    /// Prepares a color for several threads.
     ///
     /// # Panics
-    /// If the set was built for more vertices than given, or `multipliers` has another length.
-    pub fn new(
-        vertices: &'a mut [Vertex<T>],
-        set: &'a dyn ConstraintSet<T>,
-        color: usize,
-        step: Step<T>,
-        multipliers: &'a mut [T],
-    ) -> Self {
-        assert!(set.vertex_count() <= vertices.len(), "the set names vertices that are not there");
+    /// Panics if the set was built for more vertices than given, or if there are multipliers but
+    /// not one per constraint of the set.
+    pub fn new(color: ConstraintColor<'a, T>) -> Self {
+        let ConstraintColor { set, color, vertices, step, multipliers } = color;
+        assert!(set.vertex_count() <= vertices.len(), "the set refers to vertices that do not exist");
         let keeps_multipliers = !multipliers.is_empty();
         assert!(
             !keeps_multipliers || multipliers.len() == set.len(),
-            "one multiplier per constraint, or none"
+            "expected one multiplier per constraint, or none"
         );
         Self {
             set,
@@ -91,33 +91,28 @@ impl<'a, T: Scalar> Colored<'a, T> {
         }
     }
 
-    /// Takes a chunk that nobody took yet and projects it; `false` when none is left.
+    /// Takes the next free chunk and projects it. Returns `false` if no chunk is left.
     pub fn project_next_chunk(&self) -> bool {
-        let taken = self.next.fetch_add(1, Ordering::Relaxed);
-        let start = self.range.start + taken.saturating_mul(CHUNK).min(self.range.len());
-        let end = self.range.end.min(start.saturating_add(CHUNK));
-        if start >= end {
-            return false;
-        }
+        let Some(range) = next_chunk(&self.next, &self.range, CHUNK) else { return false };
         let multipliers: &mut [T] = if self.keeps_multipliers {
-            // SAFETY: start..end lies within the set, whose length the multipliers have; the counter hands it out
-            // once, so that no other slice overlaps it.
-            unsafe { std::slice::from_raw_parts_mut(self.multipliers.add(start), end - start) }
+            // SAFETY: the range lies within the set, and there is one multiplier per constraint of
+            // the set. The counter hands the range out once, so that no other slice overlaps it.
+            unsafe { std::slice::from_raw_parts_mut(self.multipliers.add(range.start), range.len()) }
         } else {
             &mut []
         };
         let vertices = SharedVertices { vertices: self.vertices, borrow: PhantomData };
-        self.set.project_shared(start..end, vertices, self.step, multipliers);
+        self.set.project_shared(ConstraintChunk { range, vertices, step: self.step, multipliers });
         true
     }
 
-    /// Number of chunks, an upper bound of the threads that can help.
+    /// Returns the number of chunks, which is an upper bound of the threads that can help.
     pub fn chunks(&self) -> usize {
         self.range.len().div_ceil(CHUNK)
     }
 }
 
-/// Vertices that a thread takes at a time. Fixed; results do not depend on it.
+/// Number of vertices of a chunk. It is fixed, and results do not depend on it.
 const VERTEX_CHUNK: usize = 128;
 
 /// One color of vertices, shared between the threads that move them.
@@ -129,16 +124,16 @@ pub struct ColoredVertices<'a, T: Scalar> {
     previous: &'a [Point3<T>],
     velocities: &'a [Vector3<T>],
     vertices: *mut Vertex<T>,
-    vertex_count: usize,
     borrow: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: sharing it only lets threads take distinct chunks, as above.
+// SAFETY: threads that share it can only take distinct chunks (see the top of the file).
 unsafe impl<T: Scalar> Sync for ColoredVertices<'_, T> {}
 
 impl<'a, T: Scalar> ColoredVertices<'a, T> {
-    /// Prepares a color of `descent`, which must be that of `system`.
-    pub(crate) fn new(system: &'a mut System<T>, descent: &'a Descent<T>, pass: ColorPass) -> Self {
+    /// Prepares a color for several threads.
+    pub fn new(color: VertexColor<'a, T>) -> Self {
+        let VertexColor { system, descent, pass } = color;
         let System { vertices, previous, velocities, kinds, .. } = system;
         Self {
             kinds,
@@ -148,63 +143,46 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
             previous,
             velocities,
             vertices: vertices.as_mut_ptr(),
-            vertex_count: vertices.len(),
             borrow: PhantomData,
         }
     }
 
-    /// Takes a chunk that nobody took yet and moves its vertices; `false` when none is left.
+    /// Takes the next free chunk and moves its vertices. Returns `false` if no chunk is left.
     pub fn move_next_chunk(&self) -> bool {
-        let Some(chosen) = self.next_chunk() else { return false };
+        let Some(range) = next_chunk(&self.next, &self.range, VERTEX_CHUNK) else { return false };
+        let indices = &self.descent.groups().order[range];
         let mut forces = [VertexForce::none(); VERTEX_CHUNK];
-        let forces = &mut forces[..chosen.len()];
+        let forces = &mut forces[..indices.len()];
         let shared = || SharedVertices { vertices: self.vertices, borrow: PhantomData };
         for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
-            kind.pull_shared(incidence, chosen, shared(), forces);
+            kind.vertex_forces_shared(VertexChunk { incidence, indices, vertices: shared(), forces });
         }
         let mut vertices = shared();
-        for (&vertex, vertex_force) in chosen.iter().zip(forces) {
-            vertices.store(vertex, self.moved(vertex, vertices.load(vertex), vertex_force));
+        for (&index, force) in indices.iter().zip(forces) {
+            let i = index as usize;
+            let (previous, velocity) = (&self.previous[i], &self.velocities[i]);
+            let moved = self.descent.step().moved(vertices.load(index), previous, velocity, force);
+            vertices.store(index, moved);
         }
         true
     }
 
-    /// Moves all vertices of the color one by one, in safe scalar code.
-    pub fn move_one_by_one(self) {
-        // SAFETY: `self` is consumed, so that no thread shares it any more, and was made from this exclusive borrow.
-        let vertices = unsafe { std::slice::from_raw_parts_mut(self.vertices, self.vertex_count) };
-        while let Some(chosen) = self.next_chunk() {
-            for vertex in chosen {
-                let mut vertex_force = VertexForce::none();
-                let (chosen, forces) =
-                    (std::slice::from_ref(vertex), std::slice::from_mut(&mut vertex_force));
-                for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
-                    kind.vertex_force(incidence, chosen, vertices, forces);
-                }
-                vertices[*vertex as usize] = self.moved(*vertex, vertices[*vertex as usize], &vertex_force);
-            }
-        }
-    }
-
-    fn next_chunk(&self) -> Option<&'a [u32]> {
-        let taken = self.next.fetch_add(1, Ordering::Relaxed);
-        let start = self.range.start + taken.saturating_mul(VERTEX_CHUNK).min(self.range.len());
-        let end = self.range.end.min(start.saturating_add(VERTEX_CHUNK));
-        (start < end).then(|| &self.descent.groups().order[start..end])
-    }
-
-    fn moved(&self, index: u32, vertex: Vertex<T>, vertex_force: &VertexForce<T>) -> Vertex<T> {
-        let i = index as usize;
-        self.descent.step().moved(vertex, &self.previous[i], &self.velocities[i], vertex_force)
-    }
-
-    /// Number of chunks, an upper bound of the threads that can help.
+    /// Returns the number of chunks, which is an upper bound of the threads that can help.
     pub fn chunks(&self) -> usize {
         self.range.len().div_ceil(VERTEX_CHUNK)
     }
 }
 
-/// The vertices as one chunk sees them. Only a batch can read or write through it, with its own checked indices.
+/// Takes the next `size` elements of `range`, or the rest of it. Each element is handed out once.
+fn next_chunk(next: &AtomicUsize, range: &Range<usize>, size: usize) -> Option<Range<usize>> {
+    let number = next.fetch_add(1, Ordering::Relaxed);
+    let start = range.start + number.saturating_mul(size).min(range.len());
+    let end = range.end.min(start.saturating_add(size));
+    (start < end).then_some(start..end)
+}
+
+/// The vertices as seen by one chunk. Only a batch can access vertices through it, with indices
+/// that the batch has checked.
 pub struct SharedVertices<'a, T> {
     vertices: *mut Vertex<T>,
     borrow: PhantomData<&'a mut Vertex<T>>,
@@ -213,8 +191,8 @@ pub struct SharedVertices<'a, T> {
 impl<T: Copy> Load<T> for SharedVertices<'_, T> {
     #[inline(always)]
     fn load(&self, index: u32) -> Vertex<T> {
-        // SAFETY: a batch only passes its own indices, all below the number of vertices, and no other thread moves
-        // a vertex of the constraint in work (top of the file).
+        // SAFETY: a batch passes only its own indices, which are below the number of vertices. No
+        // other thread moves a vertex of the constraint at hand (see the top of the file).
         unsafe { *self.vertices.add(index as usize) }
     }
 }
@@ -222,7 +200,10 @@ impl<T: Copy> Load<T> for SharedVertices<'_, T> {
 impl<T: Copy> Store<T> for SharedVertices<'_, T> {
     #[inline(always)]
     fn store(&mut self, index: u32, vertex: Vertex<T>) {
-        // SAFETY: as for `load`.
+        // SAFETY: the conditions of `load` hold. No other thread reads this vertex meanwhile.
         unsafe { *self.vertices.add(index as usize) = vertex }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,24 +1,36 @@
-//! Vertex block descent: what acts on a vertex, and the step that it takes.
+//! Vertex block descent: the forces on a vertex and the step that it takes.
 //!
-//! An implicit step of length `h` ends where `Σ m/(2h²)|x − x̃|² + Σ C²/(2α)` is least, with `x̃ = x_n + h·v + h²·g`. The
-//! vertices go there one after the other (a color of them at a time): each to where the sum, as a function of this vertex
-//! alone, is least in a quadratic model. Source: Chen, Liu, Yang, Yuksel, *Vertex Block Descent*, ACM Trans. Graph. 43 (2024),
-//! eq. 5–9. Different here:
+//! An implicit time step of length `h` ends at the minimum of
+//! `Σ m/(2h²)|x − x̃|² + Σ C²/(2α)`, with `x̃ = x_n + h·v + h²·g`. Vertex block descent moves one
+//! vertex after the other (one color of them at a time). Each vertex goes to the minimum of a
+//! quadratic model of this sum as a function of its own position. Source: Chen, Liu, Yang, Yuksel,
+//! *Vertex Block Descent*, ACM Trans. Graph. 43 (2024), eq. 5–9. This implementation differs in
+//! four points:
 //!
-//! - **Curvature from `C` and `∇C` alone.** The model's matrix is `m/h² + Σ (∇C∇Cᵀ + κ·1)/α` with `κ = |∇C|²·C⁺/(C⁺ + R)`, `C⁺` the
-//!   stretch and `R` the rest size. For a distance `C⁺ + R` is the length, and `κ = C/length` the true curvature across
-//!   the edge; for an area likewise; a volume has none in a single vertex. What is compressed has a negative curvature, which is
-//!   left out. So the matrix is positive definite whatever the shape, and bounds the true one for distances, areas and volumes. Of amplified
-//!   skin, `U'' ∝ 1 + 2βC/A0` along `∇A`, it has at least three quarters: a step lowers the energy for `ω ≤ 1.5`.
-//! - **The start is `x_n + h·v`, without gravity.** A body in static equilibrium then has no force left on any vertex at the
-//!   start, and stays: what comes to rest is in equilibrium for any number of iterations and substeps.
-//! - **There and back**: an iteration is two passes over the colors. In the first half of a substep's passes they take their turns
-//!   in order, in the second half in the opposite order. Where forces are linear, with `A = M/h² + K`, what the first half leaves of an
-//!   error is some `W`, and both leave `S = W*W`, with `W*` the adjoint of `W` in the product of `A`; so `(I − S)(I − A⁻¹M/h²)` has its eigenvalues between 0 and 1, and those of
-//!   `x_{n+1} = Q(2x_n − x_{n−1})`, with `Q` what is left to 1, satisfy `|λ|² = q ≤ 1`: no motion grows, for any stiffness, step, `ω` and
-//!   number of iterations. One way only, `Q` is not symmetric, and motions do grow. Turning round in every iteration would be as
-//!   stable, but takes more of them (`cargo xtask accuracy --trials`): two passes that meet undo little that the other left.
-//! - **Over-relaxation**: a step may be `ω` times as long, `0 < ω < 2`, as in successive over-relaxation.
+//! - **Curvature from `C` and `∇C` alone.** The model's matrix is
+//!   `m/h² + Σ (∇C∇Cᵀ + κ·1)/α` with `κ = |∇C|²·C⁺/(C⁺ + R)`, where `C⁺ = max(C, 0)` and `R` is the
+//!   rest size. For a distance, `C⁺ + R` is the length, and `κ = C/length` is the true curvature
+//!   across the edge. The same holds for an area. A volume has no curvature in a single vertex. A
+//!   compressed constraint has negative curvature, which the model omits. So the matrix is positive
+//!   definite for every shape, and it bounds the true matrix for distances, areas and volumes. For
+//!   amplified skin, where `U'' ∝ 1 + 2βC/A0` along `∇A`, the model has at least three quarters of
+//!   the true curvature, so that a step lowers the energy for `ω ≤ 1.5`.
+//! - **The start is `x_n + h·v`, without gravity.** At the start of a step, a body in static
+//!   equilibrium has no net force on any vertex and does not move. So a body at rest is in
+//!   equilibrium for any number of iterations and substeps.
+//! - **Symmetric sweep.** An iteration is two passes over the colors. The first half of a substep's
+//!   passes visits the colors in ascending order, and the second half in descending order. For
+//!   linear forces with `A = M/h² + K`, let `W` be the operator that the first half applies to an
+//!   error. Both halves together apply `S = W*W`, where `W*` is the adjoint of `W` in the inner
+//!   product of `A`. So the eigenvalues of `(I − S)(I − A⁻¹M/h²)` are between 0 and 1. With
+//!   `Q = I − (I − S)(I − A⁻¹M/h²)`, the eigenvalues of `x_{n+1} = Q(2x_n − x_{n−1})` satisfy
+//!   `|λ|² = q ≤ 1` for an eigenvalue `q` of `Q`. So no motion grows, for any stiffness, step length,
+//!   `ω` and number of iterations.
+//!   With ascending passes only, `Q` is not symmetric, and motions do grow. A change of direction in
+//!   every iteration is equally stable but needs more iterations, because two passes that follow
+//!   each other in opposite directions repeat much of the same work.
+//! - **Over-relaxation.** A step may be `ω` times as long, `0 < ω < 2`, as in successive
+//!   over-relaxation.
 
 use cutis_coloring::{ColoringError, Groups, Incidence, Tuples, greedy_vertices};
 use cutis_constraints::{Real, Scalar};
@@ -26,49 +38,51 @@ use nalgebra::{Point3, Vector3};
 
 use crate::{Formulation, Kind, Settings, SolverError, System, Vertex};
 
-/// Force on a vertex, in N, and the matrix of its quadratic model, in N/m, summed over constraints.
+/// Force on a vertex in N and the matrix of its quadratic model in N/m, summed over constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexForce<T> {
-    /// `−Σ C·∇C/α`.
+    /// The force `−Σ C·∇C/α`.
     pub force: Vector3<T>,
-    /// The entries xx, yy, zz.
+    /// Matrix entries xx, yy, zz.
     pub diagonal: Vector3<T>,
-    /// The entries xy, xz, yz.
+    /// Matrix entries xy, xz, yz.
     pub mixed: Vector3<T>,
 }
 
 impl<T: Real> VertexForce<T> {
-    /// Nothing acts.
+    /// Returns zero force and a zero matrix.
     pub fn none() -> Self {
         Self { force: Vector3::zeros(), diagonal: Vector3::zeros(), mixed: Vector3::zeros() }
     }
 
-    /// Adds a constraint with the value `c`, the gradient `g` at this vertex, a compliance and a rest size.
+    /// Adds a constraint with the value `c`, the gradient `g` at this vertex, a compliance and a rest
+    /// size.
     #[inline(always)]
     pub fn add(&mut self, c: T, g: &Vector3<T>, compliance: T, rest_size: T) {
         let zero = T::zero();
         let stiffness = T::one() / compliance;
-        let kg = g * stiffness;
+        let stiff_gradient = g * stiffness;
         let stretch = c.simd_max(zero);
         let size = stretch + rest_size.simd_abs();
-        let share = (stretch / size).select(size.simd_gt(zero), zero);
-        let curvature = stiffness * (g.dot(g) * share);
-        self.force -= kg * c;
-        self.diagonal += kg.component_mul(g) + Vector3::repeat(curvature);
-        self.mixed += Vector3::new(kg.x * g.y, kg.x * g.z, kg.y * g.z);
+        let fraction = (stretch / size).select(size.simd_gt(zero), zero);
+        let curvature = stiffness * (g.dot(g) * fraction);
+        self.force -= stiff_gradient * c;
+        self.diagonal += stiff_gradient.component_mul(g) + Vector3::repeat(curvature);
+        let [x, y] = [stiff_gradient.x, stiff_gradient.y];
+        self.mixed += Vector3::new(x * g.y, x * g.z, y * g.z);
     }
 }
 
-/// The numbers of a substep in the solver's own type.
+/// Constants of a substep in the solver's number type.
 #[derive(Clone, Copy, Debug)]
 pub struct DescentStep<T> {
-    /// Length of a substep, `h`, in s.
+    /// Length `h` of a substep in s.
     pub h: T,
-    /// `h²·g` in m.
-    pub fall: Vector3<T>,
+    /// Gravity times `h²`, in m.
+    pub gravity_h_squared: Vector3<T>,
     /// `1/h²` in 1/s².
     pub inverse_h_squared: T,
-    /// `ω`.
+    /// Over-relaxation `ω`.
     pub relaxation: T,
 }
 
@@ -77,33 +91,36 @@ impl<T: Scalar> DescentStep<T> {
         let h = settings.substep_s();
         Self {
             h: T::constant(h),
-            fall: Vector3::from(settings.gravity_m_s2.map(|g| T::constant(g * h * h))),
+            gravity_h_squared: Vector3::from(settings.gravity_m_s2.map(|g| T::constant(g * h * h))),
             inverse_h_squared: T::constant(1.0 / (h * h)),
             relaxation: T::constant(settings.relaxation),
         }
     }
 
-    /// The vertex after its step: `x + ω·H⁻¹·f` by LDLᵀ. In exact arithmetic each pivot of `H` is at least the inertia `m/h²`, and rounding
-    /// does not take it below. Where constraints are so stiff that the inertia is lost in the rounding of `H` itself, `H` counts it as
-    /// `4ε·tr H`: what is left of `f` across the constraints is rounding too, and would throw the vertex. A larger `H` shortens the
-    /// step; along the constraints it stays what it is.
+    /// Returns the vertex after its step, `x + ω·H⁻¹·f` by LDLᵀ.
+    ///
+    /// In exact arithmetic each pivot of `H` is at least the inertia `m/h²`. The code keeps this
+    /// bound under rounding. If constraints are so stiff that the inertia is lost in the rounding
+    /// of `H`, the code uses `4ε·tr H` in its place. In this case the components of `f` across the
+    /// constraints consist of rounding errors and would move the vertex far away. A larger `H`
+    /// shortens the step across the constraints and leaves the step along them unchanged.
     #[inline]
     pub(crate) fn moved(
         &self,
         vertex: Vertex<T>,
         previous: &Point3<T>,
         velocity: &Vector3<T>,
-        vertex_force: &VertexForce<T>,
+        force: &VertexForce<T>,
     ) -> Vertex<T> {
         let x = vertex.position();
         let inertia = self.inverse_h_squared / vertex.inverse_mass();
-        let target = previous + velocity * self.h + self.fall;
-        let f = vertex_force.force + (target - x) * inertia;
-        let d = vertex_force.diagonal;
+        let target = previous + velocity * self.h + self.gravity_h_squared;
+        let f = force.force + (target - x) * inertia;
+        let d = force.diagonal;
         let noise = T::constant(4.0) * T::simd_default_epsilon();
         let least = ((d.x + d.y + d.z) * noise).simd_max(inertia);
         let a = d + Vector3::repeat(least);
-        let b = vertex_force.mixed;
+        let b = force.mixed;
         let l21 = b.x / a.x;
         let l31 = b.y / a.x;
         let d2 = (a.y - l21 * b.x).simd_max(least);
@@ -122,8 +139,8 @@ impl<T: Scalar> DescentStep<T> {
     }
 }
 
-/// What vertex block descent needs of a system beside its constraints: in which groups its vertices move, and which constraints
-/// each is in.
+/// Data for vertex block descent: the color groups of the vertices and the constraints at each
+/// vertex.
 #[derive(Clone, Debug)]
 pub struct Descent<T: Scalar> {
     groups: Groups,
@@ -132,10 +149,12 @@ pub struct Descent<T: Scalar> {
 }
 
 impl<T: Scalar> Descent<T> {
-    /// For `system`, with its groups of vertices, or greedy ones if it was given none.
+    /// Prepares vertex block descent for `system`, with the system's vertex groups if it has any,
+    /// else with greedy ones.
     ///
     /// # Errors
-    /// A kind with a constraint that has no compliance to divide by, or groups that do not fit.
+    /// Returns [`SolverError::Stiffness`] for a compliance of zero, and [`SolverError::Groups`] if
+    /// two vertices of a group share a constraint.
     pub fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
         for kind in system.kinds() {
             check_compliances(kind)?;
@@ -149,29 +168,30 @@ impl<T: Scalar> Descent<T> {
         Ok(Self { groups, incidences, step: DescentStep::new(settings) })
     }
 
-    /// The vertices that move, color after color: no two of a color are in one constraint.
+    /// Returns the moving vertices by color. Two vertices of one color never share a constraint.
     pub fn groups(&self) -> &Groups {
         &self.groups
     }
 
-    /// For each kind, where its constraints name each vertex.
+    /// Returns, for each kind, the constraints at each vertex.
     pub fn incidences(&self) -> &[Incidence] {
         &self.incidences
     }
 
-    /// The numbers of a substep.
+    /// Returns the constants of a substep.
     pub fn step(&self) -> &DescentStep<T> {
         &self.step
     }
 
-    /// Bytes stored.
+    /// Returns the memory of the groups and incidences in bytes.
     pub fn bytes(&self) -> usize {
         let groups = size_of_val(self.groups.order.as_slice()) + size_of_val(self.groups.offsets.as_slice());
         groups + self.incidences.iter().map(Incidence::bytes).sum::<usize>()
     }
 }
 
-/// Those that the system was given, or greedy ones, without the vertices that do not move; checked.
+/// Returns the verified vertex groups of the system, or greedy ones, without the vertices that do
+/// not move.
 fn groups_of<T: Scalar>(
     system: &System<T>,
     tuples: &[Tuples<'_>],
@@ -208,12 +228,12 @@ fn check_compliances<T: Scalar>(kind: &Kind<T>) -> Result<(), SolverError> {
             kind: kind.name(),
             constraint,
             value: value.to_f64(),
-            expected: "a compliance above 0, whose inverse the number type can hold: vertex block descent has no rigid constraints",
+            expected: "a compliance above 0 with a finite inverse, since vertex block descent has no rigid constraints",
         }),
     }
 }
 
-/// Whether a kind with a stiffness of `found` can be solved by `asked`.
-pub(crate) fn suits(found: Formulation, asked: Formulation) -> bool {
-    found == asked || (found == Formulation::Xpbd && asked == Formulation::Vbd)
+/// True if a kind with a stiffness for `found` can be solved with the formulation `expected`.
+pub(crate) fn accepts(found: Formulation, expected: Formulation) -> bool {
+    found == expected || (found == Formulation::Xpbd && expected == Formulation::Vbd)
 }

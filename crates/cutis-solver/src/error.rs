@@ -1,194 +1,197 @@
-//! Everything that can be wrong with a system, its settings or a run.
+//! Errors of systems, settings and runs.
 
 use crate::{Clock, Formulation, Settings};
 
-/// Why a system was refused or a step stopped.
+/// An error in the input of a solver or during a step.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SolverError {
-    /// A setting has a value that cannot be used.
+    /// A setting is out of range.
     #[error("{key} is {value}; expected {expected}")]
     Setting {
         /// Name of the setting.
         key: &'static str,
-        /// What it was.
+        /// The value.
         value: f64,
-        /// What would be right.
+        /// The values that are allowed.
         expected: &'static str,
     },
     /// An array given for the vertices has the wrong length.
     #[error("{what} has {found} entries; expected {expected}, one per vertex")]
     VertexLength {
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
         /// Its length.
         found: usize,
         /// The number of vertices.
         expected: usize,
     },
-    /// More vertices or constraints than a 32-bit index can name.
-    #[error("{count} {what} are too many; at most {} can be numbered", u32::MAX)]
+    /// There are more vertices or constraints than a 32-bit index can address.
+    #[error("{count} {what} are too many; expected at most {}", u32::MAX)]
     TooMany {
-        /// What is counted.
+        /// `vertices` or `constraints`.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
-    /// A vertex has a value that cannot be used.
+    /// A value of a vertex is out of range.
     #[error("vertex {vertex}: {what} is {value}; expected {expected}")]
     Vertex {
-        /// Which vertex.
+        /// Index of the vertex.
         vertex: usize,
-        /// Which value of it.
+        /// Name of the value.
         what: &'static str,
-        /// What it was.
+        /// The value.
         value: f64,
-        /// What would be right.
+        /// The values that are allowed.
         expected: &'static str,
     },
     /// An array given for a kind of constraint has the wrong length.
     #[error("{kind}: {found} {what}; expected {expected}, one per constraint")]
     KindLength {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
         /// Its length.
         found: usize,
         /// The number of constraints.
         expected: usize,
     },
-    /// A constraint names a vertex that does not exist.
-    #[error("{kind} constraint {constraint} names vertex {vertex}, but there are {vertex_count} vertices")]
+    /// A constraint refers to a vertex that does not exist.
+    #[error(
+        "{kind} constraint {constraint} refers to vertex {vertex}, but there are {vertex_count} vertices"
+    )]
     VertexOutOfRange {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// Which constraint.
+        /// Index of the constraint.
         constraint: usize,
-        /// The vertex it names.
+        /// Index of the vertex.
         vertex: u32,
         /// The number of vertices.
         vertex_count: usize,
     },
-    /// A constraint names a vertex twice.
-    #[error("{kind} constraint {constraint} names vertex {vertex} twice; its vertices must differ")]
+    /// A constraint refers to a vertex twice.
+    #[error("{kind} constraint {constraint} refers to vertex {vertex} twice; expected different vertices")]
     RepeatedVertex {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// Which constraint.
+        /// Index of the constraint.
         constraint: usize,
-        /// The vertex it names twice.
+        /// Index of the vertex.
         vertex: u32,
     },
     /// A parameter (rest length, rest volume, …) is not finite.
     #[error("{kind} constraint {constraint}: parameter {parameter} is {value}; expected a finite number")]
     Parameter {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// Which constraint.
+        /// Index of the constraint.
         constraint: usize,
-        /// Which of its parameters, counted from 0.
+        /// Index of the parameter.
         parameter: usize,
-        /// What it was.
+        /// The value.
         value: f64,
     },
-    /// The rest shape of a constraint has no size: a mesh with two vertices at one place, a flat triangle or tetrahedron.
+    /// The rest shape of a constraint has size zero: two vertices coincide, or a triangle or
+    /// tetrahedron is flat.
     #[error(
-        "{kind} constraint {constraint} of the vertices {vertices:?} has a rest shape of size 0; \
-             its vertices must span an element"
+        "{kind} constraint {constraint} with the vertices {vertices:?} has a rest shape of size 0; \
+             expected an edge of positive length or an element that is not flat"
     )]
     RestShape {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// Which constraint.
+        /// Index of the constraint.
         constraint: usize,
-        /// Its vertices.
+        /// Indices of the vertices.
         vertices: Vec<u32>,
     },
-    /// A constraint is violated and cannot act: its gradient is zero, as where its vertices have collapsed to a point or a
-    /// line. No step will change that by itself.
+    /// A violated constraint cannot act, because its gradient is zero. This happens if its vertices
+    /// have collapsed to a point or a line. More steps do not resolve it.
     #[error(
-        "{kind} of the vertices {vertices:?} is off by {ratio} of its rest size and has no gradient there: \
-             its vertices have collapsed, and nothing says in which direction they should part"
+        "the {kind} constraint with the vertices {vertices:?} is violated by {ratio} of its rest size \
+             but has no gradient: its vertices have collapsed, and no direction separates them"
     )]
     Collapsed {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// The vertices of the constraint.
+        /// Indices of the vertices of the constraint.
         vertices: Vec<u32>,
-        /// Its value over its rest size.
+        /// Value over rest size.
         ratio: f64,
     },
     /// A stiffness or a compliance is out of range.
     #[error("{kind}{}: stiffness is {value}; expected {expected}", constraint.map(|k| format!(" constraint {k}")).unwrap_or_default())]
     Stiffness {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// Which constraint; `None` when one value serves all of them.
+        /// Index of the constraint, or `None` for a value of all constraints.
         constraint: Option<usize>,
-        /// What it was.
+        /// The value.
         value: f64,
-        /// What would be right.
+        /// The values that are allowed.
         expected: &'static str,
     },
-    /// The groups do not fit the constraints.
+    /// The color groups do not fit the constraints.
     #[error("{kind}: the groups do not fit the constraints: {reason}")]
     Groups {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// What the coloring found.
+        /// The error of the coloring.
         reason: String,
     },
-    /// A kind was given the stiffness of another formulation than the settings ask for.
-    #[error("{kind} has a stiffness for {found:?}, but the settings ask for {expected:?}")]
+    /// The stiffness of a kind is for another formulation than that of the settings.
+    #[error("{kind} has a stiffness for {found:?}, but the settings select {expected:?}")]
     Formulation {
-        /// Which kind.
+        /// Name of the kind.
         kind: &'static str,
-        /// What its stiffness is for.
+        /// The formulation of the stiffness.
         found: Formulation,
-        /// What the settings say.
+        /// The formulation of the settings.
         expected: Formulation,
     },
-    /// A handle moves a vertex that does not exist, or that another handle moves already.
+    /// A vertex of a handle does not exist or belongs to another handle.
     #[error("handle {handle}: vertex {vertex} {reason}")]
     Handle {
-        /// Which handle, in the order they were added.
+        /// Index of the handle, in the order in which handles were added.
         handle: usize,
-        /// Which vertex.
+        /// Index of the vertex.
         vertex: u32,
-        /// What is wrong with it.
+        /// Description of the problem.
         reason: &'static str,
     },
-    /// A position became infinite or NaN during a step. The positions were set back to those at `time_s`, the start of
-    /// that substep, and the velocities to zero.
+    /// A position became infinite or NaN during a step. The positions were reset to those at
+    /// `time_s`, the start of that substep, and the velocities to zero.
     #[error(
-        "vertex {vertex} left the finite numbers in frame {frame}, substep {substep}; \
-         the state is that of {time_s} s, at rest: try more substeps, more damping or a softer material"
+        "the position of vertex {vertex} is not finite after frame {frame}, substep {substep}; \
+             the state was reset to {time_s} s, at rest: try more substeps, more damping or a softer material"
     )]
     NotFinite {
         /// The first such vertex.
         vertex: usize,
-        /// Frame, counted from 0 at the start of the solver.
+        /// Index of the frame, counted from the start of the simulation.
         frame: u64,
-        /// Substep of that frame, counted from 0.
+        /// Index of the substep within the frame.
         substep: u32,
-        /// Time of the state that was kept, in seconds.
+        /// Time of the present state, in seconds.
         time_s: f64,
     },
-    /// The device of a backend failed. What the host last read of the body is kept, and is that of `time_s`.
-    #[error("the {backend} backend stopped: {reason}; the last state that was read is that of {time_s} s")]
+    /// The device of a backend failed. The host keeps the last state that it read, at `time_s`.
+    #[error("the {backend} backend stopped: {reason}; the last known state is that at {time_s} s")]
     Device {
-        /// Which backend.
+        /// Name of the backend.
         backend: &'static str,
-        /// What happened.
+        /// The error of the device.
         reason: String,
-        /// Time of the state that was kept, in seconds.
+        /// Time of the present state, in seconds.
         time_s: f64,
     },
 }
 
 impl SolverError {
-    /// [`NotFinite`](Self::NotFinite) for a body whose state is that of `clock`.
+    /// Returns [`NotFinite`](Self::NotFinite) for a state that was reset to the time of `clock`.
     pub fn not_finite(vertex: usize, clock: Clock, settings: &Settings) -> Self {
         let Clock { frame, substep } = clock;
         Self::NotFinite { vertex, frame, substep, time_s: clock.time_s(settings) }

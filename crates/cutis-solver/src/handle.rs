@@ -1,4 +1,4 @@
-//! Kinematic vertices: what a hand, a hook or a clamp moves along a given path.
+//! Kinematic vertices, which a hand, a hook or a clamp moves along a given path.
 
 use std::collections::HashSet;
 
@@ -7,21 +7,21 @@ use nalgebra::{Point3, Vector3};
 
 use crate::{SolverError, Vertex};
 
-/// A group of vertices that move a straight path at constant speed, then held.
+/// A group of vertices that move along a straight path at constant speed and then stay there.
 ///
-/// Its vertices take the inverse mass 0 and the position `rest + move_m·min(t/over_s, 1)`; with `over_s` 0 they are
-/// at the end of their path from the first substep on.
+/// The vertices get the inverse mass 0 and the position `rest + move_m·min(t/over_s, 1)`. If
+/// `over_s` is 0, they are at the end of the path from the first substep on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Handle {
-    /// The vertices it moves.
+    /// Indices of the vertices to move.
     pub vertices: Vec<u32>,
-    /// The whole path in meters.
+    /// Displacement at the end of the path, in meters.
     pub move_m: [f64; 3],
-    /// Time that the path takes, in seconds.
+    /// Duration of the movement, in seconds.
     pub over_s: f64,
 }
 
-/// A checked handle with the rest positions of its vertices.
+/// A validated handle with the rest positions of its vertices.
 #[derive(Clone, Debug)]
 pub struct KinematicHandle<T: Scalar> {
     vertices: Vec<u32>,
@@ -31,12 +31,13 @@ pub struct KinematicHandle<T: Scalar> {
 }
 
 impl<T: Scalar> KinematicHandle<T> {
-    /// Checks the numbers of `handle` and takes its vertices out of the dynamics. `taken` are those of other handles.
+    /// Checks the numbers of `handle` and sets the inverse masses of its vertices to 0.
+    /// `kinematic` holds the vertices of all handles so far.
     pub(crate) fn new(
         index: usize,
         handle: Handle,
         vertices: &mut [Vertex<T>],
-        taken: &mut HashSet<u32>,
+        kinematic: &mut HashSet<u32>,
     ) -> Result<Self, SolverError> {
         for value in handle.move_m {
             if !T::constant(value).is_finite() {
@@ -52,43 +53,43 @@ impl<T: Scalar> KinematicHandle<T> {
         let mut rest = Vec::with_capacity(handle.vertices.len());
         for &vertex in &handle.vertices {
             let error = |reason| SolverError::Handle { handle: index, vertex, reason };
-            let place = vertices.get_mut(vertex as usize).ok_or_else(|| error("does not exist"))?;
-            if !taken.insert(vertex) {
-                return Err(error("is moved by a handle already"));
+            let state = vertices.get_mut(vertex as usize).ok_or_else(|| error("does not exist"))?;
+            if !kinematic.insert(vertex) {
+                return Err(error("is already moved by another handle"));
             }
-            rest.push(place.position());
-            *place = Vertex::new(place.position(), T::zero());
+            rest.push(state.position());
+            *state = Vertex::new(state.position(), T::zero());
         }
         Ok(Self { vertices: handle.vertices, rest, move_m: handle.move_m, over_s: handle.over_s })
     }
 
-    /// The vertices it moves.
+    /// Returns the indices of the vertices that the handle moves.
     pub fn vertices(&self) -> &[u32] {
         &self.vertices
     }
 
-    /// Where they began, relative to [`System::origin`](crate::System::origin), in the order of
-    /// [`vertices`](Self::vertices).
+    /// Returns the rest positions in the order of [`vertices`](Self::vertices), in meters relative
+    /// to [`System::origin`](crate::System::origin).
     pub fn rest(&self) -> &[Point3<T>] {
         &self.rest
     }
 
-    /// How far they have come at `time_s`, in meters.
+    /// Returns the displacement at `time_s`, in meters.
     pub fn path(&self, time_s: f64) -> Vector3<T> {
-        let share = if time_s < self.over_s { time_s / self.over_s } else { 1.0 };
-        Vector3::from(self.move_m.map(|d| T::constant(d * share)))
+        let fraction = if time_s < self.over_s { time_s / self.over_s } else { 1.0 };
+        Vector3::from(self.move_m.map(|d| T::constant(d * fraction)))
     }
 
     pub(crate) fn to_f64(&self) -> KinematicHandle<f64> {
         KinematicHandle {
             vertices: self.vertices.clone(),
-            rest: self.rest.iter().map(|place| place.map(T::to_f64)).collect(),
+            rest: self.rest.iter().map(|position| position.map(T::to_f64)).collect(),
             move_m: self.move_m,
             over_s: self.over_s,
         }
     }
 
-    /// Puts the vertices where they are at `time_s`.
+    /// Moves the vertices to their positions at `time_s`.
     pub(crate) fn advance(&self, vertices: &mut [Vertex<T>], time_s: f64) {
         let path = self.path(time_s);
         for (&vertex, rest) in self.vertices.iter().zip(&self.rest) {

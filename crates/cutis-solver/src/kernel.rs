@@ -1,20 +1,22 @@
-//! The projection of one constraint: the one function that every CPU backend runs.
+//! The projection of one constraint. Every CPU backend runs this function.
 
 use cutis_constraints::{Constraint, Real};
 use nalgebra::{Point3, Vector3, convert};
 
-/// From a constraint's value to the multiplier of its gradients.
+/// A formula for the multiplier of a constraint's gradients.
 pub trait Rule<T: Real>: Copy + Send + Sync {
-    /// `Δλ` for the value `c`, the weighted square of the gradients `Σ w|∇C|²`, the stiffness of the constraint and
-    /// its multiplier so far; zero where the quotient is undefined or overflows.
+    /// Returns `Δλ` for the value `c`, the weighted square of the gradients `Σ w|∇C|²`, the
+    /// stiffness of the constraint and its accumulated multiplier. The result is zero where the
+    /// quotient is undefined or overflows.
     fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T;
 }
 
-/// `Δλ = −s·C / Σ w|∇C|²` (Müller et al. 2007, eqs. 8–9); the stiffness is `s`.
+/// The PBD formula `Δλ = −s·C / Σ w|∇C|²` (Müller et al. 2007, eqs. 8–9) with the stiffness `s`.
 #[derive(Clone, Copy, Debug)]
 pub struct Pbd;
 
-/// `Δλ = (−C − α̃λ) / (Σ w|∇C|² + α̃)`, `α̃ = α/h²` (Macklin et al. 2016, eq. 18); the stiffness is `α`.
+/// The XPBD formula `Δλ = (−C − α̃λ) / (Σ w|∇C|² + α̃)` with `α̃ = α/h²` (Macklin et al. 2016,
+/// eq. 18). The stiffness is the compliance `α`.
 #[derive(Clone, Copy, Debug)]
 pub struct Xpbd<T> {
     /// `1/h²` in 1/s².
@@ -36,8 +38,8 @@ impl<T: Real> Rule<T> for Xpbd<T> {
     }
 }
 
-/// `numerator / denominator`, or zero where the denominator is zero or the quotient is not finite: a constraint whose
-/// vertices cannot move, or whose gradient vanishes, moves nothing.
+/// Returns `numerator / denominator`, or zero where the denominator is zero or the quotient is not
+/// finite. So a constraint whose vertices are fixed or whose gradient vanishes moves nothing.
 #[inline(always)]
 fn quotient_or_zero<T: Real>(numerator: T, denominator: T) -> T {
     let quotient = numerator / denominator;
@@ -46,27 +48,28 @@ fn quotient_or_zero<T: Real>(numerator: T, denominator: T) -> T {
     quotient.select(finite, T::zero())
 }
 
-/// The least `Σ w|∇C|²` with which no vertex is moved farther than the reach `r`: `w C²/r²`, with the lightest vertex's `w`.
-///
-/// For with any larger `D ≥ Σ w|∇C|²` a vertex moves by `w_i|∇_iC||C|/D ≤ √w_i·|C|/√D ≤ r`.
+/// Returns the smallest `Σ w|∇C|²` for which no vertex moves farther than the reach `r`. It is
+/// `w C²/r²`, where `w` is the inverse mass of the lightest vertex: for every `D ≥ Σ w|∇C|²` above
+/// it, a vertex moves by `w_i|∇_iC||C|/D ≤ √w_i·|C|/√D ≤ r`.
 #[inline(always)]
 fn least_square<T: Real, const N: usize>(w: &[T; N], c: T, inverse_reach_squared: T) -> T {
     let lightest = w.iter().fold(convert(0.0), |most: T, &w| most.simd_max(w));
     lightest * (c * inverse_reach_squared * c)
 }
 
-/// What one projection does.
+/// Result of one projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection<T, const N: usize> {
-    /// Correction of each position in meters.
+    /// Correction of each position, in meters.
     pub corrections: [Vector3<T>; N],
     /// Change of the multiplier.
     pub multiplier: T,
 }
 
-/// Projects constraint `C` at positions `x` with inverse masses `w`.
+/// Projects constraint `C` at the positions `x` with the inverse masses `w`.
 ///
-/// A pure function: it knows no index, no storage and no thread. `T` may be a number or a vector of lanes.
+/// This is a pure function, independent of indices, storage and threads. `T` may be a number or a
+/// vector of SIMD lanes.
 #[inline(always)]
 pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
     x: &[Point3<T>; N],
@@ -93,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn undefined_quotients_move_nothing() {
+    fn an_undefined_quotient_moves_nothing() {
         let rule = Xpbd { inverse_h_squared: 1.0f32 };
         assert_eq!(rule.multiplier(1.0, 0.0, 0.0, 0.0), 0.0);
         assert_eq!(rule.multiplier(1e-3, 1e-45, 0.0, 0.0), 0.0, "overflow");

@@ -1,22 +1,28 @@
 //! Position-based dynamics: the system, the schedule and the scalar reference solver.
 //!
-//! A [`System`] holds vertices and one batch of constraints per kind, grouped by color. A [`Schedule`] says what a
-//! frame executes, in which order. A [`Solver`] executes it: [`SolverReference`] here, one constraint after the other
-//! in safe scalar code (in `f64` the yardstick of every other backend), the multi-threaded one in `cutis-solver-cpu`.
-//! Both run the same [`Simulation`] and the same [`project`] function, so that their results are equal bit for bit.
+//! A [`System`] holds vertices and one batch of constraints per kind, grouped by color. A
+//! [`Schedule`] defines the work of a frame and its order. A [`Solver`] executes the schedule:
+//! [`SolverReference`] in this crate, `SolverCpu` with several threads in `cutis-solver-cpu`, and
+//! `SolverGpu` in `cutis-solver-gpu`. The reference solver processes one constraint after the other
+//! in safe scalar code. In `f64` it is the reference for the accuracy of all backends. Both CPU
+//! solvers run the same [`Simulation`] and the same [`project`] function, so that their results are
+//! equal bit for bit.
 //!
 //! # Formulations
-//! - [`Formulation::Pbd`] (Müller et al. 2007): `Δx_i = −s·w_i·∇_iC·C / Σ w|∇C|²`, `s` in `[0, 1]` per iteration.
-//! - [`Formulation::Xpbd`] (Macklin et al. 2016): `Δλ = (−C − α̃λ)/(Σ w|∇C|² + α̃)`, `Δx_i = w_i ∇_iC Δλ`, with
-//!   `α̃ = α/h²` and `λ = 0` at the start of every substep.
-//! - [`Formulation::Vbd`] (Chen et al. 2024): the same energies `½C²/α`; the energy of the implicit step falls vertex by vertex.
-//!   See [`VertexForce`] for what acts on a vertex, and `descent.rs` for what differs from the source.
+//! - [`Formulation::Pbd`] (Müller et al. 2007): `Δx_i = −s·w_i·∇_iC·C / Σ w|∇C|²` with a stiffness
+//!   `s` in `[0, 1]` per iteration.
+//! - [`Formulation::Xpbd`] (Macklin et al. 2016): `Δλ = (−C − α̃λ)/(Σ w|∇C|² + α̃)` and
+//!   `Δx_i = w_i ∇_iC Δλ`, with `α̃ = α/h²` and `λ = 0` at the start of every substep.
+//! - [`Formulation::Vbd`] (Chen et al. 2024): vertex block descent with the same energies `½C²/α`.
+//!   The energy of the implicit step decreases vertex by vertex. See [`VertexForce`] for the force on
+//!   a vertex, and `descent.rs` for the differences to the source.
 //!
-//! A note that is not legal advice: US patent 11,270,041 B2 is said to read on accumulating λ over iterations. `Pbd`
-//! and `Vbd` have no λ, and `Xpbd` with one iteration per substep neither stores nor accumulates one; all are complete.
+//! A note that is not legal advice: US patent 11,270,041 B2 is said to read on accumulating λ over
+//! iterations. `Pbd` and `Vbd` have no λ, and `Xpbd` with one iteration per substep neither stores
+//! nor accumulates one. All of them are complete.
 //!
 //! # Example
-//! A mass on a spring of compliance 0.01 m/N, let go at 1.1 times its rest length:
+//! A mass on a spring of compliance 0.01 m/N, released at 1.1 times its rest length:
 //! ```
 //! use cutis_solver::{Formulation, Settings, Solver, SolverReference, Stiffness, SystemBuilder};
 //! use cutis_constraints::Distance;
@@ -28,7 +34,8 @@
 //! let system = SystemBuilder::<f64>::new(&positions, &[0.0, 1.0])?
 //!     .add::<Distance, 2>(&spring, &[[1.0]], Stiffness::compliance(0.01), &groups)?
 //!     .build();
-//! let settings = Settings { formulation: Formulation::Xpbd, dt_s: 0.01, substeps: 10, ..Settings::default() };
+//! let formulation = Formulation::Xpbd;
+//! let settings = Settings { formulation, dt_s: 0.01, substeps: 10, ..Settings::default() };
 //! let mut solver = SolverReference::new(system, settings)?;
 //! solver.step(5)?;
 //! assert!(solver.positions()?[1].x < 1.1);
@@ -36,12 +43,13 @@
 //! ```
 //!
 //! # Unsafe code
-//! One file, `colored.rs`: the type [`Colored`], which lets several threads move the vertices of one color.
-//! Everything else of this crate and of the backends is safe code.
+//! Only `colored.rs` contains unsafe code. Its types [`Colored`] and [`ColoredVertices`] let several
+//! threads move the vertices of one color. The rest of this crate and the backends are safe code.
 
 mod batch;
 mod builder;
 mod clock;
+mod color;
 mod colored;
 mod descent;
 mod error;
@@ -62,13 +70,14 @@ mod vertex;
 
 pub use builder::SystemBuilder;
 pub use clock::Clock;
+pub use color::{ConstraintColor, VertexColor};
 pub use colored::{Colored, ColoredVertices};
 pub use descent::{Descent, DescentStep, VertexForce};
 pub use error::SolverError;
 pub use handle::{Handle, KinematicHandle};
 pub use kernel::{Pbd, Projection, Rule, Xpbd, project};
 pub use measures::{Energy, MemoryPart, Momentum, Residual};
-pub use passes::{Integrator, Motion, VertexBlock};
+pub use passes::{Integrator, VertexBlock, VertexPass};
 pub use reference::{Serial, SolverReference};
 pub use schedule::{ColorPass, Schedule, Sweep};
 pub use set::{ConstraintSet, Kind, Step};

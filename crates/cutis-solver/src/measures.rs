@@ -1,14 +1,14 @@
-//! What is measured about a state, on request only: residuals, energy, momentum, memory. All sums are in `f64` and in
-//! a fixed order.
+//! Measurements of a state: residuals, energy, momentum and memory. They are computed on request
+//! only. All sums are in `f64` and have a fixed order.
 
 use nalgebra::{Point3, Vector3};
 
-/// How far the constraints of a kind are from being met: `C` over the rest size.
+/// Relative violation of the constraints of one kind: `C` over the rest size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
-    /// Kind of constraint.
+    /// Name of the kind.
     pub name: &'static str,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
     /// Largest absolute value.
     pub max: f64,
@@ -26,20 +26,20 @@ impl Residual {
     }
 }
 
-/// Energy in joules; vertices with inverse mass 0 have none.
+/// Energy of a body in joules. Vertices with inverse mass 0 do not contribute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Energy {
-    /// `Σ ½m|v|²`.
+    /// Kinetic energy `Σ ½m|v|²`.
     pub kinetic_j: f64,
-    /// `Σ ½C²/α` over all constraints with `α > 0`; `None` where a kind has a PBD stiffness, which stands for no
-    /// energy.
+    /// Elastic energy `Σ ½C²/α` over all constraints with `α > 0`. `None` if a kind has a PBD
+    /// stiffness, which defines no energy.
     pub elastic_j: Option<f64>,
-    /// `−Σ m g·x`, zero at the origin of the caller's coordinates.
+    /// Potential energy `−Σ m g·x` of gravity, zero at the origin of the caller's coordinates.
     pub gravity_j: f64,
 }
 
 impl Energy {
-    /// Sum of the parts that are defined.
+    /// Returns the sum of the parts that are defined.
     pub fn total_j(&self) -> f64 {
         self.kinetic_j + self.elastic_j.unwrap_or(0.0) + self.gravity_j
     }
@@ -48,19 +48,19 @@ impl Energy {
 /// Momentum of the vertices with finite mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Momentum {
-    /// `Σ m v` in kg·m/s.
+    /// Linear momentum `Σ m v` in kg·m/s.
     pub linear: Vector3<f64>,
-    /// `Σ m (x − center)×v` in kg·m²/s.
+    /// Angular momentum `Σ m (x − center)×v` in kg·m²/s.
     pub angular: Vector3<f64>,
-    /// Center of mass in meters.
+    /// Center of mass in meters, in the caller's coordinates.
     pub center: Point3<f64>,
 }
 
-/// One line of the memory profile.
+/// Memory of one part of a solver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryPart {
-    /// What is stored: `vertices`, or a kind of constraint.
+    /// Name of the part: `vertices`, `handles`, or a kind of constraint.
     pub name: &'static str,
-    /// Bytes on the host.
+    /// Size in bytes.
     pub bytes: usize,
 }

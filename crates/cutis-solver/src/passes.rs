@@ -1,35 +1,36 @@
-//! The passes over vertices: prediction, velocity update, and both in one where a substep follows another.
+//! The passes over vertices: prediction, velocity update, and both combined between two substeps.
 
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{Formulation, Settings, Vertex};
 
-/// The same range of the three vertex arrays.
+/// A range of vertices, as slices of the three vertex arrays.
 pub struct VertexBlock<'a, T: Scalar> {
     /// Positions and inverse masses.
     pub vertices: &'a mut [Vertex<T>],
     /// Positions at the start of the substep.
     pub previous: &'a mut [Point3<T>],
-    /// Velocities in m/s; up to date between calls of `step`, not between the substeps of one call.
+    /// Velocities in m/s. They are up to date between calls of `step`, but not between the substeps
+    /// of one call.
     pub velocities: &'a mut [Vector3<T>],
 }
 
 impl<'a, T: Scalar> VertexBlock<'a, T> {
-    /// Number of vertices.
+    /// Returns the number of vertices.
     pub fn len(&self) -> usize {
         self.vertices.len()
     }
 
-    /// Whether there is none.
+    /// True if there are no vertices.
     pub fn is_empty(&self) -> bool {
         self.vertices.is_empty()
     }
 
-    /// The first `middle` vertices and the rest.
+    /// Splits the block into the first `middle` vertices and the rest.
     ///
     /// # Panics
-    /// If there are fewer than `middle`.
+    /// Panics if there are fewer than `middle` vertices.
     pub fn split_at(self, middle: usize) -> (Self, Self) {
         let (vertices, later_vertices) = self.vertices.split_at_mut(middle);
         let (previous, later_previous) = self.previous.split_at_mut(middle);
@@ -39,28 +40,29 @@ impl<'a, T: Scalar> VertexBlock<'a, T> {
     }
 }
 
-/// Which pass over the vertices is due.
+/// A pass over all vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
-    /// `v += h·g`, `p = x`, `x += h·v`, from the stored velocities.
+pub enum VertexPass {
+    /// Sets `v += h·g`, `p = x`, `x += h·v`, with the stored velocities.
     Predict,
-    /// [`Finish`](Self::Finish) and [`Predict`](Self::Predict) at once, without a trip of `v` through memory.
+    /// Combines [`Finish`](Self::Finish) and [`Predict`](Self::Predict) without storing `v`.
     FinishAndPredict,
-    /// `v = (x − p)/h · exp(−damping·h)`, stored.
+    /// Stores `v = (x − p)/h · exp(−damping·h)`.
     Finish,
-    /// `x = p`, `v = 0`: back to the start of the substep, at rest.
+    /// Sets `x = p`, `v = 0`: returns to the start of the substep, at rest.
     Restore,
 }
 
-/// The numbers of a substep in the solver's own type.
+/// Constants of a substep in the solver's number type.
 #[derive(Clone, Copy, Debug)]
 pub struct Integrator<T> {
-    /// Length of a substep, `h`, in s.
+    /// Length `h` of a substep in s.
     pub h: T,
-    /// `exp(−damping·h)/h` in 1/s: from a displacement to a velocity.
+    /// `exp(−damping·h)/h` in 1/s, the factor from a displacement to a velocity.
     pub velocity_factor: T,
-    /// Gravity times `h`, in m/s; zero for vertex block descent, where gravity is in the energy of the step
-    /// ([`DescentStep::fall`](crate::DescentStep::fall)).
+    /// Gravity times `h`, in m/s. Zero for vertex block descent, which includes gravity in the
+    /// energy of the step, see
+    /// [`DescentStep::gravity_h_squared`](crate::DescentStep::gravity_h_squared).
     pub gravity_h: Vector3<T>,
 }
 
@@ -89,29 +91,30 @@ impl<T: Scalar> Integrator<T> {
         }
     }
 
-    /// Runs one pass over a block. Every vertex is on its own, so that the blocks' sizes do not matter.
-    pub(crate) fn run(&self, motion: Motion, block: VertexBlock<'_, T>) {
+    /// Runs one pass over a block. Vertices do not depend on each other, so the result does not
+    /// depend on the size of the blocks.
+    pub(crate) fn run(&self, pass: VertexPass, block: VertexBlock<'_, T>) {
         let VertexBlock { vertices, previous, velocities } = block;
-        let places = vertices.iter_mut().zip(previous);
-        match motion {
-            Motion::Predict => {
-                for ((x, p), v) in places.zip(velocities) {
+        let positions = vertices.iter_mut().zip(previous);
+        match pass {
+            VertexPass::Predict => {
+                for ((x, p), v) in positions.zip(velocities) {
                     self.predict(x, p, *v);
                 }
             }
-            Motion::FinishAndPredict => {
-                for (x, p) in places {
+            VertexPass::FinishAndPredict => {
+                for (x, p) in positions {
                     let v = self.finish(x, p);
                     self.predict(x, p, v);
                 }
             }
-            Motion::Finish => {
-                for ((x, p), v) in places.zip(velocities) {
+            VertexPass::Finish => {
+                for ((x, p), v) in positions.zip(velocities) {
                     *v = self.finish(x, p);
                 }
             }
-            Motion::Restore => {
-                for ((x, p), v) in places.zip(velocities) {
+            VertexPass::Restore => {
+                for ((x, p), v) in positions.zip(velocities) {
                     x.set_position(*p);
                     *v = Vector3::zeros();
                 }

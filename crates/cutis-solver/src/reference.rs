@@ -1,11 +1,11 @@
-//! The reference solver: one constraint after the other, safe scalar code, no thread.
+//! The reference solver: one constraint after the other, in safe scalar code on one thread.
 
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    ColoredVertices, ConstraintSet, Execute, Settings, Simulation, Solver, SolverError, Step, StepProfile,
-    Sweep, System, Timed, Vertex, VertexBlock,
+    ConstraintColor, Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed, Vertex,
+    VertexBlock, VertexColor,
 };
 
 /// Runs every pass on the calling thread, in ascending order.
@@ -17,21 +17,12 @@ impl<T: Scalar> Execute<T> for Serial {
         pass(block);
     }
 
-    fn sweep(
-        &self,
-        sweep: Sweep,
-        set: &dyn ConstraintSet<T>,
-        vertices: &mut [Vertex<T>],
-        step: Step<T>,
-        multipliers: &mut [T],
-    ) {
-        let range = sweep.start..sweep.end;
-        let multipliers = multipliers.get_mut(range.clone()).unwrap_or_default();
-        set.project(range, vertices, step, multipliers);
+    fn project(&self, color: ConstraintColor<'_, T>) {
+        color.project();
     }
 
-    fn color_pass(&self, color: ColoredVertices<'_, T>) {
-        color.move_one_by_one();
+    fn descend(&self, color: VertexColor<'_, T>) {
+        color.descend();
     }
 
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {
@@ -39,16 +30,17 @@ impl<T: Scalar> Execute<T> for Serial {
     }
 }
 
-/// The yardstick of the other backends, in `f64`, and their bit-for-bit twin in their own precision.
+/// The reference for the other backends. In `f64` it defines the accuracy of a result, and in the
+/// number type of a backend it defines the bits.
 pub struct SolverReference<T: Scalar> {
     simulation: Simulation<T>,
 }
 
 impl<T: Scalar> SolverReference<T> {
-    /// A solver for `system`.
+    /// Builds a solver for `system`.
     ///
     /// # Errors
-    /// Settings that cannot be used, or a kind with a stiffness of the other formulation.
+    /// Returns the errors of [`Simulation::new`].
     pub fn new(system: System<T>, settings: Settings) -> Result<Self, SolverError> {
         Ok(Self { simulation: Simulation::new(system, settings)? })
     }

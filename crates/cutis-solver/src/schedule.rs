@@ -1,45 +1,48 @@
-//! What a frame executes, as plain data: every backend runs the same sweeps in the same order.
+//! The work of a frame as plain data. Every backend runs the same sweeps in the same order.
 
 use cutis_coloring::Groups;
 use cutis_constraints::Scalar;
 
 use crate::{Kind, Settings};
 
-/// One color of one kind: constraints `start..end` of that kind may be projected in any order, or at once.
+/// One color of one kind. The constraints `start..end` may be projected in any order or in parallel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sweep {
-    /// Kind, counted in the order the kinds were added.
+    /// Index of the kind, in the order in which the kinds were added.
     pub kind: usize,
-    /// Color of that kind.
+    /// Index of the color within the kind.
     pub color: usize,
     /// First constraint.
     pub start: usize,
-    /// One past the last.
+    /// One past the last element.
     pub end: usize,
 }
 
-/// One color of the vertices that move: they may be moved in any order, or at once.
+/// One color of the moving vertices. They may be moved in any order or in parallel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColorPass {
-    /// Color.
+    /// Index of the color.
     pub color: usize,
-    /// First vertex, in the order of the groups.
+    /// First vertex in the order of the groups.
     pub start: usize,
-    /// One past the last.
+    /// One past the last element.
     pub end: usize,
 }
 
-/// A frame: `substeps` times { predict and move handles; `iterations` times { the sweeps in order, or the color passes of the iteration };
-/// update velocities }.
+/// The schedule of a frame. Each of the `substeps` predicts positions, moves handles, runs
+/// `iterations` iterations and updates velocities. An iteration is all sweeps in order, or the color
+/// passes of vertex block descent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {
-    /// Substeps of a frame.
+    /// Number of substeps of a frame.
     pub substeps: u32,
-    /// Iterations of a substep.
+    /// Number of iterations of a substep.
     pub iterations: u32,
-    /// What one iteration projects, in order. Empty colors are left out. None in vertex block descent.
+    /// The projections of one iteration, in order, without empty colors. Empty in vertex block
+    /// descent.
     pub sweeps: Vec<Sweep>,
-    /// All colors of the vertices that move, in order, in vertex block descent; none elsewhere. See [`color_passes_of`](Self::color_passes_of).
+    /// All colors of the moving vertices, in order, without empty colors. Empty except in vertex
+    /// block descent. See [`color_passes_of`](Self::color_passes_of).
     pub color_passes: Vec<ColorPass>,
 }
 
@@ -68,25 +71,27 @@ impl Schedule {
             start: range[0] as usize,
             end: range[1] as usize,
         };
-        let there = groups.offsets.windows(2).enumerate().map(pass).filter(|pass| pass.start < pass.end);
+        let color_passes =
+            groups.offsets.windows(2).enumerate().map(pass).filter(|pass| pass.start < pass.end);
         let Settings { substeps, iterations, .. } = *settings;
-        Self { substeps, iterations, sweeps: Vec::new(), color_passes: there.collect() }
+        Self { substeps, iterations, sweeps: Vec::new(), color_passes: color_passes.collect() }
     }
 
-    /// The color passes of an iteration of vertex block descent, counted from 0, in order: all colors twice. Of all passes over the
-    /// colors in a substep the first half goes there and the second half back, so that a substep is symmetric: see the top
-    /// of `descent.rs`.
+    /// Returns the color passes of an iteration of vertex block descent in order. Iterations are
+    /// counted from 0, and each passes over all colors twice. In the first half of a substep the
+    /// passes ascend, and in the second half they descend, which makes the sweep of a substep
+    /// symmetric. The top of `descent.rs` explains why.
     pub fn color_passes_of(&self, iteration: u32) -> impl Iterator<Item = &ColorPass> {
         let sweep = |number: u64| {
-            let back = number >= u64::from(self.iterations);
+            let descending = number >= u64::from(self.iterations);
             let count = self.color_passes.len();
-            (0..count).map(move |n| &self.color_passes[if back { count - 1 - n } else { n }])
+            (0..count).map(move |n| &self.color_passes[if descending { count - 1 - n } else { n }])
         };
         let first = 2 * u64::from(iteration);
         sweep(first).chain(sweep(first + 1))
     }
 
-    /// Projections of one frame; in vertex block descent, steps of a vertex.
+    /// Returns the number of projections of one frame, or of vertex steps in vertex block descent.
     pub fn projections_per_frame(&self) -> u64 {
         let sweeps: u64 = self.sweeps.iter().map(|sweep| (sweep.end - sweep.start) as u64).sum();
         let color_passes: u64 = self.color_passes.iter().map(|pass| (pass.end - pass.start) as u64).sum();
@@ -99,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn half_of_a_substeps_passes_go_there_and_half_back() {
+    fn the_passes_of_a_substep_ascend_and_then_descend() {
         let groups = Groups { order: vec![4, 2, 7], offsets: vec![0, 1, 3] };
         let settings = Settings { iterations: 3, ..Settings::default() };
         let schedule = Schedule::of_vertices(&groups, &settings);

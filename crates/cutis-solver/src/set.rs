@@ -1,4 +1,4 @@
-//! A kind of constraint as backends see it: one virtual call per chunk of a color, never per constraint.
+//! The interface of a kind of constraint to backends, with one virtual call per chunk of a color.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,74 +9,82 @@ use nalgebra::{Point3, Vector3};
 use crate::batch::Project;
 use crate::{Residual, Stiffness, Vertex};
 
-/// What a substep asks of every projection.
+/// Parameters of a substep for every projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step<T> {
-    /// PBD.
+    /// PBD, which needs no parameter.
     Pbd,
-    /// XPBD.
+    /// XPBD with its time step.
     Xpbd {
         /// `1/h²` in 1/s².
         inverse_h_squared: T,
     },
 }
 
-/// All constraints of one kind, ordered by color. Implemented by what
-/// [`SystemBuilder::add`](crate::SystemBuilder::add) stores, and by nothing else.
+/// All constraints of one kind, ordered by color.
+///
+/// Only the type that [`SystemBuilder::add`](crate::SystemBuilder::add) stores implements this
+/// trait. Indices `k` of constraints count in the order of the colors.
 pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
-    /// The kind's name, [`Constraint::NAME`](cutis_constraints::Constraint::NAME).
+    /// Returns the name of the kind, [`Constraint::NAME`](cutis_constraints::Constraint::NAME).
     fn name(&self) -> &'static str;
-    /// Vertices of one constraint.
+    /// Returns the number of vertices of one constraint.
     fn arity(&self) -> usize;
-    /// Start of each color, and the end of the last one: `colors + 1` numbers.
+    /// Returns the start of each color and the end of the last one: `colors + 1` numbers.
     fn offsets(&self) -> &[u32];
-    /// The vertices of each constraint, `arity` of them in a row, ordered by color.
+    /// Returns the vertices of all constraints, `arity` of them in a row.
     fn indices(&self) -> &[u32];
-    /// Scalars of one constraint's parameters.
+    /// Returns the number of parameters of one constraint.
     fn param_count(&self) -> usize;
-    /// The parameters of each constraint, `param_count` scalars in a row, ordered by color.
+    /// Returns the parameters of all constraints, `param_count` scalars in a row.
     fn params(&self) -> &[T];
-    /// The size that the value of constraint `k` (in the order of the colors) is compared with.
+    /// Returns the rest size of constraint `k`, to which its value is compared.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// Panics if there is no such constraint.
     fn rest_size(&self, k: usize) -> T;
-    /// The kind in WGSL, [`Constraint::WGSL`](cutis_constraints::Constraint::WGSL).
+    /// Returns the WGSL source of the kind, [`Constraint::WGSL`](cutis_constraints::Constraint::WGSL).
     fn wgsl(&self) -> &'static str;
-    /// Stiffness, ordered by color where there is one for each constraint.
+    /// Returns the stiffness, with values per constraint in the order of the colors.
     fn stiffness(&self) -> &Stiffness<T>;
-    /// `C` over rest size at the given positions; rest sizes of zero are left out.
+    /// Returns `C` over the rest size at the given positions. Constraints with a rest size of zero do
+    /// not count.
     fn residual(&self, vertices: &[Vertex<T>]) -> Residual;
-    /// `Σ ½C²/α` in joules over the constraints with `α > 0`; `None` for a PBD stiffness, which stands for no energy.
+    /// Returns `Σ ½C²/α` in joules over the constraints with `α > 0`, or `None` for a PBD stiffness,
+    /// which defines no energy.
     fn elastic_energy(&self, vertices: &[Vertex<T>]) -> Option<f64>;
-    /// The first constraint (in the order of the colors) that is off by more than `tolerance` of its rest size and cannot
-    /// act, because its gradient is zero at every vertex that could move: its index, and its value over its rest size. Rest
-    /// sizes of zero are left out, and so are constraints of which no vertex can move.
+    /// Finds the first constraint that is violated by more than `tolerance` of its rest size but
+    /// cannot act, because its gradient is zero at every vertex that can move. Returns its index and
+    /// its value over its rest size. Constraints with a rest size of zero or without a vertex that
+    /// can move do not count.
     fn collapsed(&self, vertices: &[Vertex<T>], tolerance: f64) -> Option<(usize, f64)>;
-    /// `C` of constraint `k` (in the order of the colors) in `f64`, with its vertices at `x`; `grad` takes the gradients. For
-    /// whoever needs the energies without a solver.
+    /// Returns `C` of constraint `k` in `f64` with its vertices at `x`, and writes the gradients to
+    /// `grad`. Use it to compute energies and forces without a solver.
     ///
     /// # Panics
-    /// If there is no such constraint, or if `x` or `grad` has not [`arity`](Self::arity) elements.
+    /// Panics if there is no such constraint, or if `x` or `grad` does not have
+    /// [`arity`](Self::arity) elements.
     fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64;
-    /// The same constraints in double precision, with exactly these parameters and stiffnesses.
+    /// Returns the same constraints in double precision, with exactly these parameters and
+    /// stiffnesses.
     fn to_f64(&self) -> Kind<f64>;
-    /// Bytes that the kind stores.
+    /// Returns the memory of the kind in bytes.
     fn bytes(&self) -> usize;
 
-    /// Number of constraints.
+    /// Returns the number of constraints.
     fn len(&self) -> usize {
         self.offsets().last().map_or(0, |&end| end as usize)
     }
-    /// Whether there is none.
+    /// True if there are no constraints.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Number of colors.
+    /// Returns the number of colors.
     fn colors(&self) -> usize {
         self.offsets().len().saturating_sub(1)
     }
-    /// The constraints of `color`, as a range over the ordered constraints; empty for a color that does not exist.
+    /// Returns the constraints of `color` as a range of indices. The range is empty for a color that
+    /// does not exist.
     fn range(&self, color: usize) -> Range<usize> {
         match self.offsets().get(color..color.saturating_add(2)) {
             Some(&[start, end]) => start as usize..end as usize,
@@ -85,5 +93,6 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     }
 }
 
-/// A kind as a system stores it. It never changes, so that copies of a system share it.
+/// A kind of constraint as a system stores it. It never changes, so that clones of a system share
+/// it.
 pub type Kind<T> = Arc<dyn ConstraintSet<T>>;

@@ -1,41 +1,43 @@
-//! What the caller chooses about the time integration, checked once when a solver is built.
+//! Settings of the time integration, validated once when a solver is built.
 
 use crate::SolverError;
 
-/// How a constraint's value becomes a correction.
+/// The method that turns the value of a constraint into a correction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formulation {
-    /// Stiffness in `[0, 1]` per iteration (Müller et al. 2007). The result depends on iterations and time step.
+    /// PBD with a stiffness in `[0, 1]` per iteration (Müller et al. 2007). The result depends on the
+    /// number of iterations and the time step.
     Pbd,
-    /// Compliance in 1/(N/m) for a length, generally `1/k` of the energy `½kC²` (Macklin et al. 2016).
+    /// XPBD with a compliance `1/k` of the energy `½kC²`, in m/N for a length (Macklin et al. 2016).
     Xpbd,
-    /// The same compliances, with the energy of the step lowered vertex by vertex (vertex block descent, Chen et al. 2024).
-    /// What comes to rest is in equilibrium, whatever the number of iterations and substeps.
+    /// Vertex block descent with the compliances of XPBD (Chen et al. 2024). It lowers the energy of
+    /// the step vertex by vertex. A body at rest is in equilibrium for any number of iterations and
+    /// substeps.
     Vbd,
 }
 
-/// Time step, iterations and outer forces.
+/// Time step, iterations and external forces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// PBD or XPBD; must be what every kind of the system was given.
+    /// The formulation. Every kind of the system needs a stiffness for it.
     pub formulation: Formulation,
-    /// Time of one frame in seconds.
+    /// Duration of one frame in seconds.
     pub dt_s: f64,
-    /// Substeps of one frame, each `h = dt_s/substeps` long.
+    /// Number of substeps of one frame, each `h = dt_s/substeps` long.
     pub substeps: u32,
-    /// Sweeps over all constraints in one substep.
+    /// Number of sweeps over all constraints in one substep.
     pub iterations: u32,
     /// Gravity in m/s².
     pub gravity_m_s2: [f64; 3],
-    /// Velocities are multiplied by `exp(−damping_per_s·h)` at the end of every substep. 0 = undamped.
+    /// Damping: every substep multiplies velocities by `exp(−damping_per_s·h)`. 0 = undamped.
     pub damping_per_s: f64,
-    /// Over-relaxation `ω` of [`Formulation::Vbd`], above 0 and below 2; 1 for the other formulations. Above 1 many iterations
-    /// converge sooner, a single one does not.
+    /// Over-relaxation `ω` of [`Formulation::Vbd`], above 0 and below 2. Must be 1 for the other
+    /// formulations. Values above 1 help many iterations to converge, but not a single one.
     pub relaxation: f64,
 }
 
 impl Default for Settings {
-    /// XPBD at 60 Hz, 10 substeps of one iteration, no gravity, no damping.
+    /// Returns XPBD at 60 Hz with 10 substeps of one iteration, without gravity and damping.
     fn default() -> Self {
         Self {
             formulation: Formulation::Xpbd,
@@ -50,17 +52,20 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Length of a substep in seconds.
+    /// Returns the length of a substep in seconds.
     pub fn substep_s(&self) -> f64 {
         self.dt_s / f64::from(self.substeps)
     }
 
-    /// Whether multipliers must be kept from one sweep to the next.
+    /// True if multipliers must be stored from one sweep to the next.
     pub fn keeps_multipliers(&self) -> bool {
         self.formulation == Formulation::Xpbd && self.iterations > 1
     }
 
-    /// Checks every value; [`SolverError::Setting`] names the first that cannot be used.
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// Returns [`SolverError::Setting`] for the first value out of range.
     pub fn validate(&self) -> Result<(), SolverError> {
         let check = |key, value: f64, valid: bool, expected| {
             if valid { Ok(()) } else { Err(SolverError::Setting { key, value, expected }) }
@@ -93,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_that_cannot_be_used_are_named() {
+    fn errors_name_the_setting_that_is_out_of_range() {
         let good = Settings::default();
         assert!(good.validate().is_ok());
         let relaxed = Settings { relaxation: 1.5, formulation: Formulation::Vbd, ..good };

@@ -1,43 +1,38 @@
-//! The stepping loop, written once: what runs in which order is here, how a pass is spread over threads is not.
+//! The stepping loop of all CPU backends. It defines the order of the passes. An [`Execute`] defines
+//! how a pass is distributed over threads.
 
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
-use crate::descent::suits;
+use crate::descent::accepts;
 use crate::passes::Integrator;
 use crate::{
-    Clock, ColoredVertices, ConstraintSet, Descent, Formulation, Motion, Schedule, Settings, SolverError,
-    Step, StepProfile, Sweep, System, Vertex, VertexBlock,
+    Clock, ConstraintColor, ConstraintSet, Descent, Formulation, Schedule, Settings, SolverError, Step,
+    StepProfile, System, Vertex, VertexBlock, VertexColor, VertexPass,
 };
 
-/// How the passes of a substep are executed on the host: one after the other, or by several threads.
+/// Executes the passes of a substep on the host, with one thread or with several.
 pub trait Execute<T: Scalar> {
-    /// Runs `pass` on `block`, or on its parts in any order.
+    /// Runs `pass` on `block` as a whole, or on its parts in any order.
     fn vertices(&self, block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync));
 
-    /// Projects the constraints of one sweep. `multipliers` has one number per constraint of the set, or none.
-    fn sweep(
-        &self,
-        sweep: Sweep,
-        set: &dyn ConstraintSet<T>,
-        vertices: &mut [Vertex<T>],
-        step: Step<T>,
-        multipliers: &mut [T],
-    );
+    /// Projects the constraints of one color.
+    fn project(&self, color: ConstraintColor<'_, T>);
 
-    /// Moves the vertices of one color.
-    fn color_pass(&self, color: ColoredVertices<'_, T>);
+    /// Moves the vertices of one color by vertex block descent.
+    fn descend(&self, color: VertexColor<'_, T>);
 
-    /// Runs what one thread does between the passes; `part` is its name in a [`StepProfile`](crate::StepProfile).
-    fn alone(&self, _part: &'static str, work: &mut dyn FnMut()) {
+    /// Runs serial work between the passes. `part` is its name in a
+    /// [`StepProfile`](crate::StepProfile).
+    fn serial(&self, _part: &'static str, work: &mut dyn FnMut()) {
         work();
     }
 
-    /// The first vertex with a coordinate that is not finite.
+    /// Returns the first vertex with a coordinate that is not finite.
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize>;
 }
 
-/// A system, its settings and its clock.
+/// A system with its settings, its schedule and its clock.
 pub struct Simulation<T: Scalar> {
     system: System<T>,
     settings: Settings,
@@ -48,23 +43,28 @@ pub struct Simulation<T: Scalar> {
     clock: Clock,
 }
 
-/// How a substep is solved.
+/// The method that solves a substep.
 pub enum Method<T: Scalar> {
-    /// Constraint by constraint.
+    /// Projects one constraint after the other (PBD, XPBD).
     Project(Step<T>),
-    /// Vertex by vertex.
+    /// Moves one vertex after the other (vertex block descent).
     Descend(Box<Descent<T>>),
 }
 
 impl<T: Scalar> Simulation<T> {
-    /// Checks the settings and that every kind has a stiffness of their formulation.
+    /// Prepares `system` for stepping.
     ///
-    /// Multipliers are stored only for XPBD with more than one iteration: with one, each starts and ends at zero.
+    /// Multipliers are stored only for XPBD with more than one iteration. With one iteration each
+    /// multiplier starts at zero and is used once.
+    ///
+    /// # Errors
+    /// Returns [`SolverError::Setting`] for a setting out of range, [`SolverError::Formulation`] for
+    /// a kind whose stiffness is for another formulation, and the errors of [`Descent::new`].
     pub fn new(system: System<T>, settings: Settings) -> Result<Self, SolverError> {
         settings.validate()?;
         for kind in &system.kinds {
             let (found, expected) = (kind.stiffness().formulation(), settings.formulation);
-            if !suits(found, expected) {
+            if !accepts(found, expected) {
                 return Err(SolverError::Formulation { kind: kind.name(), found, expected });
             }
         }
@@ -73,7 +73,7 @@ impl<T: Scalar> Simulation<T> {
         let h = settings.substep_s();
         let inverse_h_squared = T::constant(1.0 / (h * h));
         if !(T::constant(h) > T::zero() && inverse_h_squared.is_finite()) {
-            let expected = "a substep whose inverse square the number type can hold";
+            let expected = "a substep whose inverse square is finite in the number type";
             return Err(SolverError::Setting { key: "dt_s / substeps", value: h, expected });
         }
         let method = match settings.formulation {
@@ -95,37 +95,37 @@ impl<T: Scalar> Simulation<T> {
         })
     }
 
-    /// The body in its present state.
+    /// Returns the body in its present state.
     pub fn system(&self) -> &System<T> {
         &self.system
     }
 
-    /// The settings it was built with.
+    /// Returns the settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// What a frame executes.
+    /// Returns the schedule of a frame.
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
 
-    /// Frames and substeps done.
+    /// Returns the number of completed frames and substeps.
     pub fn clock(&self) -> Clock {
         self.clock
     }
 
-    /// Simulated time in seconds.
+    /// Returns the simulated time in seconds.
     pub fn time_s(&self) -> f64 {
         self.clock.time_s(&self.settings)
     }
 
-    /// The numbers of a substep.
+    /// Returns the constants of a substep.
     pub fn integrator(&self) -> &Integrator<T> {
         &self.integrator
     }
 
-    /// What a substep asks of every projection; nothing in vertex block descent.
+    /// Returns the parameters of a projection, or `None` in vertex block descent.
     pub fn projection_step(&self) -> Option<Step<T>> {
         match &self.method {
             Method::Project(step) => Some(*step),
@@ -133,20 +133,21 @@ impl<T: Scalar> Simulation<T> {
         }
     }
 
-    /// How a substep is solved.
+    /// Returns the method that solves a substep.
     pub fn method(&self) -> &Method<T> {
         &self.method
     }
 
-    /// Says how far a backend has come that keeps the state elsewhere.
+    /// Sets the clock. For backends that keep the state on a device.
     pub fn set_clock(&mut self, clock: Clock) {
         self.clock = clock;
     }
 
-    /// Takes over a state that a backend has kept elsewhere, in the solver's own coordinates.
+    /// Sets the state in the solver's own coordinates. For backends that keep the state on a device.
     ///
     /// # Errors
-    /// [`SolverError::VertexLength`] unless there is one of each per vertex; the state is then unchanged.
+    /// Returns [`SolverError::VertexLength`] unless both arrays have one element per vertex. The
+    /// state is then unchanged.
     pub fn set_state(
         &mut self,
         vertices: &[Vertex<T>],
@@ -155,12 +156,12 @@ impl<T: Scalar> Simulation<T> {
         self.system.set_state(vertices, velocities)
     }
 
-    /// Bytes of the stored multipliers; 0 unless XPBD runs more than one iteration.
+    /// Returns the memory of the multipliers in bytes: 0 unless XPBD runs more than one iteration.
     pub fn multiplier_bytes(&self) -> usize {
         self.multipliers.iter().map(|kind| size_of_val(kind.as_slice())).sum()
     }
 
-    /// Bytes that vertex block descent stores about which constraints each vertex is in; 0 elsewhere.
+    /// Returns the memory of the incidences of vertex block descent in bytes, 0 for other methods.
     pub fn incidence_bytes(&self) -> usize {
         match &self.method {
             Method::Project(_) => 0,
@@ -168,41 +169,45 @@ impl<T: Scalar> Simulation<T> {
         }
     }
 
-    /// Runs `frames` frames. Running them one by one gives the same bits. Nothing is allocated.
+    /// Runs `frames` frames without allocating memory. Separate calls for each frame give the same
+    /// bits.
     ///
     /// # Errors
-    /// [`SolverError::NotFinite`] as soon as a position is not finite after a substep. The state is then that of the
-    /// start of this substep, with all velocities zero, and may be stepped on.
+    /// Returns [`SolverError::NotFinite`] as soon as a position is not finite after a substep. The
+    /// state is then that at the start of this substep, with all velocities zero, and can be stepped
+    /// again.
     pub fn run(&mut self, frames: usize, execute: &impl Execute<T>) -> Result<(), SolverError> {
-        let mut begun = false;
+        let mut started = false;
         let end = self.clock.frame.saturating_add(frames as u64);
         while self.clock.frame < end {
-            self.begin_substep(begun, execute);
+            self.begin_substep(started, execute);
             if !self.system.handles.is_empty() {
                 let time_s = self.time_s() + self.settings.substep_s();
-                execute.alone(StepProfile::HANDLES, &mut || self.system.carry_handles(time_s));
+                execute.serial(StepProfile::HANDLES, &mut || self.system.move_handles(time_s));
             }
             self.solve(execute);
             if let Some(vertex) = execute.first_not_finite(&self.system.vertices) {
-                self.move_vertices(Motion::Restore, execute);
+                self.run_pass(VertexPass::Restore, execute);
                 return Err(SolverError::not_finite(vertex, self.clock, &self.settings));
             }
-            begun = true;
+            started = true;
             self.clock.tick(&self.settings);
         }
-        if begun {
-            self.move_vertices(Motion::Finish, execute);
+        if started {
+            self.run_pass(VertexPass::Finish, execute);
         }
         Ok(())
     }
 
-    /// Goes on from a saved state: positions in the caller's coordinates, velocities, frames done so far.
+    /// Continues from a saved state: positions in the caller's coordinates (m), velocities (m/s) and
+    /// the number of completed frames.
     ///
-    /// What [`System::positions`] and [`System::velocities`] gave after `frame` frames leads to the same bits as a run
-    /// without interruption, as long as [`System::origin`] is zero.
+    /// With the results of [`System::positions`] and [`System::velocities`] after `frame` frames, the
+    /// run has the same bits as one without interruption if [`System::origin`] is zero.
     ///
     /// # Errors
-    /// Wrong lengths or values that are not finite; the state is then unchanged.
+    /// Returns an error for wrong lengths or values that are not finite. The state is then
+    /// unchanged.
     pub fn restore(
         &mut self,
         positions: &[Point3<T>],
@@ -214,41 +219,47 @@ impl<T: Scalar> Simulation<T> {
         Ok(())
     }
 
-    /// Predicts, after the velocities of the substep before if there was one. Vertex block descent needs them stored.
+    /// Predicts positions. If another substep came before, updates the velocities first. Vertex block
+    /// descent reads the velocities from memory, so that it cannot combine the two passes.
     fn begin_substep(&mut self, after_another: bool, execute: &impl Execute<T>) {
         match (after_another, &self.method) {
-            (true, Method::Project(_)) => self.move_vertices(Motion::FinishAndPredict, execute),
+            (true, Method::Project(_)) => self.run_pass(VertexPass::FinishAndPredict, execute),
             (true, Method::Descend(_)) => {
-                self.move_vertices(Motion::Finish, execute);
-                self.move_vertices(Motion::Predict, execute);
+                self.run_pass(VertexPass::Finish, execute);
+                self.run_pass(VertexPass::Predict, execute);
             }
-            (false, _) => self.move_vertices(Motion::Predict, execute),
+            (false, _) => self.run_pass(VertexPass::Predict, execute),
         }
     }
 
-    fn move_vertices(&mut self, motion: Motion, execute: &impl Execute<T>) {
+    fn run_pass(&mut self, pass: VertexPass, execute: &impl Execute<T>) {
         let integrator = self.integrator;
-        execute.vertices(self.system.block(), &|block| integrator.run(motion, block));
+        execute.vertices(self.system.block(), &|block| integrator.run(pass, block));
     }
 
     fn solve(&mut self, execute: &impl Execute<T>) {
         if self.settings.keeps_multipliers() {
             let multipliers = &mut self.multipliers;
             let clear = &mut || multipliers.iter_mut().for_each(|kind| kind.fill(T::zero()));
-            execute.alone(StepProfile::MULTIPLIERS, clear);
+            execute.serial(StepProfile::MULTIPLIERS, clear);
         }
         for iteration in 0..self.schedule.iterations {
             match &self.method {
                 Method::Project(step) => {
                     for &sweep in &self.schedule.sweeps {
                         let (vertices, kinds) = self.system.projection_parts();
-                        let multipliers = &mut self.multipliers[sweep.kind];
-                        execute.sweep(sweep, &*kinds[sweep.kind], vertices, *step, multipliers);
+                        execute.project(ConstraintColor {
+                            set: &*kinds[sweep.kind],
+                            color: sweep.color,
+                            vertices,
+                            step: *step,
+                            multipliers: &mut self.multipliers[sweep.kind],
+                        });
                     }
                 }
                 Method::Descend(descent) => {
                     for &pass in self.schedule.color_passes_of(iteration) {
-                        execute.color_pass(ColoredVertices::new(&mut self.system, descent, pass));
+                        execute.descend(VertexColor { system: &mut self.system, descent, pass });
                     }
                 }
             }

@@ -1,4 +1,4 @@
-//! What every backend offers.
+//! The interface of all backends.
 
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
@@ -7,34 +7,38 @@ use crate::{
     Energy, MemoryPart, Momentum, Residual, Schedule, Settings, Simulation, SolverError, StepProfile, System,
 };
 
-/// A backend with a body in it. Object-safe; what is measured is computed when it is asked for.
+/// A backend with a body. The trait is object-safe, and measurements are computed on request.
 ///
-/// A backend may keep the state on a device. Whatever looks at the state therefore takes `&mut self` and can fail: it reads
-/// what it needs from there, and no more. On a CPU backend it costs nothing and never fails.
+/// A backend may keep the state on a device. Methods that access the state therefore take `&mut
+/// self` and can fail. They read from the device only what they need. On a CPU backend they read
+/// nothing and never fail.
 pub trait Solver<T: Scalar>: Send {
-    /// Name in reports.
+    /// Returns the name of the backend in reports.
     fn name(&self) -> &'static str;
 
     /// Runs `frames` frames.
     ///
     /// # Errors
-    /// [`SolverError::NotFinite`]: see [`Simulation::run`]; [`SolverError::Device`] if a device fails.
+    /// Returns [`SolverError::NotFinite`] as described at [`Simulation::run`], and
+    /// [`SolverError::Device`] if a device fails.
     fn step(&mut self, frames: usize) -> Result<(), SolverError>;
 
-    /// As [`step`](Self::step), with the same bits, and enters into `profile` how long each part took: on a CPU backend at no
-    /// cost to speak of; on a device each part is waited for, so that the parts take longer than a plain step. What ran
-    /// before an error is entered too.
+    /// Runs `frames` frames with the bits of [`step`](Self::step) and adds the duration of each part
+    /// to `profile`. On a CPU backend the overhead is negligible. On a device the host waits for each
+    /// part, so that the parts take longer than a plain step. After an error, the profile contains
+    /// the parts that ran before it.
     ///
     /// # Errors
-    /// As [`step`](Self::step).
+    /// Returns the errors of [`step`](Self::step).
     fn step_timed(&mut self, frames: usize, profile: &mut StepProfile) -> Result<(), SolverError> {
         profile.time(StepProfile::STEP, || self.step(frames))
     }
 
-    /// Goes on from a saved state: positions in the caller's coordinates (m), velocities (m/s), frames done so far.
+    /// Continues from a saved state: positions in the caller's coordinates (m), velocities (m/s) and
+    /// the number of completed frames.
     ///
     /// # Errors
-    /// Wrong lengths or values that are not finite: see [`Simulation::restore`]; [`SolverError::Device`].
+    /// Returns the errors of [`Simulation::restore`], and [`SolverError::Device`] if a device fails.
     fn restore(
         &mut self,
         positions: &[Point3<T>],
@@ -42,69 +46,72 @@ pub trait Solver<T: Scalar>: Send {
         frame: u64,
     ) -> Result<(), SolverError>;
 
-    /// Settings, schedule and clock as of now, and the body as it was when the host last read it: on a CPU backend as of
-    /// now, elsewhere at the last call of [`refresh`](Self::refresh).
+    /// Returns the present settings, schedule and clock, and the host's copy of the body. On a CPU
+    /// backend this is the present body. Elsewhere it is the body at the last call of
+    /// [`refresh`](Self::refresh).
     fn simulation(&self) -> &Simulation<T>;
 
-    /// Brings the host's copy of the body up to date.
+    /// Updates the host's copy of the body.
     ///
     /// # Errors
-    /// [`SolverError::Device`].
+    /// Returns [`SolverError::Device`] if a device fails.
     fn refresh(&mut self) -> Result<(), SolverError> {
         Ok(())
     }
 
-    /// Positions of chosen vertices in the caller's coordinates (m), in the order asked for.
+    /// Returns the positions of some vertices in the caller's coordinates (m), in the order of
+    /// `vertices`.
     ///
     /// # Errors
-    /// [`SolverError::Vertex`] for a vertex that does not exist; [`SolverError::Device`].
+    /// Returns [`SolverError::Vertex`] for a vertex that does not exist, and
+    /// [`SolverError::Device`] if a device fails.
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<T>>, SolverError> {
         self.system()?.positions_of(vertices)
     }
 
-    /// The body in its present state.
+    /// Returns the body in its present state.
     ///
     /// # Errors
-    /// As for [`refresh`](Self::refresh); the same for all that follow.
+    /// This method and those below return the errors of [`refresh`](Self::refresh).
     fn system(&mut self) -> Result<&System<T>, SolverError> {
         self.refresh()?;
         Ok(self.simulation().system())
     }
-    /// Positions in the caller's coordinates (m), in the caller's order.
+    /// Returns all positions in the caller's coordinates (m), in the caller's order.
     fn positions(&mut self) -> Result<Vec<Point3<T>>, SolverError> {
         Ok(self.system()?.positions())
     }
-    /// Velocities in m/s.
+    /// Returns all velocities in m/s.
     fn velocities(&mut self) -> Result<&[Vector3<T>], SolverError> {
         Ok(self.system()?.velocities())
     }
-    /// `C` over rest size, per kind.
+    /// Returns `C` over the rest size for each kind.
     fn residuals(&mut self) -> Result<Vec<Residual>, SolverError> {
         Ok(self.system()?.residuals())
     }
-    /// Kinetic, elastic and gravitational energy.
+    /// Returns the kinetic, elastic and gravitational energy.
     fn energy(&mut self) -> Result<Energy, SolverError> {
         let gravity = self.settings().gravity_m_s2;
         Ok(self.system()?.energy(gravity))
     }
-    /// Linear and angular momentum.
+    /// Returns the linear and angular momentum.
     fn momentum(&mut self) -> Result<Momentum, SolverError> {
         Ok(self.system()?.momentum())
     }
 
-    /// The settings in use.
+    /// Returns the settings.
     fn settings(&self) -> &Settings {
         self.simulation().settings()
     }
-    /// What a frame executes.
+    /// Returns the schedule of a frame.
     fn schedule(&self) -> &Schedule {
         self.simulation().schedule()
     }
-    /// Simulated time in seconds.
+    /// Returns the simulated time in seconds.
     fn time_s(&self) -> f64 {
         self.simulation().time_s()
     }
-    /// Bytes stored, part by part.
+    /// Returns the memory on the host by part.
     fn bytes(&self) -> Vec<MemoryPart> {
         let simulation = self.simulation();
         let mut parts = simulation.system().bytes();

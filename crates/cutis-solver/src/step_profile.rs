@@ -1,52 +1,53 @@
-//! Where the time of a step goes, part by part; only for whoever asks.
+//! Optional per-part timing of a step.
 
 use std::cell::RefCell;
 use std::time::Instant;
 
 use cutis_constraints::Scalar;
 
-use crate::{ColoredVertices, ConstraintSet, Execute, Step, Sweep, Vertex, VertexBlock};
+use crate::{ConstraintColor, Execute, Vertex, VertexBlock, VertexColor};
 
 /// Time of one part of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimePart {
-    /// One of the constants of [`StepProfile`], or the name of a kind of constraint.
+    /// A constant of [`StepProfile`] or the name of a kind of constraint.
     pub name: &'static str,
     /// Wall time in seconds.
     pub seconds: f64,
 }
 
-/// Wall time of steps by part, added up over as many steps as it is given to.
+/// Wall time by part, summed over all steps that used this profile.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepProfile {
     parts: Vec<TimePart>,
 }
 
 impl StepProfile {
-    /// Prediction and velocities.
+    /// Prediction and velocity update.
     pub const VERTICES: &'static str = "vertices";
-    /// Vertices that handles carry.
+    /// Movement of the kinematic vertices.
     pub const HANDLES: &'static str = "handles";
-    /// Multipliers, set to zero at the start of a substep.
+    /// Reset of the multipliers at the start of a substep.
     pub const MULTIPLIERS: &'static str = "multipliers";
-    /// The steps of the vertices in vertex block descent, all kinds together.
+    /// Vertex steps of vertex block descent, for all kinds together.
     pub const DESCENT: &'static str = "descent";
-    /// The look at whether all positions are finite.
+    /// Test for positions that are not finite.
     pub const CHECK: &'static str = "check";
-    /// The whole step, of a backend that cannot tell its parts.
+    /// The whole step, for a backend that does not measure parts.
     pub const STEP: &'static str = "step";
 
-    /// The parts in the order in which they first ran; a kind under its name, and what did not run not at all.
+    /// Returns the parts in the order in which they first ran, without those that did not run. A
+    /// kind of constraint appears under its name.
     pub fn parts(&self) -> &[TimePart] {
         &self.parts
     }
 
-    /// Seconds of one part; 0 if it did not run.
+    /// Returns the seconds of one part, 0 if it did not run.
     pub fn seconds(&self, name: &str) -> f64 {
         self.parts.iter().filter(|part| part.name == name).map(|part| part.seconds).sum()
     }
 
-    /// Seconds of all parts.
+    /// Returns the seconds of all parts.
     pub fn total_s(&self) -> f64 {
         self.parts.iter().map(|part| part.seconds).sum()
     }
@@ -59,7 +60,7 @@ impl StepProfile {
         }
     }
 
-    /// Runs `work` and adds the time that it takes to a part.
+    /// Runs `work` and adds its duration to a part.
     pub fn time<R>(&mut self, name: &'static str, work: impl FnOnce() -> R) -> R {
         let start = Instant::now();
         let result = work();
@@ -68,14 +69,14 @@ impl StepProfile {
     }
 }
 
-/// Executes as another does, with the same bits, and enters the time of every pass.
+/// An executor that times every pass of another one. The bits do not change.
 pub struct Timed<'a, E> {
     inner: E,
     profile: RefCell<&'a mut StepProfile>,
 }
 
 impl<'a, E> Timed<'a, E> {
-    /// Enters what `inner` takes into `profile`.
+    /// Adds the durations of the passes of `inner` to `profile`.
     pub fn new(inner: E, profile: &'a mut StepProfile) -> Self {
         Self { inner, profile: RefCell::new(profile) }
     }
@@ -86,24 +87,16 @@ impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
         self.profile.borrow_mut().time(StepProfile::VERTICES, || self.inner.vertices(block, pass));
     }
 
-    fn sweep(
-        &self,
-        sweep: Sweep,
-        set: &dyn ConstraintSet<T>,
-        vertices: &mut [Vertex<T>],
-        step: Step<T>,
-        multipliers: &mut [T],
-    ) {
-        let work = || self.inner.sweep(sweep, set, vertices, step, multipliers);
-        self.profile.borrow_mut().time(set.name(), work);
+    fn project(&self, color: ConstraintColor<'_, T>) {
+        self.profile.borrow_mut().time(color.set.name(), || self.inner.project(color));
     }
 
-    fn color_pass(&self, color: ColoredVertices<'_, T>) {
-        self.profile.borrow_mut().time(StepProfile::DESCENT, || self.inner.color_pass(color));
+    fn descend(&self, color: VertexColor<'_, T>) {
+        self.profile.borrow_mut().time(StepProfile::DESCENT, || self.inner.descend(color));
     }
 
-    fn alone(&self, part: &'static str, work: &mut dyn FnMut()) {
-        self.profile.borrow_mut().time(part, || self.inner.alone(part, work));
+    fn serial(&self, part: &'static str, work: &mut dyn FnMut()) {
+        self.profile.borrow_mut().time(part, || self.inner.serial(part, work));
     }
 
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {

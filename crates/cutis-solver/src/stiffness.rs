@@ -1,23 +1,23 @@
-//! Stiffness of a kind of constraint: one number for all of them, or one for each.
+//! Stiffness of a kind of constraint: one value for all constraints, or one per constraint.
 
 use cutis_constraints::Scalar;
 
 use crate::{Formulation, SolverError};
 
-/// One value for a whole kind, or one value for each constraint in the caller's order.
+/// One value for all constraints of a kind, or one value per constraint in the caller's order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values<T> {
-    /// The same for all; needs no storage per constraint.
+    /// The same value for all constraints, without storage per constraint.
     Uniform(T),
-    /// One for each.
+    /// One value per constraint.
     Each(Vec<T>),
 }
 
 impl<T: Copy> Values<T> {
-    /// The value of constraint `index`.
+    /// Returns the value of constraint `index`.
     ///
     /// # Panics
-    /// If there is none.
+    /// Panics if there is no such constraint.
     #[inline(always)]
     pub fn at(&self, index: usize) -> T {
         match self {
@@ -36,7 +36,7 @@ impl<T: Scalar> Values<T> {
     }
 }
 
-/// Stiffness of a kind, in the terms of one formulation.
+/// Stiffness of a kind for one formulation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stiffness<T> {
     /// Share of the error removed by one projection, in `[0, 1]`; for [`Formulation::Pbd`].
@@ -46,17 +46,17 @@ pub enum Stiffness<T> {
 }
 
 impl<T: Scalar> Stiffness<T> {
-    /// The same PBD stiffness for all constraints.
+    /// Returns the same PBD stiffness for all constraints.
     pub fn pbd(stiffness: T) -> Self {
         Self::Pbd(Values::Uniform(stiffness))
     }
 
-    /// The same compliance for all constraints.
+    /// Returns the same compliance for all constraints.
     pub fn compliance(compliance: T) -> Self {
         Self::Compliance(Values::Uniform(compliance))
     }
 
-    /// The formulation that it belongs to.
+    /// Returns the formulation of this stiffness.
     pub fn formulation(&self) -> Formulation {
         match self {
             Self::Pbd(_) => Formulation::Pbd,
@@ -64,14 +64,14 @@ impl<T: Scalar> Stiffness<T> {
         }
     }
 
-    /// The numbers, whatever they mean.
+    /// Returns the values, independent of the formulation.
     pub fn values(&self) -> &Values<T> {
         match self {
             Self::Pbd(values) | Self::Compliance(values) => values,
         }
     }
 
-    /// The same numbers in double precision.
+    /// Returns the same values in double precision.
     pub fn to_f64(&self) -> Stiffness<f64> {
         match self {
             Self::Pbd(values) => Stiffness::Pbd(values.to_f64()),
@@ -79,7 +79,7 @@ impl<T: Scalar> Stiffness<T> {
         }
     }
 
-    /// Checks range and length, then sorts per-constraint values by `order`.
+    /// Checks the range and the number of values, then sorts values per constraint by `order`.
     pub(crate) fn validated(
         self,
         kind: &'static str,

@@ -1,4 +1,4 @@
-//! The state of a body: vertices, velocities, constraints by kind, handles.
+//! The state of a body: vertices, velocities, kinds of constraints, handles.
 
 use std::sync::Arc;
 
@@ -10,9 +10,10 @@ use crate::{
     Energy, Kind, KinematicHandle, MemoryPart, Momentum, Residual, SolverError, Vertex, VertexBlock,
 };
 
-/// A body ready to be solved; built and checked by [`SystemBuilder`](crate::SystemBuilder).
+/// A body that is ready to be solved. [`SystemBuilder`](crate::SystemBuilder) builds and validates
+/// it.
 ///
-/// A kind that was not added has no storage here at all. Clones share the kinds.
+/// A kind that was not added takes no memory. Clones share the kinds.
 #[derive(Clone)]
 pub struct System<T: Scalar> {
     pub(crate) origin: Vector3<T>,
@@ -21,40 +22,42 @@ pub struct System<T: Scalar> {
     pub(crate) velocities: Vec<Vector3<T>>,
     pub(crate) kinds: Vec<Kind<T>>,
     pub(crate) handles: Vec<KinematicHandle<T>>,
-    /// Groups of the vertices, if the caller knows better ones than greedy coloring finds.
+    /// Vertex groups of the caller, used instead of greedy coloring.
     pub(crate) vertex_groups: Option<Arc<Groups>>,
 }
 
 impl<T: Scalar> System<T> {
-    /// What the solver's coordinates are relative to, in the caller's coordinates (m). Zero unless the body lies
-    /// farther from the caller's origin than its own extent.
+    /// Returns the origin of the solver's coordinates in the caller's coordinates (m). Zero unless
+    /// the body lies farther from the caller's origin than its own extent.
     pub fn origin(&self) -> Point3<T> {
         Point3::from(self.origin)
     }
 
-    /// Vertices relative to [`origin`](Self::origin).
+    /// Returns the vertices, relative to [`origin`](Self::origin).
     pub fn vertices(&self) -> &[Vertex<T>] {
         &self.vertices
     }
 
-    /// Positions in the caller's coordinates (m). A vertex that never moved has exactly the position it was given.
+    /// Returns all positions in the caller's coordinates (m). A vertex that never moved has exactly
+    /// the position that the caller gave.
     pub fn positions(&self) -> Vec<Point3<T>> {
         self.vertices.iter().map(|vertex| vertex.position() + self.origin).collect()
     }
 
-    /// Positions of chosen vertices in the caller's coordinates (m), in the order asked for.
+    /// Returns the positions of some vertices in the caller's coordinates (m), in the order of
+    /// `vertices`.
     ///
     /// # Errors
-    /// [`SolverError::Vertex`] for a vertex that does not exist.
+    /// Returns [`SolverError::Vertex`] for a vertex that does not exist.
     pub fn positions_of(&self, vertices: &[u32]) -> Result<Vec<Point3<T>>, SolverError> {
         self.check_vertices(vertices)?;
         Ok(vertices.iter().map(|&v| self.vertices[v as usize].position() + self.origin).collect())
     }
 
-    /// Refuses the first vertex that does not exist.
+    /// Checks that all vertices exist.
     ///
     /// # Errors
-    /// [`SolverError::Vertex`].
+    /// Returns [`SolverError::Vertex`] for the first vertex that does not exist.
     pub fn check_vertices(&self, vertices: &[u32]) -> Result<(), SolverError> {
         let count = self.vertices.len();
         match vertices.iter().find(|&&vertex| vertex as usize >= count) {
@@ -63,38 +66,38 @@ impl<T: Scalar> System<T> {
                 vertex: vertex as usize,
                 what: "index",
                 value: vertex.into(),
-                expected: "a vertex of the body",
+                expected: "the index of a vertex of the body",
             }),
         }
     }
 
-    /// Velocities in m/s.
+    /// Returns the velocities in m/s.
     pub fn velocities(&self) -> &[Vector3<T>] {
         &self.velocities
     }
 
-    /// The kinds of constraints, in the order they were added.
+    /// Returns the kinds of constraints in the order in which they were added.
     pub fn kinds(&self) -> &[Kind<T>] {
         &self.kinds
     }
 
-    /// The handles, in the order they were added.
+    /// Returns the handles in the order in which they were added.
     pub fn handles(&self) -> &[KinematicHandle<T>] {
         &self.handles
     }
 
-    /// The vertices to be moved and the kinds that say where, for use with [`Colored`](crate::Colored).
+    /// Returns the vertices and the kinds, for a [`ConstraintColor`](crate::ConstraintColor).
     pub fn projection_parts(&mut self) -> (&mut [Vertex<T>], &[Kind<T>]) {
         (&mut self.vertices, &self.kinds)
     }
 
-    /// The same body in double precision: each number is what it was, only what a solver makes of them has fewer
-    /// rounding errors. For references.
+    /// Returns the same body in double precision, for reference solutions. All numbers stay the
+    /// same, and a solver computes with smaller rounding errors.
     pub fn to_f64(&self) -> System<f64> {
         System {
             origin: self.origin.map(T::to_f64),
             vertices: self.vertices.iter().map(|vertex| vertex.to_f64()).collect(),
-            previous: self.previous.iter().map(|place| place.map(T::to_f64)).collect(),
+            previous: self.previous.iter().map(|position| position.map(T::to_f64)).collect(),
             velocities: self.velocities.iter().map(|velocity| velocity.map(T::to_f64)).collect(),
             kinds: self.kinds.iter().map(|kind| kind.to_f64()).collect(),
             handles: self.handles.iter().map(KinematicHandle::to_f64).collect(),
@@ -142,28 +145,28 @@ impl<T: Scalar> System<T> {
             }
         }
         self.vertices.copy_from_slice(vertices);
-        for (place, velocity) in self.velocities.iter_mut().zip(velocities) {
-            *place = velocity;
+        for (old, new) in self.velocities.iter_mut().zip(velocities) {
+            *old = new;
         }
         Ok(())
     }
 
-    pub(crate) fn carry_handles(&mut self, time_s: f64) {
+    pub(crate) fn move_handles(&mut self, time_s: f64) {
         for handle in &self.handles {
             handle.advance(&mut self.vertices, time_s);
         }
     }
 
-    /// Residual of each kind at the present positions.
+    /// Returns the residual of each kind at the present positions.
     pub fn residuals(&self) -> Vec<Residual> {
         self.kinds.iter().map(|kind| kind.residual(&self.vertices)).collect()
     }
 
-    /// Whether every violated constraint can act at the present positions; `tolerance` is the value over the rest size from
-    /// which on it counts as violated.
+    /// Checks that every violated constraint can act at the present positions. A constraint counts as
+    /// violated if its value is more than `tolerance` times its rest size.
     ///
     /// # Errors
-    /// [`SolverError::Collapsed`] names the first that cannot.
+    /// Returns [`SolverError::Collapsed`] for the first violated constraint without a gradient.
     pub fn check_collapsed(&self, tolerance: f64) -> Result<(), SolverError> {
         for set in &self.kinds {
             if let Some((k, ratio)) = set.collapsed(&self.vertices, tolerance) {
@@ -174,7 +177,8 @@ impl<T: Scalar> System<T> {
         Ok(())
     }
 
-    /// Vertices with finite mass: mass in kg, position in the caller's coordinates, velocity.
+    /// Returns mass in kg, position in the caller's coordinates and velocity of each vertex with
+    /// finite mass.
     fn masses(&self) -> impl Iterator<Item = (f64, Vector3<f64>, Vector3<f64>)> {
         self.vertices.iter().zip(&self.velocities).filter_map(|(vertex, velocity)| {
             let inverse_mass = vertex.inverse_mass().to_f64();
@@ -183,7 +187,7 @@ impl<T: Scalar> System<T> {
         })
     }
 
-    /// Energy at the present positions and velocities, under the gravity given in m/s².
+    /// Returns the energy at the present positions and velocities, with gravity in m/s².
     pub fn energy(&self, gravity_m_s2: [f64; 3]) -> Energy {
         let gravity = Vector3::from(gravity_m_s2);
         let (mut kinetic_j, mut gravity_j) = (0.0, 0.0);
@@ -195,7 +199,8 @@ impl<T: Scalar> System<T> {
         Energy { kinetic_j, elastic_j, gravity_j }
     }
 
-    /// Linear momentum, angular momentum about the center of mass, and the center of mass.
+    /// Returns the linear momentum, the angular momentum about the center of mass, and the center of
+    /// mass.
     pub fn momentum(&self) -> Momentum {
         let (mut total, mut center, mut linear) = (0.0, Vector3::zeros(), Vector3::zeros());
         for (mass, x, velocity) in self.masses() {
@@ -210,10 +215,11 @@ impl<T: Scalar> System<T> {
         Momentum { linear, angular, center: Point3::from(center) }
     }
 
-    /// The largest distance in meters between a vertex and its place in `reference` (caller's coordinates).
+    /// Returns the largest distance in meters between a vertex and its position in `reference`
+    /// (caller's coordinates).
     ///
     /// # Errors
-    /// [`SolverError::VertexLength`] unless `reference` has one position per vertex.
+    /// Returns [`SolverError::VertexLength`] unless `reference` has one position per vertex.
     pub fn max_displacement<S: Scalar>(&self, reference: &[Point3<S>]) -> Result<f64, SolverError> {
         let (found, expected) = (reference.len(), self.vertices.len());
         if found != expected {
@@ -226,7 +232,7 @@ impl<T: Scalar> System<T> {
         Ok(self.vertices.iter().zip(reference).map(distance).fold(0.0, f64::max))
     }
 
-    /// What the body stores: the vertices, then each kind that was added, then the handles if there are any.
+    /// Returns the memory of the vertices, of each kind, and of the handles if there are any.
     pub fn bytes(&self) -> Vec<MemoryPart> {
         let vertices = size_of_val(self.vertices.as_slice())
             + size_of_val(self.previous.as_slice())
@@ -241,7 +247,7 @@ impl<T: Scalar> System<T> {
     }
 }
 
-/// Refuses the first vector with a component that is not finite.
+/// Returns an error for the first vector with a component that is not finite.
 pub(crate) fn check_finite<'a, S: Scalar>(
     what: &'static str,
     vectors: impl Iterator<Item = &'a Vector3<S>>,

@@ -100,8 +100,8 @@ pub const STABILITY: &[Mutation] = &[
         Stability,
         "a substep of vertex block descent goes one way only",
         "crates/cutis-solver/src/schedule.rs",
-        "let back = number >= u64::from(self.iterations);",
-        "let back = number >= 2 * u64::from(self.iterations);",
+        "let descending = number >= u64::from(self.iterations);",
+        "let descending = number >= 2 * u64::from(self.iterations);",
     ),
     mutation(
         Stability,

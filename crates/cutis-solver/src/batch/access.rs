@@ -1,16 +1,16 @@
-//! Where the loops over constraints read vertices and move them.
+//! Access to vertices for the loops over constraints, exclusive or shared between threads.
 
 use crate::Vertex;
 
-/// Where a loop over constraints reads vertices.
+/// Reads vertices.
 pub trait Load<T> {
-    /// The vertex `index`.
+    /// Returns vertex `index`.
     fn load(&self, index: u32) -> Vertex<T>;
 }
 
-/// Where it moves them, too.
+/// Reads and writes vertices.
 pub trait Store<T>: Load<T> {
-    /// Replaces the vertex `index`.
+    /// Replaces vertex `index`.
     fn store(&mut self, index: u32, vertex: Vertex<T>);
 }
 

@@ -1,4 +1,5 @@
-//! Storage of one kind of constraint: flat arrays ordered by color, checked when they are made.
+//! Storage of one kind of constraint: flat arrays ordered by color. All values are checked when
+//! the storage is built.
 
 mod access;
 mod project;
@@ -17,44 +18,52 @@ use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
 
 pub use access::{Load, Store};
 
-/// Lanes that any number type has at most.
-const MOST_LANES: usize = 4;
+/// Upper bound of the number of SIMD lanes over all number types.
+const MAX_LANES: usize = 4;
 
-/// The projections of a kind. Its module is private, so that nothing outside this crate implements or calls it.
+/// A range of constraints of one kind, to be projected with the vertices `V`.
+pub struct ConstraintChunk<'a, T, V> {
+    /// Constraints in the order of the colors.
+    pub range: Range<usize>,
+    /// All vertices of the system.
+    pub vertices: V,
+    /// Parameters of the substep.
+    pub step: Step<T>,
+    /// One multiplier per constraint of `range`; empty if none are stored.
+    pub multipliers: &'a mut [T],
+}
+
+/// Vertices on which the forces of one kind are evaluated, at the state `V`.
+pub struct VertexChunk<'a, T, V> {
+    /// The constraints of this kind at each vertex.
+    pub incidence: &'a Incidence,
+    /// Indices of the vertices.
+    pub indices: &'a [u32],
+    /// All vertices of the system.
+    pub vertices: V,
+    /// One force per entry of `indices`, to which this kind adds its part.
+    pub forces: &'a mut [VertexForce<T>],
+}
+
+/// The inner loops of one kind. The module is private, so that code outside of this crate can
+/// neither implement nor call this trait.
 pub trait Project<T: Scalar> {
-    /// Projects `range` in ascending order. `multipliers` belongs to `range`, or is empty when none are kept.
-    fn project(&self, range: Range<usize>, vertices: &mut [Vertex<T>], step: Step<T>, multipliers: &mut [T]);
-    /// The same, with vertices that other threads may be moving too: no two constraints in work at a time may share
-    /// one.
-    fn project_shared(
-        &self,
-        range: Range<usize>,
-        vertices: SharedVertices<'_, T>,
-        step: Step<T>,
-        multipliers: &mut [T],
-    );
-    /// Adds what this kind does to each of `chosen` to its place in `forces`. `incidence` is that of this kind.
-    fn vertex_force(
-        &self,
-        incidence: &Incidence,
-        chosen: &[u32],
-        vertices: &[Vertex<T>],
-        forces: &mut [VertexForce<T>],
-    );
-    /// The same, side by side, with vertices that other threads may be moving too: none that is in a constraint with one
-    /// of `chosen`.
-    fn pull_shared(
-        &self,
-        incidence: &Incidence,
-        chosen: &[u32],
-        vertices: SharedVertices<'_, T>,
-        forces: &mut [VertexForce<T>],
-    );
-    /// Number of vertices that the indices were checked against.
+    /// Projects the constraints one after the other, in ascending order.
+    fn project(&self, chunk: ConstraintChunk<'_, T, &mut [Vertex<T>]>);
+    /// Projects with SIMD lanes while other threads project other constraints. No two constraints
+    /// that are projected at the same time may share a vertex.
+    fn project_shared(&self, chunk: ConstraintChunk<'_, T, SharedVertices<'_, T>>);
+    /// Adds the forces of this kind on each vertex, one vertex after the other.
+    fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>);
+    /// Adds the forces with SIMD lanes while other threads move other vertices. No thread may
+    /// move a vertex that shares a constraint with a vertex of this chunk.
+    fn vertex_forces_shared(&self, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>);
+    /// Returns the number of vertices for which the indices were checked.
     fn vertex_count(&self) -> usize;
 }
 
-/// All constraints of the kind `C`. No two of one color share a vertex; every index is below `vertex_count`.
+/// All constraints of the kind `C`. Two constraints of one color never share a vertex, and every
+/// index is below `vertex_count`.
 pub(crate) struct Batch<C, const N: usize, T, P> {
     vertex_count: usize,
     offsets: Vec<u32>,

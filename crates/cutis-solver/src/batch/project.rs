@@ -1,25 +1,17 @@
-//! The loops over a range of constraints, scalar for the reference and in lanes for the threads.
+//! The loops over a range of constraints: scalar for the reference, with SIMD lanes for threads.
 
-use std::ops::Range;
-
-use cutis_coloring::Incidence;
 use cutis_constraints::{Constraint, Params, Scalar};
 use nalgebra::Point3;
 use simba::simd::SimdValue;
 
-use super::{Batch, MOST_LANES, Project, Store};
+use super::{Batch, ConstraintChunk, MAX_LANES, Project, Store, VertexChunk};
 use crate::colored::SharedVertices;
-use crate::{Pbd, Rule, Step, Values, Vertex, VertexForce, Xpbd, project};
+use crate::{Pbd, Rule, Step, Values, Vertex, Xpbd, project};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     /// Projects one constraint after the other.
-    fn one_by_one<S: Store<T>, R: Rule<T>>(
-        &self,
-        range: Range<usize>,
-        store: &mut S,
-        rule: R,
-        multipliers: &mut [T],
-    ) {
+    fn project_scalar<S: Store<T>, R: Rule<T>>(&self, chunk: ConstraintChunk<'_, T, &mut S>, rule: R) {
+        let ConstraintChunk { range, vertices: store, multipliers, .. } = chunk;
         let start = range.start;
         let stiffness = self.stiffness.values();
         for (k, (tuple, params)) in self.indices[range.clone()].iter().zip(&self.params[range]).enumerate() {
@@ -27,26 +19,26 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             let x = vertices.map(|v| v.position());
             let w = vertices.map(|v| v.inverse_mass());
             let multiplier = multipliers.get(k).copied().unwrap_or_else(T::zero);
-            let done = project::<C, N, T, R>(&x, &w, params, rule, stiffness.at(start + k), multiplier);
+            let projection = project::<C, N, T, R>(&x, &w, params, rule, stiffness.at(start + k), multiplier);
             if let Some(multiplier) = multipliers.get_mut(k) {
-                *multiplier += done.multiplier;
+                *multiplier += projection.multiplier;
             }
             for i in 0..N {
-                store.store(tuple[i], Vertex::new(x[i] + done.corrections[i], w[i]));
+                store.store(tuple[i], Vertex::new(x[i] + projection.corrections[i], w[i]));
             }
         }
     }
 
-    /// Projects constraints of one color side by side, as many at once as there are lanes, and the rest one by one:
-    /// the same bits, since they share no vertex and each lane does what the scalar does.
-    fn side_by_side<S: Store<T>, R: Rule<T>, L: Rule<T::Lanes>>(
+    /// Projects constraints of one color in SIMD lanes, and the remainder with scalars. The bits
+    /// are those of the scalar loop: the constraints share no vertex, and each lane executes the
+    /// operations of the scalar.
+    fn project_simd<S: Store<T>, R: Rule<T>, L: Rule<T::Lanes>>(
         &self,
-        range: Range<usize>,
-        mut store: S,
+        chunk: ConstraintChunk<'_, T, S>,
         rule: R,
         lane_rule: L,
-        multipliers: &mut [T],
     ) {
+        let ConstraintChunk { range, vertices: mut store, step, multipliers } = chunk;
         let lanes = T::Lanes::LANES;
         let stiffness = self.stiffness.values();
         let groups = range.len() / lanes;
@@ -70,15 +62,15 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             let offset = group * lanes;
             let multiplier =
                 if keeps { T::lanes(|lane| multipliers[offset + lane]) } else { T::Lanes::splat(T::zero()) };
-            let done = project::<C, N, T::Lanes, L>(&x, &w, &params, lane_rule, stiffness, multiplier);
+            let projection = project::<C, N, T::Lanes, L>(&x, &w, &params, lane_rule, stiffness, multiplier);
             if keeps {
-                let sum: T::Lanes = multiplier + done.multiplier;
+                let sum: T::Lanes = multiplier + projection.multiplier;
                 for lane in 0..lanes {
                     multipliers[offset + lane] = sum.extract(lane);
                 }
             }
             for i in 0..N {
-                let moved = x[i] + done.corrections[i];
+                let moved = x[i] + projection.corrections[i];
                 for lane in 0..lanes {
                     let position = moved.map(|component| component.extract(lane));
                     store.store(tuples[lane][i], Vertex::new(position, w[i].extract(lane)));
@@ -87,72 +79,50 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             rest.start = first + lanes;
         }
         let multipliers = if keeps { &mut multipliers[groups * lanes..] } else { multipliers };
-        self.one_by_one(rest, &mut store, rule, multipliers);
+        let rest = ConstraintChunk { range: rest, vertices: &mut store, step, multipliers };
+        self.project_scalar(rest, rule);
     }
 }
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, C::Params<T>> {
-    fn project(
-        &self,
-        range: Range<usize>,
-        mut vertices: &mut [Vertex<T>],
-        step: Step<T>,
-        multipliers: &mut [T],
-    ) {
+    fn project(&self, chunk: ConstraintChunk<'_, T, &mut [Vertex<T>]>) {
+        let ConstraintChunk { range, mut vertices, step, multipliers } = chunk;
+        let chunk = ConstraintChunk { range, vertices: &mut vertices, step, multipliers };
         match step {
-            Step::Pbd => self.one_by_one(range, &mut vertices, Pbd, multipliers),
+            Step::Pbd => self.project_scalar(chunk, Pbd),
+            Step::Xpbd { inverse_h_squared } => self.project_scalar(chunk, Xpbd { inverse_h_squared }),
+        }
+    }
+
+    fn project_shared(&self, chunk: ConstraintChunk<'_, T, SharedVertices<'_, T>>) {
+        match chunk.step {
+            Step::Pbd => self.project_simd(chunk, Pbd, Pbd),
             Step::Xpbd { inverse_h_squared } => {
-                self.one_by_one(range, &mut vertices, Xpbd { inverse_h_squared }, multipliers);
+                let lane_rule = Xpbd { inverse_h_squared: T::Lanes::splat(inverse_h_squared) };
+                self.project_simd(chunk, Xpbd { inverse_h_squared }, lane_rule);
             }
         }
     }
 
-    fn project_shared(
-        &self,
-        range: Range<usize>,
-        vertices: SharedVertices<'_, T>,
-        step: Step<T>,
-        multipliers: &mut [T],
-    ) {
-        match step {
-            Step::Pbd => self.side_by_side(range, vertices, Pbd, Pbd, multipliers),
-            Step::Xpbd { inverse_h_squared } => {
-                let lanes = Xpbd { inverse_h_squared: T::Lanes::splat(inverse_h_squared) };
-                self.side_by_side(range, vertices, Xpbd { inverse_h_squared }, lanes, multipliers);
-            }
+    fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>) {
+        for (&vertex, force) in chunk.indices.iter().zip(chunk.forces) {
+            self.force_scalar(chunk.incidence.of(vertex), &chunk.vertices, force);
         }
     }
 
-    fn vertex_force(
-        &self,
-        incidence: &Incidence,
-        chosen: &[u32],
-        vertices: &[Vertex<T>],
-        forces: &mut [VertexForce<T>],
-    ) {
-        for (&vertex, vertex_force) in chosen.iter().zip(forces) {
-            self.force_one_by_one(incidence.of(vertex), &vertices, vertex_force);
-        }
-    }
-
-    fn pull_shared(
-        &self,
-        incidence: &Incidence,
-        chosen: &[u32],
-        vertices: SharedVertices<'_, T>,
-        forces: &mut [VertexForce<T>],
-    ) {
+    fn vertex_forces_shared(&self, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>) {
+        let VertexChunk { incidence, indices, vertices, forces } = chunk;
         let lanes = T::Lanes::LANES;
-        let mut places: [&[u32]; MOST_LANES] = [&[]; MOST_LANES];
-        for (chosen, forces) in chosen.chunks(lanes).zip(forces.chunks_mut(lanes)) {
-            if chosen.len() == lanes {
-                for (places, &vertex) in places.iter_mut().zip(chosen) {
-                    *places = incidence.of(vertex);
+        let mut entries: [&[u32]; MAX_LANES] = [&[]; MAX_LANES];
+        for (indices, forces) in indices.chunks(lanes).zip(forces.chunks_mut(lanes)) {
+            if indices.len() == lanes {
+                for (entries, &vertex) in entries.iter_mut().zip(indices) {
+                    *entries = incidence.of(vertex);
                 }
-                self.force_side_by_side(&places[..lanes], &vertices, forces);
+                self.forces_simd(&entries[..lanes], &vertices, forces);
             } else {
-                for (&vertex, vertex_force) in chosen.iter().zip(forces) {
-                    self.force_one_by_one(incidence.of(vertex), &vertices, vertex_force);
+                for (&vertex, force) in indices.iter().zip(forces) {
+                    self.force_scalar(incidence.of(vertex), &vertices, force);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! What a kind tells of itself: its arrays, and what can be measured of it.
+//! The arrays of a kind, and measurements over its constraints.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -85,13 +85,13 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
     }
 
     fn to_f64(&self) -> Kind<f64> {
-        let wide =
+        let to_f64 =
             |params: &C::Params<T>| <C::Params<f64> as Params<f64>>::from_fn(|j| params.as_ref()[j].to_f64());
         Arc::new(Batch::<C, N, f64, C::Params<f64>> {
             vertex_count: self.vertex_count,
             offsets: self.offsets.clone(),
             indices: self.indices.clone(),
-            params: self.params.iter().map(wide).collect(),
+            params: self.params.iter().map(to_f64).collect(),
             stiffness: self.stiffness.to_f64(),
             kind: PhantomData,
         })

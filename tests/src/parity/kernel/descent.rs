@@ -118,7 +118,7 @@ impl Body {
 
     fn on_gpu(&self, gpu: &Gpu, wrong: Wrong) -> Result<Vec<[f32; 4]>, Failure> {
         let set = self.set();
-        let &DescentStep { h, fall, inverse_h_squared, relaxation } = self.descent()?.step();
+        let &DescentStep { h, gravity_h_squared: g, inverse_h_squared, relaxation } = self.descent()?.step();
         let masses = self.simulation.system().vertices().iter().map(|vertex| vertex.inverse_mass());
         let row = |x: &Point3<f32>, w: f32| [x.x, x.y, x.z, w];
         let places = self.positions.iter().zip(&self.velocities).zip(masses);
@@ -142,7 +142,7 @@ impl Body {
         let previous = gpu.buffer("previous", &previous)?;
         let velocities = gpu.buffer("velocities", &velocities)?;
         let forces = gpu.zeroed::<[f32; 12]>("vertex forces", self.positions.len())?;
-        let step = [fall.x, fall.y, fall.z, h, inverse_h_squared, relaxation, 0.0, 0.0];
+        let step = [g.x, g.y, g.z, h, inverse_h_squared, relaxation, 0.0, 0.0];
         let step = gpu.uniform("step", &step)?;
         let acting = gpu.bind(&vertex_force, 0, &[(0, vertices.whole()), (1, forces.whole())])?;
         let moving = [

@@ -5,7 +5,9 @@ use std::ops::Range;
 use cutis_conformance::Alteration;
 use cutis_gpu::{Binding, Gpu};
 use cutis_shaders::solver::{self, Multiplier, PROJECT, Rule};
-use cutis_solver::{Execute, Formulation, Serial, Settings, Simulation, Step, Sweep, Values, Vertex};
+use cutis_solver::{
+    ConstraintColor, Execute, Formulation, Serial, Settings, Simulation, Step, Sweep, Values, Vertex,
+};
 use nalgebra::Vector3;
 
 use crate::parity::bench::{Bench, Effort, Failure};
@@ -125,7 +127,13 @@ impl Body {
         for _ in 0..self.iterations() {
             for &sweep in self.sweeps() {
                 let Some(step) = self.simulation.projection_step() else { continue };
-                Serial.sweep(sweep, kind, &mut vertices, step, &mut multipliers);
+                Serial.project(ConstraintColor {
+                    set: kind,
+                    color: sweep.color,
+                    vertices: &mut vertices,
+                    step,
+                    multipliers: &mut multipliers,
+                });
             }
         }
         (bytemuck::cast_slice(&vertices).to_vec(), multipliers)

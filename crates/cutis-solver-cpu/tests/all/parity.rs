@@ -1,4 +1,4 @@
-//! The backend against the reference: equal bit for bit, for any number of threads.
+//! The backend against the reference solver: equal bit for bit, for any number of threads.
 
 use std::time::Instant;
 
@@ -12,8 +12,8 @@ use cutis_solver_cpu::{CpuError, SolverCpu};
 use cutis_test_kit::Kuhn;
 use nalgebra::Point3;
 
-/// A block large enough for several chunks of every color and several blocks of vertices: all kinds, one face fixed,
-/// an edge carried by a handle.
+/// A block with several chunks of every color and several blocks of vertices. It has all kinds of
+/// constraints, one fixed face, and a handle that moves an edge.
 fn body<T: Scalar>(formulation: Formulation) -> System<T> {
     let lattice = Kuhn::new([40, 24, 20], 0.1);
     let count = lattice.positions.len();
@@ -61,16 +61,10 @@ fn body<T: Scalar>(formulation: Formulation) -> System<T> {
 }
 
 fn settings(formulation: Formulation, iterations: u32) -> Settings {
+    let (dt_s, substeps, damping_per_s) = (0.01, 2, 0.5);
+    let relaxation = if formulation == Formulation::Vbd { 1.3 } else { 1.0 };
     let gravity_m_s2 = [0.0, -9.81, 0.0];
-    Settings {
-        formulation,
-        dt_s: 0.01,
-        substeps: 2,
-        iterations,
-        gravity_m_s2,
-        damping_per_s: 0.5,
-        relaxation: if formulation == Formulation::Vbd { 1.3 } else { 1.0 },
-    }
+    Settings { formulation, dt_s, substeps, iterations, gravity_m_s2, damping_per_s, relaxation }
 }
 
 /// Positions and velocities after three frames, as bits.
@@ -90,13 +84,13 @@ fn parity<T: Scalar>(formulation: Formulation, iterations: u32) {
         let solver = SolverCpu::new(body::<T>(formulation), settings, Some(threads)).unwrap();
         assert!(bits(solver, &[1, 2]) == reference, "{threads} threads, {formulation:?}");
     }
-    // The control: another number of iterations must not be equal.
+    // Control: another number of iterations gives other bits.
     let other = Settings { iterations: iterations + 1, ..settings };
     assert!(bits(SolverReference::new(body::<T>(formulation), other).unwrap(), &[3]) != reference);
 }
 
 #[test]
-fn equal_to_the_reference_for_any_number_of_threads() {
+fn results_equal_the_reference_for_any_number_of_threads() {
     parity::<f32>(Formulation::Pbd, 2);
     parity::<f32>(Formulation::Xpbd, 1);
     parity::<f32>(Formulation::Xpbd, 3);
@@ -107,13 +101,13 @@ fn equal_to_the_reference_for_any_number_of_threads() {
 }
 
 #[test]
-fn going_on_from_a_saved_state_gives_the_same_bits() {
+fn a_run_from_a_saved_state_has_the_same_bits() {
     for formulation in [Formulation::Xpbd, Formulation::Vbd] {
-        goes_on(formulation);
+        assert_continues(formulation);
     }
 }
 
-fn goes_on(formulation: Formulation) {
+fn assert_continues(formulation: Formulation) {
     let settings = settings(formulation, 1);
     let new = || SolverCpu::new(body::<f32>(formulation), settings, Some(2)).unwrap();
     let whole = bits(new(), &[3]);
@@ -129,7 +123,7 @@ fn goes_on(formulation: Formulation) {
 }
 
 #[test]
-fn a_number_of_threads_that_makes_no_sense_is_refused() {
+fn a_number_of_threads_out_of_range_is_rejected() {
     for threads in [0, 1_000_000] {
         let solver =
             SolverCpu::new(body::<f32>(Formulation::Pbd), settings(Formulation::Pbd, 1), Some(threads));
@@ -137,9 +131,8 @@ fn a_number_of_threads_that_makes_no_sense_is_refused() {
     }
 }
 
-/// What timing tells, and that it changes no bit.
 #[test]
-fn a_timed_step_has_the_same_bits_and_tells_its_parts() {
+fn a_timed_step_has_the_same_bits_and_reports_its_parts() {
     let settings = |iterations| Settings { iterations, substeps: 3, ..Settings::default() };
     for iterations in [1, 2] {
         let mut plain = SolverReference::<f32>::new(body(Formulation::Xpbd), settings(iterations)).unwrap();
@@ -168,7 +161,7 @@ fn a_timed_step_has_the_same_bits_and_tells_its_parts() {
     }
 }
 
-/// The same body in double precision, moved as a body that was built in double precision from the same numbers.
+/// A conversion to double precision gives the body that is built in double precision.
 #[test]
 fn a_body_in_double_precision_is_the_same_body() {
     for formulation in [Formulation::Pbd, Formulation::Xpbd] {
@@ -176,19 +169,19 @@ fn a_body_in_double_precision_is_the_same_body() {
         let same = body::<f64>(formulation).to_f64();
         let mut expected = SolverCpu::new(body::<f64>(formulation), settings, Some(1)).unwrap();
         let mut found = SolverCpu::new(same, settings, Some(2)).unwrap();
-        let mut wide = SolverCpu::new(body::<f32>(formulation).to_f64(), settings, Some(2)).unwrap();
-        let mut narrow = SolverCpu::new(body::<f32>(formulation), settings, Some(2)).unwrap();
-        for solver in [&mut expected, &mut found, &mut wide] {
+        let mut double = SolverCpu::new(body::<f32>(formulation).to_f64(), settings, Some(2)).unwrap();
+        let mut single = SolverCpu::new(body::<f32>(formulation), settings, Some(2)).unwrap();
+        for solver in [&mut expected, &mut found, &mut double] {
             solver.step(2).unwrap();
         }
-        narrow.step(2).unwrap();
+        single.step(2).unwrap();
         assert!(found.positions().unwrap() == expected.positions().unwrap());
-        let apart = |a: &[Point3<f64>], b: &[Point3<f64>]| {
+        let distance = |a: &[Point3<f64>], b: &[Point3<f64>]| {
             a.iter().zip(b).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
         };
-        let narrow: Vec<Point3<f64>> = narrow.positions().unwrap().iter().map(|p| p.cast()).collect();
-        let wide = wide.positions().unwrap();
-        assert!((1e-12..1e-5).contains(&apart(&wide, &narrow)), "{}", apart(&wide, &narrow));
-        assert!(apart(&wide, &expected.positions().unwrap()) < 1e-5);
+        let single: Vec<Point3<f64>> = single.positions().unwrap().iter().map(|p| p.cast()).collect();
+        let double = double.positions().unwrap();
+        assert!((1e-12..1e-5).contains(&distance(&double, &single)), "{}", distance(&double, &single));
+        assert!(distance(&double, &expected.positions().unwrap()) < 1e-5);
     }
 }

@@ -1,4 +1,4 @@
-//! What is refused at the door, and with which words; and what happens when numbers explode in spite of it.
+//! Input validation and its error messages, the state after numbers that overflow, and measurements.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Volume};
@@ -35,12 +35,12 @@ fn soft() -> Stiffness<f64> {
 }
 
 #[test]
-fn vertices_that_cannot_be_used_are_named() {
+fn errors_name_invalid_vertices() {
     let mut points = points();
     points[2].y = f64::NAN;
     let error = SystemBuilder::<f64>::new(&points, &[1.0; 3]).err().unwrap();
     assert!(matches!(error, SolverError::Vertex { vertex: 2, what: "coordinate", .. }), "{error}");
-    // Finite in double precision, but not in single precision.
+    // This is finite in double precision but not in single precision.
     points[2].y = 1e300;
     let error = SystemBuilder::<f32>::new(&points, &[1.0; 3]).err().unwrap();
     assert!(matches!(error, SolverError::Vertex { vertex: 2, what: "coordinate", .. }), "{error}");
@@ -57,16 +57,17 @@ fn vertices_that_cannot_be_used_are_named() {
 }
 
 #[test]
-fn constraints_that_cannot_be_used_are_named() {
+fn errors_name_invalid_constraints() {
     let error = add(&[[0, 1], [1, 3]], &[[1.0]; 2], soft(), &groups()).unwrap();
-    assert_eq!(error.to_string(), "distance constraint 1 names vertex 3, but there are 3 vertices");
+    assert_eq!(error.to_string(), "distance constraint 1 refers to vertex 3, but there are 3 vertices");
     let error = add(&[[0, 1], [2, 2]], &[[1.0]; 2], soft(), &groups()).unwrap();
     assert!(matches!(error, SolverError::RepeatedVertex { constraint: 1, vertex: 2, .. }), "{error}");
     let error = add(&EDGES, &[[1.0]], soft(), &groups()).unwrap();
     assert!(matches!(error, SolverError::KindLength { found: 1, expected: 2, .. }), "{error}");
     let error = add(&EDGES, &[[1.0], [f64::INFINITY]], soft(), &groups()).unwrap();
     assert!(matches!(error, SolverError::Parameter { constraint: 1, parameter: 0, .. }), "{error}");
-    // The edges share vertex 1, so that one group for both is wrong, and so is a group that names an edge twice.
+    // Both edges in one group is wrong because they share vertex 1. The other group is wrong because
+    // it contains an edge twice.
     for (order, offsets) in [(vec![0, 1], vec![0, 2]), (vec![0, 0], vec![0, 1, 2])] {
         let error = add(&EDGES, &[[1.0]; 2], soft(), &Groups { order, offsets }).unwrap();
         assert!(matches!(error, SolverError::Groups { kind: "distance", .. }), "{error}");
@@ -79,7 +80,7 @@ fn constraints_that_cannot_be_used_are_named() {
 }
 
 #[test]
-fn stiffnesses_that_cannot_be_used_are_named() {
+fn errors_name_invalid_stiffnesses() {
     let bad = [
         (Stiffness::compliance(-1.0), None),
         (Stiffness::compliance(f64::NAN), None),
@@ -104,7 +105,7 @@ fn stiffnesses_that_cannot_be_used_are_named() {
 }
 
 #[test]
-fn handles_that_cannot_be_used_are_named() {
+fn errors_name_invalid_handles() {
     let handle = |vertices: &[u32], over_s| Handle { vertices: vertices.to_vec(), move_m: [1.0; 3], over_s };
     let error = builder().handle(handle(&[1, 3], 1.0)).err().unwrap();
     assert!(matches!(error, SolverError::Handle { handle: 0, vertex: 3, .. }), "{error}");
@@ -118,7 +119,7 @@ fn handles_that_cannot_be_used_are_named() {
 }
 
 #[test]
-fn a_handle_carries_its_vertices_along_the_path_and_holds_them() {
+fn a_handle_moves_its_vertices_along_the_path_and_holds_them() {
     let handle = Handle { vertices: vec![2], move_m: [0.0, 3.0, 0.0], over_s: 1.5 };
     let system = builder().handle(handle).unwrap().build();
     let settings = Settings { dt_s: 0.5, substeps: 2, gravity_m_s2: [0.0, -1.0, 0.0], ..Settings::default() };
@@ -146,7 +147,7 @@ fn a_body_far_from_the_origin_keeps_its_coordinates_and_its_precision() {
 }
 
 #[test]
-fn numbers_that_explode_are_named_and_the_state_before_is_kept() {
+fn overflow_names_the_vertex_and_restores_the_state_before() {
     let velocities = [Vector3::zeros(), Vector3::zeros(), Vector3::new(1e38f32, 0.0, 0.0)];
     let system =
         SystemBuilder::<f32>::new(&points(), &[0.0, 1.0, 1.0]).unwrap().velocities(&velocities).unwrap();
@@ -159,11 +160,11 @@ fn numbers_that_explode_are_named_and_the_state_before_is_kept() {
     assert!(solver.velocities().unwrap().iter().all(|v| *v == Vector3::zeros()));
     assert_eq!(solver.time_s(), 2.0);
     solver.step(1).unwrap();
-    assert_eq!(solver.positions().unwrap(), kept, "at rest it stays where it is");
+    assert_eq!(solver.positions().unwrap(), kept, "a body at rest stays in place");
 }
 
 #[test]
-fn measures_agree_with_closed_forms() {
+fn measurements_agree_with_closed_forms() {
     let velocities = [Vector3::zeros(), Vector3::new(0.0, 2.0, 0.0), Vector3::new(0.0, -2.0, 0.0)];
     let system = SystemBuilder::<f64>::new(&points(), &[0.0, 0.5, 0.25])
         .unwrap()
@@ -179,7 +180,7 @@ fn measures_agree_with_closed_forms() {
     let momentum = system.momentum();
     assert_eq!(momentum.linear, Vector3::new(0.0, 4.0 - 8.0, 0.0));
     assert_eq!(momentum.center.x, (2.0 + 8.0) / 6.0);
-    // About the center of mass, 5/3: −2/3·4 for one, −1/3·8 for the other.
+    // The moments about the center of mass, 5/3, are −2/3·4 and −1/3·8.
     assert!((momentum.angular.z + 16.0 / 3.0).abs() < 1e-12, "{momentum:?}");
     let residual = system.residuals()[0];
     assert_eq!((residual.name, residual.max), ("distance", 1.0));
@@ -191,7 +192,7 @@ fn measures_agree_with_closed_forms() {
 }
 
 #[test]
-fn rest_shapes_without_size_are_named() {
+fn errors_name_rest_shapes_of_size_zero() {
     let mut points = points().to_vec();
     points[2] = points[1];
     points.push(Point3::new(0.0, 1.0, 0.0));
@@ -203,12 +204,12 @@ fn rest_shapes_without_size_are_named() {
     let groups = greedy(&flat, 4).unwrap();
     let error = builder().add_from_rest::<Volume, 4>(&flat, &Default::default(), soft(), &groups);
     assert!(matches!(error.err(), Some(SolverError::RestShape { kind: "volume", constraint: 0, .. })));
-    // Asked for by name, a spring of length zero is no mistake.
+    // An explicit rest length of zero is valid.
     assert!(add(&EDGES, &[[0.0], [1.0]], soft(), &self::groups()).is_none());
 }
 
 #[test]
-fn a_collapsed_constraint_is_named_and_others_are_not() {
+fn only_a_collapsed_constraint_is_reported() {
     let system = |points: &[Point3<f64>], masses: &[f64; 3], lengths: &[[f64; 1]]| {
         let builder = SystemBuilder::<f64>::new(points, masses).unwrap();
         builder.add::<Distance, 2>(&EDGES, lengths, soft(), &groups()).unwrap().build()
@@ -219,9 +220,17 @@ fn a_collapsed_constraint_is_named_and_others_are_not() {
     assert_eq!(
         error,
         Err(SolverError::Collapsed { kind: "distance", vertices: vec![1, 2], ratio: -1.0 }),
-        "the first edge is at rest, the second has no direction"
+        "the first edge is at rest, and the second has no direction"
     );
-    assert_eq!(system(&together, &[0.0; 3], &[[1.0], [2.0]]).check_collapsed(0.1), Ok(()), "held on purpose");
+    assert_eq!(
+        system(&together, &[0.0; 3], &[[1.0], [2.0]]).check_collapsed(0.1),
+        Ok(()),
+        "no vertex can move"
+    );
     assert_eq!(system(&together, &[1.0; 3], &[[1.0], [0.0]]).check_collapsed(0.1), Ok(()), "at rest");
-    assert_eq!(system(&points(), &[1.0; 3], &[[5.0], [5.0]]).check_collapsed(0.1), Ok(()), "can act");
+    assert_eq!(
+        system(&points(), &[1.0; 3], &[[5.0], [5.0]]).check_collapsed(0.1),
+        Ok(()),
+        "the constraints have gradients"
+    );
 }

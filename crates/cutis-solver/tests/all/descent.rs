@@ -1,4 +1,5 @@
-//! Vertex block descent: the energy of a step falls, what rests is in equilibrium, and what cannot be solved is refused.
+//! Vertex block descent: the energy of a step decreases, a body at rest is in equilibrium, and
+//! systems without a solution are rejected.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Constraint, Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
@@ -6,60 +7,25 @@ use cutis_solver::{
     Formulation, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
     VertexForce,
 };
+use cutis_test_kit::Kuhn;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// A block of 5 × 4 × 4 points, 1 cm apart, six tetrahedra to a cell, held at x = 0, with a skin on top that forces.
+/// A block of 5 × 4 × 4 vertices, 1 cm apart, fixed at x = 0, with contracting skin on top.
 fn block(distance: f64) -> System<f64> {
     block_with(distance, 2.0)
 }
 
-/// The same with skin of another amplification.
+/// The block of [`block`] with another amplification of the skin.
 fn block_with(distance: f64, amplification: f64) -> System<f64> {
     let size = [5u32, 4, 4];
-    let number = |p: [u32; 3]| p[0] + size[0] * (p[1] + size[1] * p[2]);
-    let (mut positions, mut tets, mut skin) = (Vec::new(), Vec::new(), Vec::new());
-    for k in 0..size[2] {
-        for j in 0..size[1] {
-            for i in 0..size[0] {
-                positions.push(Point3::new(f64::from(i), f64::from(j), f64::from(k)) * 0.01);
-                if i + 1 == size[0] || j + 1 == size[1] || k + 1 == size[2] {
-                    continue;
-                }
-                for (order, even) in [
-                    ([0, 1, 2], true),
-                    ([1, 2, 0], true),
-                    ([2, 0, 1], true),
-                    ([0, 2, 1], false),
-                    ([1, 0, 2], false),
-                    ([2, 1, 0], false),
-                ] {
-                    let mut corner = [i, j, k];
-                    let mut tet = [number(corner); 4];
-                    for (axis, place) in order.into_iter().zip(1..) {
-                        corner[axis] += 1;
-                        tet[place] = number(corner);
-                    }
-                    if !even {
-                        tet.swap(2, 3);
-                    }
-                    tets.push(tet);
-                }
-                if k + 2 == size[2] {
-                    let top = |a: u32, b: u32| number([i + a, j + b, k + 1]);
-                    skin.extend([[top(0, 0), top(1, 0), top(1, 1)], [top(0, 0), top(1, 1), top(0, 1)]]);
-                }
-            }
-        }
+    let Kuhn { positions, edges, tets, .. } = Kuhn::new(size.map(|n| n as usize), 0.01);
+    let mut skin = Vec::new();
+    for (i, j) in (0..size[1] - 1).flat_map(|j| (0..size[0] - 1).map(move |i| (i, j))) {
+        let top = |a: u32, b: u32| i + a + size[0] * (j + b + size[1] * (size[2] - 1));
+        skin.extend([[top(0, 0), top(1, 0), top(1, 1)], [top(0, 0), top(1, 1), top(0, 1)]]);
     }
-    let mut edges: Vec<[u32; 2]> = tets
-        .iter()
-        .flat_map(|t| [[t[0], t[1]], [t[0], t[2]], [t[0], t[3]], [t[1], t[2]], [t[1], t[3]], [t[2], t[3]]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
     let count = positions.len();
     let inverse_masses: Vec<f64> = (0..count).map(|n| if n % 5 == 0 { 0.0 } else { 1000.0 }).collect();
     let tension = SkinTensionMaterial { rest_area_scale: 0.8, amplification };
@@ -100,7 +66,7 @@ fn settings(formulation: Formulation, substeps: u32, iterations: u32) -> Setting
     }
 }
 
-/// Largest force on a vertex that moves, over its weight.
+/// Returns the largest force on a moving vertex over its weight.
 fn unbalance(system: &System<f64>) -> f64 {
     let weight = |n: usize| Vector3::from(GRAVITY) / system.vertices()[n].inverse_mass();
     let mut forces: Vec<Vector3<f64>> = (0..system.vertices().len()).map(weight).collect();
@@ -121,7 +87,7 @@ fn unbalance(system: &System<f64>) -> f64 {
 }
 
 #[test]
-fn what_rests_is_in_equilibrium_whatever_the_settings() {
+fn a_body_at_rest_is_in_equilibrium_for_all_settings() {
     let mut tips = Vec::new();
     for (substeps, iterations) in [(1, 1), (1, 8), (4, 1), (20, 2)] {
         let settings = settings(Formulation::Vbd, substeps, iterations);
@@ -133,36 +99,40 @@ fn what_rests_is_in_equilibrium_whatever_the_settings() {
     }
     assert!(tips[0] < -1e-4, "the block hangs: {tips:?}");
     assert!(tips.iter().all(|tip| (tip - tips[0]).abs() < 1e-9), "{tips:?}");
-    // The control: XPBD rests elsewhere, the farther away the larger its substeps.
+    // Control: XPBD comes to rest elsewhere, farther away for larger substeps.
     let mut xpbd = SolverReference::new(block(1e-3), settings(Formulation::Xpbd, 1, 1)).unwrap();
     xpbd.step(1500).unwrap();
     assert!(unbalance(xpbd.system().unwrap()) > 0.1);
 }
 
-/// `Σ m/(2h²)|x − x̃|² + Σ C²/(2α)` after one step of `iterations` from a scrambled start at rest.
+/// Returns `Σ m/(2h²)|x − x̃|² + Σ C²/(2α)` after one step of `iterations` from random positions at
+/// rest.
 fn energy_of_step(iterations: u32, relaxation: f64, amplification: f64) -> f64 {
     let settings = Settings { relaxation, damping_per_s: 0.0, ..settings(Formulation::Vbd, 1, iterations) };
     let mut solver = SolverReference::new(block_with(1e-4, amplification), settings).unwrap();
     let mut start = solver.positions().unwrap();
     let count = start.len();
-    for (n, place) in start.iter_mut().enumerate().filter(|(n, _)| n % 5 != 0) {
+    for (n, position) in start.iter_mut().enumerate().filter(|(n, _)| n % 5 != 0) {
         let noise = |axis: usize| ((n * 37 + axis * 11) % count) as f64 / count as f64 - 0.5;
-        *place += Vector3::new(noise(1), noise(2), noise(3)) * 0.03;
+        *position += Vector3::new(noise(1), noise(2), noise(3)) * 0.03;
     }
     solver.restore(&start, &vec![Vector3::zeros(); count], 0).unwrap();
     solver.step(1).unwrap();
     let h = settings.substep_s();
-    let fall = Vector3::from(GRAVITY) * (h * h);
+    let gravity_h_squared = Vector3::from(GRAVITY) * (h * h);
     let elastic = solver.energy().unwrap().elastic_j.unwrap();
-    let inertia = |n: usize, x: &Point3<f64>| 0.5 / 1000.0 / (h * h) * (x - start[n] - fall).norm_squared();
+    let inertia = |n: usize, x: &Point3<f64>| {
+        0.5 / 1000.0 / (h * h) * (x - start[n] - gravity_h_squared).norm_squared()
+    };
     let moving = solver.positions().unwrap();
     let moving = moving.iter().enumerate().filter(|(n, _)| n % 5 != 0);
     elastic + moving.map(|(n, x)| inertia(n, x)).sum::<f64>()
 }
 
 #[test]
-fn the_energy_of_a_step_falls_with_every_iteration() {
-    // Of skin that is amplified so much the model has three quarters of the curvature: ω may be 1.5.
+fn every_iteration_lowers_the_energy_of_a_step() {
+    // For strongly amplified skin the model has three quarters of the true curvature, so that ω may
+    // be up to 1.5.
     for (relaxation, amplification) in [(0.7, 2.0), (1.0, 2.0), (1.4, 1e3)] {
         let energies: Vec<f64> = (1..=60).map(|n| energy_of_step(n, relaxation, amplification)).collect();
         for (n, pair) in energies.windows(2).enumerate() {
@@ -170,12 +140,12 @@ fn the_energy_of_a_step_falls_with_every_iteration() {
         }
         assert!(energies[59] < 0.5 * energies[0], "{energies:?}");
     }
-    // Over-relaxation gets farther with the same work.
+    // Over-relaxation gets closer with the same number of iterations.
     assert!(energy_of_step(60, 1.4, 2.0) < energy_of_step(60, 1.0, 2.0));
 }
 
 #[test]
-fn the_model_of_a_stretched_edge_is_its_true_one() {
+fn the_model_of_a_stretched_edge_is_its_hessian_plus_a_known_surplus() {
     let (a, b) = (Point3::new(0.1, -0.2, 0.3), Point3::new(0.5, 0.9, -0.4));
     let force = |x: Point3<f64>| {
         let eval = Distance::eval(&[x, b], &[0.7]);
@@ -186,7 +156,8 @@ fn the_model_of_a_stretched_edge_is_its_true_one() {
     let VertexForce { diagonal: d, mixed: m, .. } = force(a);
     let model = Matrix3::new(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z);
     let shift = 1e-6;
-    // κ stands for the curvature across the edge; along it there is none, but the model has it there too.
+    // κ is the curvature across the edge. The true curvature along the edge is zero, but the model
+    // adds κ there too.
     let along = (a - b).normalize();
     let length = (a - b).norm();
     let surplus = along * along.transpose() * ((length - 0.7) / length / 0.01);
@@ -198,9 +169,9 @@ fn the_model_of_a_stretched_edge_is_its_true_one() {
     }
 }
 
-/// How far the tip of a tetrahedron with half of its rest volume goes in a substep, over how far it has to go, at `10^stiff` times the
-/// stiffness that its inertia stands for.
-fn leap<T: Scalar>(stiff: i32) -> f64 {
+/// Moves the tip of a tetrahedron with half of its rest volume for one substep, at `10^stiff` times
+/// the stiffness that corresponds to its inertia. Returns the distance over the distance to rest.
+fn relative_step<T: Scalar>(stiff: i32) -> f64 {
     let base = [[0.1, -0.7, 1.3], [1.2, -0.4, 0.9], [0.4, 0.6, 1.6]].map(Point3::from);
     let tip = Point3::new(0.8, 0.3, 2.1);
     let middle = Point3::from((base[0].coords + base[1].coords + base[2].coords) / 3.0);
@@ -230,19 +201,20 @@ fn leap<T: Scalar>(stiff: i32) -> f64 {
     moved.norm() * gradient / eval.c.to_f64().abs()
 }
 
-/// Where a constraint is stiffer than `1/ε` times the inertia, the inertia is lost in the rounding of the model's matrix.
+/// If a constraint is stiffer than `1/ε` times the inertia, the inertia is lost in the rounding of
+/// the model's matrix.
 #[test]
-fn no_stiffness_throws_a_vertex() {
+fn steps_are_correct_for_every_stiffness() {
     for stiff in 0..=30 {
-        for leap in [leap::<f32>(stiff), leap::<f64>(stiff)] {
+        for found in [relative_step::<f32>(stiff), relative_step::<f64>(stiff)] {
             let expected = 1.0 / (1.0 + 10_f64.powi(-stiff));
-            assert!((leap - expected).abs() < 0.01, "{leap} instead of {expected} at 1e{stiff}");
+            assert!((found - expected).abs() < 0.01, "{found} instead of {expected} at 1e{stiff}");
         }
     }
 }
 
 #[test]
-fn what_cannot_descend_is_refused() {
+fn systems_that_descent_cannot_solve_are_rejected() {
     let descent = settings(Formulation::Vbd, 1, 1);
     let refused = |system| SolverReference::new(system, descent).err();
     let error = refused(block(0.0)).unwrap();

@@ -1,0 +1,61 @@
+//! The work on one color: constraints to project or vertices to move, with serial versions in safe
+//! code.
+
+use cutis_constraints::Scalar;
+
+use crate::batch::{ConstraintChunk, VertexChunk};
+use crate::{ColorPass, ConstraintSet, Descent, Step, System, Vertex, VertexForce};
+
+/// One color of one kind of constraint, with everything that its projection needs.
+pub struct ConstraintColor<'a, T: Scalar> {
+    /// All constraints of the kind.
+    pub set: &'a dyn ConstraintSet<T>,
+    /// The color to project.
+    pub color: usize,
+    /// All vertices of the system.
+    pub vertices: &'a mut [Vertex<T>],
+    /// Parameters of the substep.
+    pub step: Step<T>,
+    /// One multiplier per constraint of the whole set, or empty if none are stored.
+    pub multipliers: &'a mut [T],
+}
+
+impl<T: Scalar> ConstraintColor<'_, T> {
+    /// Projects the constraints one after the other, in ascending order.
+    pub fn project(self) {
+        let Self { set, color, vertices, step, multipliers } = self;
+        let range = set.range(color);
+        let multipliers = multipliers.get_mut(range.clone()).unwrap_or_default();
+        set.project(ConstraintChunk { range, vertices, step, multipliers });
+    }
+}
+
+/// One color of the vertices of a system, with everything that vertex block descent needs to move
+/// them.
+pub struct VertexColor<'a, T: Scalar> {
+    pub(crate) system: &'a mut System<T>,
+    /// Belongs to `system`.
+    pub(crate) descent: &'a Descent<T>,
+    pub(crate) pass: ColorPass,
+}
+
+impl<T: Scalar> VertexColor<'_, T> {
+    /// Moves the vertices one after the other, in ascending order.
+    pub fn descend(self) {
+        let Self { system, descent, pass } = self;
+        let System { vertices, previous, velocities, kinds, .. } = system;
+        for indices in descent.groups().order[pass.start..pass.end].chunks(1) {
+            let mut forces = [VertexForce::none()];
+            for (kind, incidence) in kinds.iter().zip(descent.incidences()) {
+                kind.vertex_forces(VertexChunk {
+                    incidence,
+                    indices,
+                    vertices: vertices.as_slice(),
+                    forces: &mut forces,
+                });
+            }
+            let i = indices[0] as usize;
+            vertices[i] = descent.step().moved(vertices[i], &previous[i], &velocities[i], &forces[0]);
+        }
+    }
+}

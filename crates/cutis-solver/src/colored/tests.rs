@@ -1,0 +1,149 @@
+//! Each unsafe block with a tiny body, on one thread and on several, against the serial code. Small
+//! enough for Miri: `cargo miri test -p cutis-solver colored::`.
+
+use cutis_coloring::{Groups, greedy};
+use cutis_constraints::{Distance, Volume};
+use nalgebra::Point3;
+
+use super::*;
+use crate::{Formulation, Settings, Simulation, Stiffness, SystemBuilder};
+
+/// Two tetrahedra that share no vertex, connected by an edge, all out of shape.
+fn system(each: bool) -> System<f64> {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Point3::from);
+    let moved = corners.map(|p| Point3::new(p.x * 1.2 + 3.0, p.y - 0.1 * p.z, p.z * 0.7));
+    let positions = [corners, moved].concat();
+    let tets = [[0, 1, 2, 3], [4, 5, 6, 7]];
+    let edges = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 6], [6, 7]];
+    let stiffness = |n: usize| match each {
+        true => Stiffness::Compliance(crate::Values::Each((1..=n).map(|k| 0.01 * k as f64).collect())),
+        false => Stiffness::compliance(0.01),
+    };
+    SystemBuilder::<f64>::new(&positions, &[0.0, 1.0, 2.0, 1.0, 1.0, 2.0, 1.0, 0.5])
+        .unwrap()
+        .add::<Distance, 2>(&edges, &[[0.8]; 7], stiffness(7), &greedy(&edges, 8).unwrap())
+        .unwrap()
+        .add::<Volume, 4>(&tets, &[[0.3]; 2], stiffness(2), &Groups::from_colors(&[0, 0]).unwrap())
+        .unwrap()
+        .build()
+}
+
+/// Runs `work` on `threads` threads at the same time.
+fn on_threads(threads: usize, work: &(dyn Fn() + Sync)) {
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(work);
+        }
+        work();
+    });
+}
+
+/// All vertices after one sweep over all colors, and the multipliers of the kinds.
+fn swept(each: bool, keeps_multipliers: bool, run: impl Fn(ConstraintColor<'_, f64>)) -> Vec<Vec<f64>> {
+    let mut system = system(each);
+    let (vertices, kinds) = system.projection_parts();
+    let step = Step::Xpbd { inverse_h_squared: 100.0 };
+    let mut kept = Vec::new();
+    for kind in kinds {
+        let set = &**kind;
+        let mut multipliers = vec![0.25; if keeps_multipliers { set.len() } else { 0 }];
+        for color in 0..set.colors() {
+            run(ConstraintColor { set, color, vertices, step, multipliers: &mut multipliers });
+        }
+        kept.push(multipliers);
+    }
+    kept.push(vertices.iter().flat_map(|vertex| (0..4).map(|n| vertex.component(n))).collect());
+    kept
+}
+
+#[test]
+fn shared_constraints_have_the_bits_of_serial_ones() {
+    for (each, keeps_multipliers) in [(false, false), (false, true), (true, true)] {
+        let serial = swept(each, keeps_multipliers, |color| color.project());
+        for threads in [1, 2] {
+            let shared = swept(each, keeps_multipliers, |color| {
+                let color = Colored::new(color);
+                on_threads(threads, &|| while color.project_next_chunk() {});
+                assert!(!color.project_next_chunk(), "no chunk is left");
+            });
+            assert_eq!(shared, serial, "{threads} threads");
+        }
+    }
+}
+
+/// All vertices after one symmetric sweep of vertex block descent.
+fn descended(each: bool, run: impl Fn(VertexColor<'_, f64>)) -> Vec<Vertex<f64>> {
+    let mut system = system(each);
+    let settings = Settings { formulation: Formulation::Vbd, dt_s: 0.1, ..Settings::default() };
+    let descent = Descent::new(&system, &settings).unwrap();
+    let simulation = Simulation::new(system.clone(), settings).unwrap();
+    for &pass in simulation.schedule().color_passes_of(0) {
+        run(VertexColor { system: &mut system, descent: &descent, pass });
+    }
+    system.vertices
+}
+
+#[test]
+fn shared_vertices_have_the_bits_of_serial_ones() {
+    for each in [false, true] {
+        let serial = descended(each, |color| color.descend());
+        assert_ne!(serial, system(each).vertices, "the sweep moves vertices");
+        for threads in [1, 2] {
+            let shared = descended(each, |color| {
+                let color = ColoredVertices::new(color);
+                on_threads(threads, &|| while color.move_next_chunk() {});
+            });
+            assert_eq!(shared, serial, "{threads} threads");
+        }
+    }
+}
+
+/// More than one chunk, so that two threads work at the same time, with some rows of SIMD lanes
+/// and a remainder.
+#[test]
+fn threads_take_each_chunk_once() {
+    let count = 2 * CHUNK as u32 + 3;
+    let positions: Vec<_> = (0..2 * count).map(|n| Point3::new(f64::from(n), 0.0, 0.0)).collect();
+    let edges: Vec<_> = (0..count).map(|n| [2 * n, 2 * n + 1]).collect();
+    let groups = Groups::from_colors(&vec![0; edges.len()]).unwrap();
+    let build = || {
+        SystemBuilder::<f64>::in_place(&positions, &vec![1.0; positions.len()])
+            .unwrap()
+            .add::<Distance, 2>(&edges, &vec![[0.5]; edges.len()], Stiffness::compliance(0.01), &groups)
+            .unwrap()
+            .build()
+    };
+    let step = Step::Xpbd { inverse_h_squared: 100.0 };
+    let run = |run: &dyn Fn(ConstraintColor<'_, f64>)| {
+        let (mut system, mut multipliers) = (build(), vec![0.0; edges.len()]);
+        let (vertices, kinds) = system.projection_parts();
+        run(ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers: &mut multipliers });
+        (system.vertices, multipliers)
+    };
+    let serial = run(&|color| color.project());
+    let shared = run(&|color| {
+        let color = Colored::new(color);
+        assert_eq!(color.chunks(), 3);
+        on_threads(2, &|| while color.project_next_chunk() {});
+    });
+    assert!(shared == serial);
+    assert!(serial.1.iter().all(|&multiplier| multiplier != 0.0));
+}
+
+#[test]
+#[should_panic(expected = "vertices that do not exist")]
+fn a_set_for_more_vertices_is_refused() {
+    let mut system = system(false);
+    let (vertices, kinds) = system.projection_parts();
+    let (vertices, step) = (&mut vertices[..7], Step::Pbd);
+    Colored::new(ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers: &mut [] });
+}
+
+#[test]
+#[should_panic(expected = "one multiplier per constraint")]
+fn too_few_multipliers_are_refused() {
+    let mut system = system(false);
+    let (vertices, kinds) = system.projection_parts();
+    let (multipliers, step) = (&mut [0.0; 6][..], Step::Pbd);
+    Colored::new(ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers });
+}

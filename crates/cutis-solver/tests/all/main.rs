@@ -1,0 +1,4 @@
+//! Integration tests of the solver.
+
+mod descent;
+mod validation;
