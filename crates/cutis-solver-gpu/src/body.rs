@@ -1,49 +1,53 @@
-//! The vertices on the device and the passes over them.
+//! The state of the vertices on the device, and the passes over them.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
 use cutis_solver::{Formulation, Simulation, Step};
 use nalgebra::Vector3;
 
-/// A binding may begin at every sixteenth element of 16 bytes: 256 bytes.
+/// A binding must start at a multiple of 256 bytes, which is 16 elements of 16 bytes.
 const ALIGNMENT: usize = 16;
 
-/// No vertex: all are finite.
+/// Value of the status while all vertices are finite.
 const NONE: u32 = u32::MAX;
 
-/// The state of the body: positions with inverse masses, positions before the substep, velocities.
-pub(crate) struct Body {
+/// The state of a body on the device, with the kernels of the passes over vertices.
+pub(crate) struct DeviceBody {
+    /// Positions and inverse masses.
     pub(crate) vertices: Buffer<[f32; 4]>,
+    /// Positions at the start of the substep.
     pub(crate) previous: Buffer<[f32; 4]>,
     pub(crate) velocities: Buffer<[f32; 4]>,
     pub(crate) settings: Buffer<[f32; 8]>,
-    /// First vertex that is not finite, substeps that ended finite, whether one began after one that did not.
+    /// Three numbers: the first vertex that is not finite, the number of finite substeps, and 1 once a
+    /// substep has started after one that was not finite.
     pub(crate) status: Buffer<u32>,
-    pub(crate) predict: VertexPass,
-    /// After `finish`; in vertex block descent only, which needs the velocities stored.
-    pub(crate) predict_next: Option<VertexPass>,
-    pub(crate) finish_and_predict: VertexPass,
-    pub(crate) finish: VertexPass,
-    pub(crate) check: VertexPass,
-    pub(crate) restore: VertexPass,
+    pub(crate) predict: VertexKernel,
+    /// Prediction after `finish`. Only for vertex block descent, which reads the velocities from
+    /// memory.
+    pub(crate) predict_next: Option<VertexKernel>,
+    pub(crate) finish_and_predict: VertexKernel,
+    pub(crate) finish: VertexKernel,
+    pub(crate) check: VertexKernel,
+    pub(crate) restore: VertexKernel,
 }
 
-/// How a step went.
+/// Result of the substeps since the status was cleared.
 pub(crate) struct Status {
-    /// The first vertex that left the finite numbers.
+    /// The first vertex that is not finite.
     pub(crate) vertex: Option<usize>,
-    /// Substeps that ended finite.
+    /// Number of substeps with a finite result.
     pub(crate) substeps: u32,
 }
 
-/// One kernel over all vertices, in parts.
-pub(crate) struct VertexPass {
+/// One kernel over all vertices, split into parts that fit a binding and a dispatch.
+pub(crate) struct VertexKernel {
     kernel: Kernel,
     parts: Vec<(BindGroup, usize)>,
 }
 
-impl VertexPass {
-    /// Dispatches of one run.
+impl VertexKernel {
+    /// Returns the number of dispatches of one run.
     pub(crate) fn dispatches(&self) -> usize {
         self.parts.len()
     }
@@ -55,7 +59,7 @@ impl VertexPass {
     }
 }
 
-impl Body {
+impl DeviceBody {
     pub(crate) fn new(gpu: &Gpu, simulation: &Simulation<f32>) -> Result<Self, GpuError> {
         let system = simulation.system();
         let count = system.vertices().len();
@@ -72,8 +76,8 @@ impl Body {
             parts.push((start..count.min(start + part), first));
         }
         let source = solver::vertices();
-        // Each entry point with the bindings that it uses.
-        let pass = |entry: &str, used: &[u32]| -> Result<VertexPass, GpuError> {
+        // Each entry point binds only what it uses.
+        let pass = |entry: &str, used: &[u32]| -> Result<VertexKernel, GpuError> {
             let kernel = gpu.kernel(&format!("vertices: {entry}"), &source, entry)?;
             let mut groups = Vec::with_capacity(parts.len());
             for (range, first) in &parts {
@@ -88,7 +92,7 @@ impl Body {
                 let bindings: Vec<_> = used.iter().map(binding).collect();
                 groups.push((gpu.bind(&kernel, 0, &bindings)?, range.len()));
             }
-            Ok(VertexPass { kernel, parts: groups })
+            Ok(VertexKernel { kernel, parts: groups })
         };
         let descends = simulation.settings().formulation == Formulation::Vbd;
         Ok(Self {
@@ -106,7 +110,7 @@ impl Body {
         })
     }
 
-    /// Predicts, after the velocities of the substep before if there was one.
+    /// Predicts positions. If another substep came before, updates the velocities first.
     pub(crate) fn begin_substep(&self, pass: &mut Pass<'_>, after_another: bool) {
         match (after_another, &self.predict_next) {
             (false, _) => self.predict.run(pass),
@@ -118,25 +122,25 @@ impl Body {
         }
     }
 
-    /// Writes the host's positions and velocities.
+    /// Uploads the host's positions and velocities.
     pub(crate) fn upload(&self, gpu: &Gpu, simulation: &Simulation<f32>) -> Result<(), GpuError> {
         gpu.write(&self.vertices, 0, bytemuck::cast_slice(simulation.system().vertices()))?;
         gpu.write(&self.velocities, 0, &padded(simulation.system().velocities()))
     }
 
-    /// Forgets how the last step went.
+    /// Resets the status.
     pub(crate) fn clear_status(&self, gpu: &Gpu) -> Result<(), GpuError> {
         gpu.write(&self.status, 0, &[NONE, 0, 0])
     }
 
-    /// Waits for what was submitted and reads twelve bytes.
+    /// Waits for the submitted work and reads the status, twelve bytes.
     pub(crate) fn status(&self, gpu: &Gpu) -> Result<Status, GpuError> {
         let words = gpu.read(&self.status, 0..3)?;
         Ok(Status { vertex: (words[0] != NONE).then_some(words[0] as usize), substeps: words[1] })
     }
 }
 
-/// The struct `Settings` of the shaders.
+/// Returns the struct `Settings` of the shaders.
 fn settings_of(simulation: &Simulation<f32>) -> [f32; 8] {
     let numbers = simulation.integrator();
     let inverse_h_squared = match simulation.projection_step() {

@@ -1,8 +1,10 @@
-//! Vertex block descent on the device: slabs of the body, and the chunks of vertices that move at once.
+//! Vertex block descent on the device: slabs of the body, and chunks of vertices that move in
+//! parallel.
 //!
-//! A constraint is read by each of its vertices, and these are of different colors. So constraints are not stored by
-//! color but by **slab**: a range of vertices whose constraints fit one binding each. All colors of a slab share its tables. A body
-//! that fits the device's bindings is one slab, and each of its constraints is stored once.
+//! Each vertex of a constraint reads it, and the vertices of a constraint have different colors. So
+//! constraints are stored by **slab** and not by color. A slab is a range of vertices whose
+//! constraints fit one binding per array. All colors of a slab share its arrays. A body that fits the
+//! device's bindings is one slab, and each of its constraints is stored once.
 
 use std::ops::Range;
 
@@ -11,54 +13,57 @@ use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
 use cutis_solver::{ColorPass, ConstraintSet, Descent, DescentStep, Kind, Simulation};
 
-use crate::body::Body;
+use crate::body::DeviceBody;
 
-/// Numbers of a vertex's vertex_force: force, diagonal and mixed entries, four each.
-pub(crate) type VertexForceRow = [f32; 12];
-/// A vertex of a chunk and its range of the slab's places.
-pub(crate) type Share = [u32; 3];
+/// The struct `VertexForce` of the shaders: force, diagonal and mixed entries, four numbers each.
+pub(crate) type PackedVertexForce = [f32; 12];
+/// The struct `VertexEntries` of the shaders: the position of a vertex in its chunk, and the start
+/// and end of its entries.
+pub(crate) type VertexEntries = [u32; 3];
 
-/// All that the color passes of an iteration need.
-pub(crate) struct DescentOnDevice {
+/// Kernels and buffers of the color passes.
+pub(crate) struct DescentKernels {
     descend: Kernel,
-    /// One per kind.
+    /// For each kind, the kernel of its forces and the group that all chunks share.
     forces: Vec<(Kernel, BindGroup)>,
-    moved: BindGroup,
+    state: BindGroup,
     /// Chunks of each color.
-    colors: Vec<Vec<Chunk>>,
+    colors: Vec<Vec<VertexChunk>>,
 }
 
 /// Vertices of one color and one slab.
-struct Chunk {
+struct VertexChunk {
     vertices: BindGroup,
     len: usize,
-    /// Kinds with constraints on them.
+    /// For each kind that acts on these vertices: its index, its bind group and the number of
+    /// vertices.
     kinds: Vec<(usize, BindGroup, usize)>,
 }
 
-/// The constraints of one kind that touch a slab.
-struct Table {
-    /// Ascending.
+/// The constraints of one kind at the vertices of a slab.
+struct SlabConstraints {
+    /// Indices of the constraints, ascending.
     constraints: Vec<u32>,
     tuples: Buffer<u32>,
     params: Buffer<f32>,
+    /// Inverse compliance and rest size.
     shape: Buffer<[f32; 2]>,
 }
 
-impl DescentOnDevice {
+impl DescentKernels {
     pub(crate) fn new(
         gpu: &Gpu,
-        body: &Body,
+        body: &DeviceBody,
         simulation: &Simulation<f32>,
         descent: &Descent<f32>,
     ) -> Result<Self, GpuError> {
         let kinds = simulation.system().kinds();
         let source = solver::descend();
         let descend = gpu.kernel("vertices: descend", &source, solver::DESCEND)?;
-        let most = gpu.chunk_len(size_of::<VertexForceRow>());
+        let most = gpu.chunk_len(size_of::<PackedVertexForce>());
         let groups = descent.groups();
         let largest = groups.iter().map(<[u32]>::len).max().unwrap_or(0).min(most);
-        let scratch = gpu.zeroed::<VertexForceRow>("vertex forces", largest)?;
+        let scratch = gpu.zeroed::<PackedVertexForce>("vertex forces", largest)?;
         let settings = gpu.uniform("settings of a descent", &settings_of(descent.step()))?;
         let bindings = [
             (0, body.vertices.whole()),
@@ -67,7 +72,7 @@ impl DescentOnDevice {
             (3, body.velocities.whole()),
             (4, settings.whole()),
         ];
-        let moved = gpu.bind(&descend, 0, &bindings)?;
+        let state = gpu.bind(&descend, 0, &bindings)?;
         let mut forces = Vec::with_capacity(kinds.len());
         for set in kinds {
             let source = solver::vertex_force(set.arity(), set.wgsl());
@@ -76,14 +81,15 @@ impl DescentOnDevice {
             let shared = gpu.bind(&kernel, 0, &[(0, body.vertices.whole()), (1, scratch.whole())])?;
             forces.push((kernel, shared));
         }
-        let mut made = Self { descend, forces, moved, colors: groups.iter().map(|_| Vec::new()).collect() };
+        let mut kernels =
+            Self { descend, forces, state, colors: groups.iter().map(|_| Vec::new()).collect() };
         for slab in slabs(gpu, kinds, descent) {
-            made.add_slab(gpu, kinds, descent, slab, most)?;
+            kernels.add_slab(gpu, kinds, descent, slab, most)?;
         }
-        Ok(made)
+        Ok(kernels)
     }
 
-    /// Stores the constraints of a slab and the chunks of its vertices.
+    /// Adds the constraints of a slab and the chunks of its vertices.
     fn add_slab(
         &mut self,
         gpu: &Gpu,
@@ -92,19 +98,21 @@ impl DescentOnDevice {
         slab: Range<u32>,
         most: usize,
     ) -> Result<(), GpuError> {
-        let mut tables = Vec::with_capacity(kinds.len());
+        let mut constraints = Vec::with_capacity(kinds.len());
         for (set, incidence) in kinds.iter().zip(descent.incidences()) {
-            tables.push(Table::new(gpu, &**set, incidence, descent, slab.clone())?);
+            constraints.push(SlabConstraints::new(gpu, &**set, incidence, descent, slab.clone())?);
         }
         for (color, group) in descent.groups().iter().enumerate() {
-            let chosen: Vec<u32> = group.iter().copied().filter(|v| slab.contains(v)).collect();
-            for chosen in chosen.chunks(most) {
-                let order = gpu.buffer("vertices of a color", chosen)?;
+            let vertices: Vec<u32> = group.iter().copied().filter(|v| slab.contains(v)).collect();
+            for indices in vertices.chunks(most) {
+                let order = gpu.buffer("vertices of a color", indices)?;
                 let vertices = gpu.bind(&self.descend, 1, &[(0, order.whole())])?;
-                let mut chunk = Chunk { vertices, len: chosen.len(), kinds: Vec::new() };
+                let mut chunk = VertexChunk { vertices, len: indices.len(), kinds: Vec::new() };
                 for (n, (set, incidence)) in kinds.iter().zip(descent.incidences()).enumerate() {
                     let (kernel, _) = &self.forces[n];
-                    if let Some((group, len)) = tables[n].bind(gpu, kernel, &**set, incidence, chosen)? {
+                    if let Some((group, len)) =
+                        constraints[n].bind(gpu, kernel, &**set, incidence, indices)?
+                    {
                         chunk.kinds.push((n, group, len));
                     }
                 }
@@ -114,26 +122,27 @@ impl DescentOnDevice {
         Ok(())
     }
 
-    /// Moves the vertices of a color.
+    /// Encodes the work that moves the vertices of a color.
     pub(crate) fn color_pass(&self, recording: &mut Pass<'_>, pass: &ColorPass) {
         for chunk in &self.colors[pass.color] {
             for (n, group, len) in &chunk.kinds {
                 let (kernel, shared) = &self.forces[*n];
                 recording.dispatch(kernel, &[shared, group], *len);
             }
-            recording.dispatch(&self.descend, &[&self.moved, &chunk.vertices], chunk.len);
+            recording.dispatch(&self.descend, &[&self.state, &chunk.vertices], chunk.len);
         }
     }
 
-    /// Dispatches of an iteration, and their threads.
-    pub(crate) fn load<'a>(&self, color_passes: impl Iterator<Item = &'a ColorPass>) -> [usize; 2] {
-        let chunks: Vec<&Chunk> = color_passes.flat_map(|pass| &self.colors[pass.color]).collect();
-        let threads = |chunk: &&Chunk| chunk.len + chunk.kinds.iter().map(|(_, _, len)| len).sum::<usize>();
+    /// Returns the numbers of dispatches and threads of an iteration.
+    pub(crate) fn workload<'a>(&self, color_passes: impl Iterator<Item = &'a ColorPass>) -> [usize; 2] {
+        let chunks: Vec<&VertexChunk> = color_passes.flat_map(|pass| &self.colors[pass.color]).collect();
+        let threads =
+            |chunk: &&VertexChunk| chunk.len + chunk.kinds.iter().map(|(_, _, len)| len).sum::<usize>();
         [chunks.iter().map(|chunk| 1 + chunk.kinds.len()).sum(), chunks.iter().map(threads).sum()]
     }
 }
 
-impl Table {
+impl SlabConstraints {
     fn new(
         gpu: &Gpu,
         set: &dyn ConstraintSet<f32>,
@@ -142,13 +151,13 @@ impl Table {
         slab: Range<u32>,
     ) -> Result<Self, GpuError> {
         let (name, arity, count) = (set.name(), set.arity(), set.param_count());
-        let mut touched = vec![false; set.len()];
+        let mut used = vec![false; set.len()];
         for &vertex in descent.groups().order.iter().filter(|v| slab.contains(v)) {
-            for &place in incidence.of(vertex) {
-                touched[place as usize / arity] = true;
+            for &entry in incidence.of(vertex) {
+                used[entry as usize / arity] = true;
             }
         }
-        let constraints: Vec<u32> = (0u32..).zip(&touched).filter(|(_, t)| **t).map(|(k, _)| k).collect();
+        let constraints: Vec<u32> = (0u32..).zip(&used).filter(|(_, used)| **used).map(|(k, _)| k).collect();
         let rows = |from: usize| constraints.iter().map(move |&k| k as usize * from..(k as usize + 1) * from);
         let tuples: Vec<u32> = rows(arity).flat_map(|row| &set.indices()[row]).copied().collect();
         let params: Vec<f32> = rows(count).flat_map(|row| &set.params()[row]).copied().collect();
@@ -163,49 +172,50 @@ impl Table {
         })
     }
 
-    /// Binds the constraints on `chosen`; nothing if there are none.
+    /// Binds the constraints at the vertices `indices` of a chunk. Returns the group and the number of
+    /// vertices with constraints, or `None` if there are none.
     fn bind(
         &self,
         gpu: &Gpu,
         kernel: &Kernel,
         set: &dyn ConstraintSet<f32>,
         incidence: &Incidence,
-        chosen: &[u32],
+        indices: &[u32],
     ) -> Result<Option<(BindGroup, usize)>, GpuError> {
         let arity = set.arity() as u32;
-        let (mut places, mut shares): (Vec<u32>, Vec<Share>) = Default::default();
-        for (vertex, &v) in (0u32..).zip(chosen) {
-            let start = places.len() as u32;
-            for &place in incidence.of(v) {
-                // Every constraint of a chosen vertex is in the table.
-                let k = self.constraints.partition_point(|&k| k < place / arity) as u32;
-                places.push(k * arity + place % arity);
+        let (mut entries, mut ranges): (Vec<u32>, Vec<VertexEntries>) = Default::default();
+        for (position, &vertex) in (0u32..).zip(indices) {
+            let start = entries.len() as u32;
+            for &entry in incidence.of(vertex) {
+                // The slab contains every constraint of its vertices.
+                let k = self.constraints.partition_point(|&k| k < entry / arity) as u32;
+                entries.push(k * arity + entry % arity);
             }
-            let end = places.len() as u32;
+            let end = entries.len() as u32;
             if end > start {
-                shares.push([vertex, start, end]);
+                ranges.push([position, start, end]);
             }
         }
-        if shares.is_empty() {
+        if ranges.is_empty() {
             return Ok(None);
         }
         let name = set.name();
-        let places = gpu.buffer(&format!("{name}: places"), &places)?;
-        let len = shares.len();
-        let shares = gpu.buffer(&format!("{name}: shares"), &shares)?;
+        let entries = gpu.buffer(&format!("{name}: entries"), &entries)?;
+        let len = ranges.len();
+        let ranges = gpu.buffer(&format!("{name}: ranges of entries"), &ranges)?;
         let bindings = [
             (0, self.tuples.whole()),
             (1, self.params.whole()),
             (2, self.shape.whole()),
-            (3, places.whole()),
-            (4, shares.whole()),
+            (3, entries.whole()),
+            (4, ranges.whole()),
         ];
         Ok(Some((gpu.bind(kernel, 1, &bindings)?, len)))
     }
 }
 
-/// Ranges of vertices whose constraints, and the places of whose vertices, fit one binding per array. A vertex with more than
-/// that is a slab of its own, and the device's limits refuse it.
+/// Returns ranges of vertices whose constraints and entries fit one binding per array. A vertex that
+/// needs more is a slab on its own, and its buffers exceed the device's limits.
 fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u32>> {
     let mut order = descent.groups().order.clone();
     order.sort_unstable();
@@ -216,7 +226,7 @@ fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u3
             [gpu.binding_len(row), gpu.binding_len(size_of::<u32>())]
         })
         .collect();
-    // For each constraint the slab that stored it last, counted from 1.
+    // For each constraint the last slab that stores it, counted from 1.
     let mut stored: Vec<Vec<u32>> = kinds.iter().map(|set| vec![0; set.len()]).collect();
     let mut used = vec![[0usize; 2]; kinds.len()];
     let (mut slabs, mut start) = (Vec::new(), 0);
@@ -225,10 +235,10 @@ fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u3
         let mut fits = true;
         let mut more = Vec::with_capacity(kinds.len());
         for (n, (set, incidence)) in kinds.iter().zip(descent.incidences()).enumerate() {
-            let places = incidence.of(vertex);
-            let new = places.iter().filter(|&&p| stored[n][p as usize / set.arity()] != number).count();
-            fits &= used[n][0] + new <= room[n][0] && used[n][1] + places.len() <= room[n][1];
-            more.push([new, places.len()]);
+            let entries = incidence.of(vertex);
+            let new = entries.iter().filter(|&&e| stored[n][e as usize / set.arity()] != number).count();
+            fits &= used[n][0] + new <= room[n][0] && used[n][1] + entries.len() <= room[n][1];
+            more.push([new, entries.len()]);
         }
         let number = if fits || used.iter().all(|used| *used == [0, 0]) {
             number
@@ -242,8 +252,8 @@ fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u3
             number + 1
         };
         for (n, (set, incidence)) in kinds.iter().zip(descent.incidences()).enumerate() {
-            for &place in incidence.of(vertex) {
-                stored[n][place as usize / set.arity()] = number;
+            for &entry in incidence.of(vertex) {
+                stored[n][entry as usize / set.arity()] = number;
             }
             used[n] = [used[n][0] + more[n][0], used[n][1] + more[n][1]];
         }
@@ -254,7 +264,7 @@ fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u3
     slabs
 }
 
-/// The struct `Descent` of the shaders.
+/// Returns the struct `Descent` of the shaders.
 fn settings_of(step: &DescentStep<f32>) -> [f32; 8] {
     let DescentStep { h, gravity_h_squared: g, inverse_h_squared, relaxation } = *step;
     [g.x, g.y, g.z, h, inverse_h_squared, relaxation, 0.0, 0.0]

@@ -1,16 +1,16 @@
-//! What can go wrong when the backend starts.
+//! Errors when the backend starts.
 
 use cutis_gpu::GpuError;
 use cutis_solver::SolverError;
 
-/// Why a [`SolverGpu`](crate::SolverGpu) could not be made.
+/// An error in the construction of a [`SolverGpu`](crate::SolverGpu).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuSolverError {
-    /// The settings do not fit the system.
+    /// The settings or the system are invalid.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// The device refused something.
+    /// The device failed, or its limits are too small.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }

@@ -1,11 +1,12 @@
-//! Reading the positions of a few vertices without reading all.
+//! Readback of the positions of a few vertices.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel};
 use cutis_shaders::solver;
 
-use crate::body::Body;
+use crate::body::DeviceBody;
 
-/// What was asked for last: who asks every frame asks for the same.
+/// Kernel and buffers of the last request. They are kept, because a caller that reads positions
+/// every frame reads those of the same vertices.
 pub(crate) struct Gather {
     kernel: Kernel,
     wanted: Vec<u32>,
@@ -13,7 +14,7 @@ pub(crate) struct Gather {
 }
 
 impl Gather {
-    fn new(gpu: &Gpu, body: &Body, wanted: &[u32]) -> Result<Self, GpuError> {
+    fn new(gpu: &Gpu, body: &DeviceBody, wanted: &[u32]) -> Result<Self, GpuError> {
         let kernel = gpu.kernel("gather", &solver::gather(), solver::GATHER)?;
         let mut chunks = Vec::new();
         for part in wanted.chunks(gpu.chunk_len(size_of::<[f32; 4]>())) {
@@ -25,11 +26,12 @@ impl Gather {
         Ok(Self { kernel, wanted: wanted.to_vec(), chunks })
     }
 
-    /// Vertices `wanted`, all of which exist, from the device. `last` is kept for the next time.
+    /// Reads the vertices `wanted`, all of which must exist. `last` keeps the buffers for the next
+    /// call.
     pub(crate) fn read(
         last: &mut Option<Self>,
         gpu: &Gpu,
-        body: &Body,
+        body: &DeviceBody,
         wanted: &[u32],
     ) -> Result<Vec<[f32; 4]>, GpuError> {
         let gather = match last.take() {

@@ -1,12 +1,13 @@
-//! Kinematic vertices on the device: where they began, and how far each handle has come in each substep of a frame.
+//! Kinematic vertices on the device: their rest positions, and the displacement of each handle in
+//! each substep of a frame.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
 use cutis_solver::{Clock, KinematicHandle, Settings, System};
 
-use crate::body::Body;
+use crate::body::DeviceBody;
 
-/// The handles of a body.
+/// Kernel and buffers of the handles of a body.
 pub(crate) struct Handles {
     kernel: Kernel,
     shared: BindGroup,
@@ -17,10 +18,10 @@ pub(crate) struct Handles {
 }
 
 impl Handles {
-    /// `None` for a body without handles, which needs no kernel for them.
+    /// Returns `None` for a body without handles, which needs no kernel for them.
     pub(crate) fn new(
         gpu: &Gpu,
-        body: &Body,
+        body: &DeviceBody,
         system: &System<f32>,
         settings: &Settings,
     ) -> Result<Option<Self>, GpuError> {
@@ -46,16 +47,16 @@ impl Handles {
         let most = gpu.chunk_len(size_of::<[u32; 4]>());
         let mut chunks = Vec::new();
         for (held, owners) in held.chunks(most).zip(owners.chunks(most)) {
-            let places = gpu.buffer("handles: vertices", held)?;
+            let vertices = gpu.buffer("handles: vertices", held)?;
             let owners = gpu.buffer("handles: owners", owners)?;
-            let group = gpu.bind(&kernel, 1, &[(0, places.whole()), (1, owners.whole())])?;
+            let group = gpu.bind(&kernel, 1, &[(0, vertices.whole()), (1, owners.whole())])?;
             chunks.push((group, held.len()));
         }
         Ok(Some(Self { kernel, shared, chunks, frame, paths }))
     }
 
-    /// Writes where the handles are at the end of each substep from `clock` to the end of its frame. `done` substeps were
-    /// done since the status was cleared.
+    /// Uploads the displacement of each handle at the end of each substep, from `clock` to the end of
+    /// its frame. `done` is the number of substeps since the status was cleared.
     pub(crate) fn write_paths(
         &self,
         gpu: &Gpu,
@@ -78,7 +79,7 @@ impl Handles {
         gpu.write(&self.paths, 0, &paths)
     }
 
-    /// Puts the vertices where they are at the end of the substep in work.
+    /// Moves the vertices to their positions at the end of the current substep.
     pub(crate) fn advance(&self, pass: &mut Pass<'_>) {
         for (chunk, threads) in &self.chunks {
             pass.dispatch(&self.kernel, &[&self.shared, chunk], *threads);

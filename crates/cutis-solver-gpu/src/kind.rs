@@ -6,38 +6,38 @@ use cutis_gpu::{BindGroup, Binding, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver::{self, Multiplier, Rule};
 use cutis_solver::{ConstraintSet, Formulation, Settings, Sweep, Values};
 
-use crate::body::Body;
+use crate::body::DeviceBody;
 
-/// A part of a color, small enough for one binding and one dispatch, with buffers of its own.
-pub(crate) struct Chunk {
-    /// Constraints, in the order of the colors.
+/// A part of a color that fits one binding and one dispatch, with its buffers.
+pub(crate) struct ConstraintChunk {
+    /// Indices of the constraints in the order of the colors.
     pub(crate) range: Range<usize>,
     pub(crate) tuples: Buffer<u32>,
     pub(crate) params: Buffer<f32>,
     stiffness: Option<Buffer<f32>>,
     multipliers: Option<Buffer<f32>>,
-    /// One per variant of the kernel.
+    /// One group per variant of the kernel.
     groups: Vec<BindGroup>,
 }
 
-/// A kernel for a way to treat multipliers, with the group that all chunks share.
+/// A kernel for one treatment of multipliers, with the group that all chunks share.
 struct Variant {
     kernel: Kernel,
     shared: BindGroup,
 }
 
 /// A kind of constraint on the device.
-pub(crate) struct Kind {
-    /// Chunks of each color.
-    pub(crate) colors: Vec<Vec<Chunk>>,
-    /// For the first iteration, and for later ones where they differ.
+pub(crate) struct DeviceKind {
+    /// The chunks of each color.
+    pub(crate) colors: Vec<Vec<ConstraintChunk>>,
+    /// One variant for the first iteration, and one for later iterations if they differ.
     variants: Vec<Variant>,
 }
 
-impl Kind {
+impl DeviceKind {
     pub(crate) fn new(
         gpu: &Gpu,
-        body: &Body,
+        body: &DeviceBody,
         set: &dyn ConstraintSet<f32>,
         settings: &Settings,
     ) -> Result<Self, GpuError> {
@@ -50,13 +50,13 @@ impl Kind {
             Values::Uniform(value) => (solver::Stiffness::Uniform, Some(gpu.uniform("stiffness", value)?)),
             Values::Each(_) => (solver::Stiffness::Each, None),
         };
-        let ways: &[Multiplier] = match settings.keeps_multipliers() {
+        let multipliers: &[Multiplier] = match settings.keeps_multipliers() {
             true => &[Multiplier::First, Multiplier::Next],
             false => &[Multiplier::None],
         };
-        let mut variants = Vec::with_capacity(ways.len());
-        for &way in ways {
-            let source = solver::project(arity, set.wgsl(), rule, stiffness, way);
+        let mut variants = Vec::with_capacity(multipliers.len());
+        for &multiplier in multipliers {
+            let source = solver::project(arity, set.wgsl(), rule, stiffness, multiplier);
             let kernel = gpu.kernel(&format!("{name}: project"), &source, solver::PROJECT)?;
             let mut bindings = vec![(0, body.vertices.whole())];
             if rule == Rule::Xpbd {
@@ -73,7 +73,7 @@ impl Kind {
             let mut chunks = Vec::new();
             for first in (start..end).step_by(most) {
                 let range = first..end.min(first + most);
-                let chunk = Chunk::new(gpu, set, range, settings.keeps_multipliers())?;
+                let chunk = ConstraintChunk::new(gpu, set, range, settings.keeps_multipliers())?;
                 chunks.push(chunk.bound(gpu, &variants, uniform.as_ref())?);
             }
             colors.push(chunks);
@@ -81,7 +81,7 @@ impl Kind {
         Ok(Self { colors, variants })
     }
 
-    /// Projects a color.
+    /// Encodes the projection of a color.
     pub(crate) fn project(&self, pass: &mut Pass<'_>, sweep: &Sweep, iteration: u32) {
         let variant = if iteration == 0 { 0 } else { self.variants.len() - 1 };
         let Variant { kernel, shared } = &self.variants[variant];
@@ -91,7 +91,7 @@ impl Kind {
     }
 }
 
-impl Chunk {
+impl ConstraintChunk {
     fn new(
         gpu: &Gpu,
         set: &dyn ConstraintSet<f32>,

@@ -1,17 +1,21 @@
 //! GPU backend: the simulation of `cutis-solver`, executed as WGSL.
 //!
-//! [`SolverGpu`] runs the schedule of the CPU backends, the same passes in the same order with the same operations. On a software
-//! device its results are those of [`SolverReference<f32>`](cutis_solver::SolverReference) bit for bit; a hardware
-//! device may fuse a multiplication with an addition, and then differs by rounding.
+//! [`SolverGpu`] runs the schedule of the CPU backends: the same passes in the same order with the
+//! same operations. On a software device its results have the bits of
+//! [`SolverReference<f32>`](cutis_solver::SolverReference). A hardware device may fuse a
+//! multiplication with an addition, and then differs by rounding.
 //!
-//! - **The state stays on the device.** A frame is one submit (a very long one is several). A call of `step` reads back twelve bytes, whether the body
-//!   is still finite; everything else is read when somebody asks for it, and no more than that:
-//!   [`positions_of`](cutis_solver::Solver::positions_of) reads the vertices it names,
-//!   [`residuals`](cutis_solver::Solver::residuals) two numbers per 64 constraints.
-//! - **Chunks.** The constraints of a color are stored in parts that fit WebGPU's baseline limits on bindings, buffers and
-//!   workgroups. Parts of a color share no vertex, so that the result does not depend on how it is split.
-//! - **Pipelines are built for what a body has**: a kind that was not added, handles, multipliers and measures that nobody asks
-//!   for have none.
+//! - **The state stays on the device.** A frame is one submission, or several for a very long frame. A
+//!   call of `step` reads back twelve bytes, which tell whether all positions are finite. Everything
+//!   else is read on request: [`positions_of`](cutis_solver::Solver::positions_of) reads only the
+//!   requested vertices, and [`residuals`](cutis_solver::Solver::residuals) reads two numbers per 64
+//!   constraints. [`SolverGpu::vertices`] gives other kernels access to the positions without a
+//!   readback.
+//! - **Chunks.** The constraints of a color are stored in parts that fit WebGPU's baseline limits on
+//!   bindings, buffers and workgroups. Constraints of a color share no vertex, so the result does not
+//!   depend on the split.
+//! - **Pipelines and buffers only for parts in use.** Kinds, handles, multipliers and measurements
+//!   that a body does not use have none.
 //!
 //! ```
 //! use cutis_constraints::Distance;
@@ -32,7 +36,7 @@
 //!         solver.step(5)?;
 //!         assert!(solver.positions()?[1].x < 1.1);
 //!     }
-//!     Err(error) => println!("no GPU here: {error}"),
+//!     Err(error) => println!("no GPU: {error}"),
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

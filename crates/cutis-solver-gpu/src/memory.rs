@@ -1,21 +1,21 @@
-//! What a body needs on a device.
+//! Memory of a body on a device.
 
 use cutis_solver::{
     ConstraintSet, Descent, Formulation, KinematicHandle, MemoryPart, Settings, System, Values,
 };
 
-use crate::descent::{Share, VertexForceRow};
+use crate::descent::{PackedVertexForce, VertexEntries};
 
-/// Bytes on the device, part by part; no device is needed to know them. Measures that are asked for later (residuals, the
-/// positions of some vertices) come on top.
+/// Returns the memory on the device by part. No device is needed to compute it. Measurements
+/// (residuals, the positions of some vertices) allocate additional memory on their first use.
 pub fn device_bytes(system: &System<f32>, settings: &Settings) -> Vec<MemoryPart> {
     let vertices = system.vertices().len();
-    // Position, position before the substep, velocity: four numbers each.
+    // Position, position at the start of the substep, and velocity have four numbers each.
     let mut parts = vec![MemoryPart { name: "vertices", bytes: vertices * 3 * size_of::<[f32; 4]>() }];
     let descends = settings.formulation == Formulation::Vbd;
     for kind in system.kinds() {
         if descends {
-            parts.push(MemoryPart { name: kind.name(), bytes: pulling_bytes(system, &**kind) });
+            parts.push(MemoryPart { name: kind.name(), bytes: descent_bytes(system, &**kind) });
             continue;
         }
         let each = match kind.stiffness().values() {
@@ -30,37 +30,38 @@ pub fn device_bytes(system: &System<f32>, settings: &Settings) -> Vec<MemoryPart
         parts.push(MemoryPart { name: "multipliers", bytes: count * size_of::<f32>() });
     }
     if descends {
-        // The vertices of all colors, and the forces of the largest one.
+        // The indices of the vertices of all colors, and the forces of the largest color.
         let bytes = Descent::new(system, settings).map_or(0, |descent| {
             let largest = descent.groups().iter().map(<[u32]>::len).max().unwrap_or(0);
-            size_of_val(descent.groups().order.as_slice()) + largest * size_of::<VertexForceRow>()
+            size_of_val(descent.groups().order.as_slice()) + largest * size_of::<PackedVertexForce>()
         });
         parts.push(MemoryPart { name: "vertex forces", bytes });
     }
-    let held: usize =
+    let kinematic: usize =
         system.handles().iter().map(|handle: &KinematicHandle<f32>| handle.vertices().len()).sum();
-    if held > 0 {
-        parts.push(MemoryPart { name: "handles", bytes: held * size_of::<[u32; 5]>() });
+    if kinematic > 0 {
+        parts.push(MemoryPart { name: "handles", bytes: kinematic * size_of::<[u32; 5]>() });
     }
     parts
 }
 
-/// A kind in vertex block descent, if all lies in one slab: the constraints on vertices that move, and where they name them.
-fn pulling_bytes(system: &System<f32>, kind: &dyn ConstraintSet<f32>) -> usize {
+/// Returns the memory of a kind in vertex block descent for a body of one slab: the constraints on
+/// moving vertices, and their entries.
+fn descent_bytes(system: &System<f32>, kind: &dyn ConstraintSet<f32>) -> usize {
     let moves: Vec<bool> = system.vertices().iter().map(|vertex| vertex.inverse_mass() > 0.0).collect();
-    let mut pulled = vec![false; moves.len()];
-    let (mut constraints, mut places) = (0, 0);
+    let mut has_force = vec![false; moves.len()];
+    let (mut constraints, mut entries) = (0, 0);
     for tuple in kind.indices().chunks_exact(kind.arity()) {
         let mut moving = 0;
         for &vertex in tuple.iter().filter(|&&vertex| moves[vertex as usize]) {
-            pulled[vertex as usize] = true;
+            has_force[vertex as usize] = true;
             moving += 1;
         }
-        places += moving;
+        entries += moving;
         constraints += usize::from(moving > 0);
     }
-    let shares = pulled.iter().filter(|pulled| **pulled).count();
-    // Tuple, parameters, inverse compliance and rest size.
-    let row = (kind.arity() + kind.param_count() + 2) * size_of::<f32>();
-    constraints * row + places * size_of::<u32>() + shares * size_of::<Share>()
+    let vertices = has_force.iter().filter(|has_force| **has_force).count();
+    // A constraint has its tuple, its parameters, the inverse compliance and the rest size.
+    let constraint = (kind.arity() + kind.param_count() + 2) * size_of::<f32>();
+    constraints * constraint + entries * size_of::<u32>() + vertices * size_of::<VertexEntries>()
 }

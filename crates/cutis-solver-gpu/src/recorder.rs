@@ -1,58 +1,59 @@
-//! Records the work of frames: into one pass each, or, if somebody wants to know where the time goes, into one pass per part,
-//! each of which is waited for.
+//! Recording of the work of a frame, in one pass, or in one timed pass per part.
 
 use std::time::Instant;
 
 use cutis_gpu::{Gpu, GpuError, Pass};
 use cutis_solver::StepProfile;
 
-/// A pass under way.
+/// A pass that is being recorded.
 pub(crate) struct Recorder<'a> {
     gpu: &'a Gpu,
     pass: Pass<'a>,
-    timed: Option<Timed<'a>>,
+    profiling: Option<Profiling<'a>>,
 }
 
-struct Timed<'a> {
+struct Profiling<'a> {
     profile: &'a mut StepProfile,
-    /// What the pass under way holds.
+    /// The part of the step that the present pass belongs to.
     part: &'static str,
 }
 
 impl<'a> Recorder<'a> {
-    /// Begins; with a profile, the time of each part goes there.
+    /// Starts a pass. With a profile, each part gets its own pass, and its duration goes to the
+    /// profile.
     pub(crate) fn new(gpu: &'a Gpu, profile: Option<&'a mut StepProfile>) -> Self {
-        let timed = profile.map(|profile| Timed { profile, part: StepProfile::VERTICES });
-        Self { gpu, pass: gpu.pass("frame"), timed }
+        let profiling = profile.map(|profile| Profiling { profile, part: StepProfile::VERTICES });
+        Self { gpu, pass: gpu.pass("frame"), profiling }
     }
 
-    /// Where the work of a part is recorded.
+    /// Returns the pass that records the work of `part`.
     ///
     /// # Errors
-    /// As the device gives them for the part before.
-    pub(crate) fn part(&mut self, name: &'static str) -> Result<&mut Pass<'a>, GpuError> {
-        if self.timed.as_ref().is_some_and(|timed| timed.part != name) {
+    /// Returns the errors of [`submit`](Self::submit) for the part before.
+    pub(crate) fn pass_for(&mut self, part: &'static str) -> Result<&mut Pass<'a>, GpuError> {
+        if self.profiling.as_ref().is_some_and(|profiling| profiling.part != part) {
             self.submit()?;
-            self.timed.as_mut().into_iter().for_each(|timed| timed.part = name);
+            self.profiling.as_mut().into_iter().for_each(|profiling| profiling.part = part);
         }
         Ok(&mut self.pass)
     }
 
-    /// Sends what was recorded, and waits for it where it is timed: by the timestamps of the device, where it was opened with
-    /// them, else by the clock of the host, which sees the submission and the wait too.
+    /// Submits the recorded work and starts a new pass. With a profile, waits for the work and adds
+    /// its duration: by the timestamps of the device if it was opened with them, else by the clock of
+    /// the host, which includes the submission and the wait.
     ///
     /// # Errors
-    /// As the device gives them.
+    /// Returns the errors of the device.
     pub(crate) fn submit(&mut self) -> Result<(), GpuError> {
-        let pass = std::mem::replace(&mut self.pass, self.gpu.pass("frame, further on"));
-        let Some(Timed { profile, part }) = &mut self.timed else { return pass.submit() };
+        let pass = std::mem::replace(&mut self.pass, self.gpu.pass("frame, continued"));
+        let Some(Profiling { profile, part }) = &mut self.profiling else { return pass.submit() };
         self.gpu.wait()?;
         let start = Instant::now();
         pass.submit()?;
         self.gpu.wait()?;
-        let waited_s = start.elapsed().as_secs_f64();
-        let stamped_s = self.gpu.last_pass_ns()?.map(|ns| ns as f64 * 1e-9);
-        profile.add(part, stamped_s.unwrap_or(waited_s));
+        let host_s = start.elapsed().as_secs_f64();
+        let device_s = self.gpu.last_pass_ns()?.map(|ns| ns as f64 * 1e-9);
+        profile.add(part, device_s.unwrap_or(host_s));
         Ok(())
     }
 }

@@ -1,27 +1,27 @@
-//! Residuals by reduction on the device: two numbers per workgroup come back, not the state.
+//! Residuals by reduction on the device. The host reads two numbers per workgroup.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, WORKGROUP};
 use cutis_shaders::solver;
 use cutis_solver::{ConstraintSet, Residual};
 
-use crate::body::Body;
-use crate::kind::Kind;
+use crate::body::DeviceBody;
+use crate::kind::DeviceKind;
 
-/// The reduction of one kind; made when it is first asked for.
+/// The reduction of one kind, built on its first use.
 pub(crate) struct Reduction {
     name: &'static str,
     kernel: Kernel,
     shared: BindGroup,
     chunks: Vec<(BindGroup, usize, Buffer<[f32; 2]>)>,
-    /// Constraints that have a rest size.
+    /// Number of constraints with a rest size.
     count: usize,
 }
 
 impl Reduction {
     pub(crate) fn new(
         gpu: &Gpu,
-        body: &Body,
-        kind: &Kind,
+        body: &DeviceBody,
+        kind: &DeviceKind,
         set: &dyn ConstraintSet<f32>,
     ) -> Result<Self, GpuError> {
         let source = solver::residual(set.arity(), set.wgsl());
@@ -49,7 +49,8 @@ impl Reduction {
         Ok(Self { name: set.name(), kernel, shared, chunks, count })
     }
 
-    /// `C` over rest size at the present state. Ratios are `f32`, and so are the sums over 64 of them; the rest is `f64`.
+    /// Returns `C` over the rest size at the present state. Ratios and sums over 64 ratios are `f32`.
+    /// The sums over workgroups are `f64`.
     pub(crate) fn run(&self, gpu: &Gpu) -> Result<Residual, GpuError> {
         let mut pass = gpu.pass("residual");
         for (group, threads, _) in &self.chunks {

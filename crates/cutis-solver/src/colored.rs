@@ -25,8 +25,9 @@ use nalgebra::{Point3, Vector3};
 use crate::batch::{ConstraintChunk, Load, Store, VertexChunk};
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
 
-/// Number of constraints of a chunk. It is fixed, and results do not depend on it.
-const CHUNK: usize = 1024;
+/// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so that
+/// a tiny body has several.
+const CHUNK: usize = if cfg!(miri) { 8 } else { 1024 };
 
 /// One color of one kind, shared between the threads that project it.
 ///
@@ -112,8 +113,8 @@ impl<'a, T: Scalar> Colored<'a, T> {
     }
 }
 
-/// Number of vertices of a chunk. It is fixed, and results do not depend on it.
-const VERTEX_CHUNK: usize = 128;
+/// Number of vertices of a chunk. Results do not depend on it.
+const VERTEX_CHUNK: usize = if cfg!(miri) { 2 } else { 128 };
 
 /// One color of vertices, shared between the threads that move them.
 pub struct ColoredVertices<'a, T: Scalar> {

@@ -1,5 +1,5 @@
-//! Each unsafe block with a tiny body, on one thread and on several, against the serial code. Small
-//! enough for Miri: `cargo miri test -p cutis-solver colored::`.
+//! Tests of each unsafe block with a tiny body, on one thread and on two, against the serial code.
+//! Miri runs them in seconds: `cargo +nightly miri test -p cutis-solver --lib colored::`.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Volume};
@@ -98,8 +98,7 @@ fn shared_vertices_have_the_bits_of_serial_ones() {
     }
 }
 
-/// More than one chunk, so that two threads work at the same time, with some rows of SIMD lanes
-/// and a remainder.
+/// Several chunks for two threads. The last chunk has a remainder without SIMD lanes.
 #[test]
 fn threads_take_each_chunk_once() {
     let count = 2 * CHUNK as u32 + 3;

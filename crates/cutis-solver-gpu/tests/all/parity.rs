@@ -1,23 +1,24 @@
-//! Equal to the reference: bit for bit on software, within rounding on hardware; with controls that must differ.
+//! Results equal those of the reference solver: bit for bit on software adapters, within rounding on
+//! hardware. Controls must differ.
 
 use std::time::Instant;
 
 use cutis_gpu::{Gpu, GpuOptions};
 use cutis_solver::{Formulation, Settings, Solver, SolverReference, StepProfile};
 use cutis_solver_gpu::SolverGpu;
+use cutis_test_kit::gpu::{is_exact, on_each_adapter, on_each_adapter_with};
 use nalgebra::{Point3, Vector3};
 
 use crate::body::{Parts, body, settings};
-use crate::{is_exact, on_each_adapter};
 
-/// On hardware: the share of the body's extent by which positions may differ after a few frames.
+/// Largest difference of positions on hardware after a few frames, relative to the body's extent.
 const TOLERANCE: f32 = 1e-6;
 
 fn state(solver: &mut dyn Solver<f32>) -> (Vec<Point3<f32>>, Vec<Vector3<f32>>) {
     (solver.positions().unwrap(), solver.velocities().unwrap().to_vec())
 }
 
-/// Whether two solvers stand at the same place after `frames` frames, in steps of one and of the rest.
+/// True if both solvers have the same state after three frames, in steps of one and two frames.
 fn agree(gpu: &Gpu, parts: Parts, on_gpu: Settings, on_cpu: Settings) -> bool {
     let mut first = SolverGpu::new(gpu, body(parts), on_gpu).unwrap();
     let mut second = SolverReference::<f32>::new(body(parts), on_cpu).unwrap();
@@ -31,22 +32,22 @@ fn agree(gpu: &Gpu, parts: Parts, on_gpu: Settings, on_cpu: Settings) -> bool {
         return found == expected;
     }
     let extent = 12.0 * parts.step as f32;
-    let apart = found.0.iter().zip(&expected.0).map(|(a, b)| (a - b).amax()).fold(0.0, f32::max);
-    apart <= TOLERANCE * extent
+    let difference = found.0.iter().zip(&expected.0).map(|(a, b)| (a - b).amax()).fold(0.0, f32::max);
+    difference <= TOLERANCE * extent
 }
 
 fn assert_parity(gpu: &Gpu, parts: Parts, iterations: u32) {
     let settings = settings(&parts, iterations);
     let name = &gpu.adapter().name;
     assert!(agree(gpu, parts, settings, settings), "{name}: {parts:?}, {iterations} iterations");
-    // The control: other gravity must be seen.
+    // Control: another gravity must give another state.
     let other = Settings { gravity_m_s2: settings.gravity_m_s2.map(|g| g * 1.001), ..settings };
-    assert!(!agree(gpu, parts, other, settings), "{name}: {parts:?}: another gravity goes unseen");
+    assert!(!agree(gpu, parts, other, settings), "{name}: {parts:?}: another gravity gives the same state");
 }
 
 #[test]
-fn all_kinds_together_in_every_formulation() {
-    on_each_adapter(GpuOptions::default(), |gpu| {
+fn all_kinds_together_agree_in_every_formulation() {
+    on_each_adapter(|gpu| {
         for (formulation, iterations) in
             [(Formulation::Pbd, 2), (Formulation::Xpbd, 1), (Formulation::Xpbd, 3), (Formulation::Vbd, 2)]
         {
@@ -60,8 +61,8 @@ fn all_kinds_together_in_every_formulation() {
 }
 
 #[test]
-fn every_kind_alone() {
-    on_each_adapter(GpuOptions::default(), |gpu| {
+fn every_kind_alone_agrees() {
+    on_each_adapter(|gpu| {
         for formulation in [Formulation::Pbd, Formulation::Xpbd, Formulation::Vbd] {
             let none = Parts::none(formulation);
             let paper = formulation == Formulation::Pbd;
@@ -79,27 +80,30 @@ fn every_kind_alone() {
     });
 }
 
-/// Every color and the vertices split many times, and the limits no better than WebGPU asks for.
+/// Colors and vertices are split into many chunks, and the limits are WebGPU's baseline.
 #[test]
-fn split_colors_and_baseline_limits() {
+fn chunks_and_baseline_limits_do_not_change_results() {
     for chunk_cap in [Some(7), Some(100), None] {
-        on_each_adapter(GpuOptions { chunk_cap, baseline_limits: true, ..GpuOptions::default() }, |gpu| {
-            for iterations in [1, 2] {
-                assert_parity(gpu, Parts::all(Formulation::Xpbd), iterations);
-                assert_parity(gpu, Parts::all(Formulation::Vbd), iterations);
-            }
-        });
+        on_each_adapter_with(
+            &GpuOptions { chunk_cap, baseline_limits: true, ..GpuOptions::default() },
+            |gpu| {
+                for iterations in [1, 2] {
+                    assert_parity(gpu, Parts::all(Formulation::Xpbd), iterations);
+                    assert_parity(gpu, Parts::all(Formulation::Vbd), iterations);
+                }
+            },
+        );
     }
 }
 
-/// A step part by part has the bits of one in one go, by the clock of the host and by the timestamps of the device.
+/// Parts are timed by the clock of the host or by the timestamps of the device.
 #[test]
-fn a_timed_step_has_the_same_bits_and_tells_its_parts() {
+fn a_timed_step_has_the_same_bits_and_reports_its_parts() {
     let projected: &[&str] = &["vertices", "handles", "distance", "stc", "volume", "check"];
     let descending: &[&str] = &["vertices", "handles", "descent", "check"];
     for (formulation, expected) in [(Formulation::Xpbd, projected), (Formulation::Vbd, descending)] {
         for timestamps in [false, true] {
-            on_each_adapter(GpuOptions { timestamps, ..GpuOptions::default() }, |gpu| {
+            on_each_adapter_with(&GpuOptions { timestamps, ..GpuOptions::default() }, |gpu| {
                 let parts = Parts::all(formulation);
                 let settings = settings(&parts, 2);
                 let mut plain = SolverGpu::new(gpu, body(parts), settings).unwrap();

@@ -1,20 +1,19 @@
-//! Saved states, runs in pieces, bodies that leave the finite numbers.
+//! Saved states, runs in several calls, and positions that become infinite.
 
 use cutis_coloring::greedy;
 use cutis_constraints::Distance;
-use cutis_gpu::GpuOptions;
 use cutis_solver::{
     Formulation, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
 };
 use cutis_solver_gpu::{GpuSolverError, SolverGpu};
+use cutis_test_kit::gpu::{is_exact, on_each_adapter};
 use nalgebra::{Point3, Vector3};
 
 use crate::body::{Parts, body, settings};
-use crate::{is_exact, on_each_adapter};
 
 #[test]
-fn one_step_of_many_frames_is_many_steps_of_one() {
-    on_each_adapter(GpuOptions::default(), |gpu| {
+fn one_call_for_many_frames_equals_many_calls() {
+    on_each_adapter(|gpu| {
         let parts = Parts { volume: false, ..Parts::all(Formulation::Xpbd) };
         let run = |calls: &[usize]| {
             let mut solver = SolverGpu::new(gpu, body(parts), settings(&parts, 2)).unwrap();
@@ -23,14 +22,14 @@ fn one_step_of_many_frames_is_many_steps_of_one() {
             }
             (solver.positions().unwrap(), solver.velocities().unwrap().to_vec(), solver.time_s())
         };
-        // More frames than are submitted unseen.
+        // More frames than the solver runs between two status checks.
         assert!(run(&[70]) == run(&[1, 63, 2, 4]));
     });
 }
 
 #[test]
-fn a_saved_state_goes_on_on_either_backend() {
-    on_each_adapter(GpuOptions::default(), |gpu| {
+fn a_saved_state_continues_on_either_backend() {
+    on_each_adapter(|gpu| {
         let parts = Parts::all(Formulation::Xpbd);
         let settings = settings(&parts, 1);
         let mut first = SolverGpu::new(gpu, body(parts), settings).unwrap();
@@ -54,7 +53,7 @@ fn a_saved_state_goes_on_on_either_backend() {
     });
 }
 
-fn runaway() -> System<f32> {
+fn overflowing() -> System<f32> {
     let points = [0.0f32, 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0));
     let velocities = [Vector3::zeros(), Vector3::zeros(), Vector3::new(1e38f32, 0.0, 0.0)];
     let springs = [[0, 1]];
@@ -67,15 +66,16 @@ fn runaway() -> System<f32> {
         .build()
 }
 
-/// As on the CPU: the vertex is named, the state is that of the start of the substep, and may be stepped on.
+/// As on the CPU, the error names the vertex, and the state is reset to the start of the substep and
+/// can be stepped again.
 #[test]
-fn a_body_that_explodes_stops_at_the_start_of_its_substep() {
+fn overflow_resets_the_state_to_the_start_of_its_substep() {
     let settings = Settings { dt_s: 12.0, substeps: 6, ..Settings::default() };
-    let mut reference = SolverReference::new(runaway(), settings).unwrap();
+    let mut reference = SolverReference::new(overflowing(), settings).unwrap();
     let expected = reference.step(5).unwrap_err();
     assert!(matches!(expected, SolverError::NotFinite { vertex: 2, frame: 0, substep: 1, .. }), "{expected}");
-    on_each_adapter(GpuOptions::default(), |gpu| {
-        let mut solver = SolverGpu::new(gpu, runaway(), settings).unwrap();
+    on_each_adapter(|gpu| {
+        let mut solver = SolverGpu::new(gpu, overflowing(), settings).unwrap();
         assert_eq!(solver.step(5).unwrap_err(), expected);
         assert_eq!(solver.time_s(), reference.time_s());
         let kept = solver.positions().unwrap();
@@ -83,7 +83,7 @@ fn a_body_that_explodes_stops_at_the_start_of_its_substep() {
             assert_eq!(kept, reference.positions().unwrap());
         }
         assert!(solver.velocities().unwrap().iter().all(|v| *v == Vector3::zeros()));
-        // The rest of the frame, with two vertices at rest and one on its spring.
+        // The rest of the frame moves only the vertex on the spring.
         solver.step(1).unwrap();
         assert_eq!(solver.positions().unwrap()[2], kept[2]);
         assert_eq!(solver.simulation().clock().substep, 0);
@@ -91,8 +91,8 @@ fn a_body_that_explodes_stops_at_the_start_of_its_substep() {
 }
 
 #[test]
-fn settings_that_do_not_fit_are_refused() {
-    on_each_adapter(GpuOptions::default(), |gpu| {
+fn settings_for_another_formulation_are_rejected() {
+    on_each_adapter(|gpu| {
         let parts = Parts::all(Formulation::Xpbd);
         let pbd = Settings { formulation: Formulation::Pbd, ..settings(&parts, 1) };
         let error = SolverGpu::new(gpu, body(parts), pbd).err().unwrap();

@@ -1,4 +1,4 @@
-//! Bodies of every kind, formulation and way of storing.
+//! Test bodies with every kind of constraint, formulation and storage layout.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{
@@ -8,7 +8,7 @@ use cutis_solver::{Formulation, Handle, Settings, Stiffness, System, SystemBuild
 
 use cutis_test_kit::Kuhn;
 
-/// What a body is made of.
+/// Parts of a test body.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts {
     pub formulation: Formulation,
@@ -17,9 +17,9 @@ pub struct Parts {
     pub skin: bool,
     pub paper: bool,
     pub handle: bool,
-    /// A stiffness for each constraint, or one for all.
+    /// One stiffness per constraint instead of one for all.
     pub each: bool,
-    /// Length of a lattice step in m.
+    /// Spacing of the lattice in m.
     pub step: f64,
 }
 
@@ -36,13 +36,13 @@ impl Parts {
     }
 }
 
-/// One face fixed, unequal masses.
+/// Builds a body with one fixed face and different masses.
 pub fn body<T: Scalar>(parts: Parts) -> System<T> {
     let lattice = Kuhn::new([12, 9, 7], parts.step);
     let count = lattice.positions.len();
     let masses: Vec<f64> = (0..count).map(|n| (n % 12).min(1) as f64 * (0.5 + (n % 7) as f64)).collect();
     let skin: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(5).collect();
-    // Compliances in their own power of the length, so that a scaled body moves alike.
+    // Each compliance scales with its power of the length, so that a scaled body moves the same way.
     let stiffness = |count: usize, compliance: f64| {
         let value = |n: usize| if parts.each { (1 + n % 3) as f64 } else { 1.0 };
         let unit = match parts.formulation {
@@ -90,23 +90,17 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
     if parts.handle {
         let move_m = [0.1 * scale, 0.2 * scale, 0.0];
         for row in 0..2 {
-            let held = (0..count as u32).filter(|n| n % 12 == 11 && (n / 12) % 9 == 8 * row).collect();
-            builder = builder.handle(Handle { vertices: held, move_m, over_s: 0.03 }).unwrap();
+            let vertices = (0..count as u32).filter(|n| n % 12 == 11 && (n / 12) % 9 == 8 * row).collect();
+            builder = builder.handle(Handle { vertices, move_m, over_s: 0.03 }).unwrap();
         }
     }
     builder.build()
 }
 
 pub fn settings(parts: &Parts, iterations: u32) -> Settings {
-    let gravity_m_s2 = [0.0, -9.81 * parts.step / 0.1, 0.0];
-    let formulation = parts.formulation;
-    Settings {
-        formulation,
-        dt_s: 0.01,
-        substeps: 2,
-        iterations,
-        gravity_m_s2,
-        damping_per_s: 0.5,
-        relaxation: if formulation == Formulation::Vbd { 1.3 } else { 1.0 },
-    }
+    let Parts { formulation, step, .. } = *parts;
+    let gravity_m_s2 = [0.0, -9.81 * step / 0.1, 0.0];
+    let relaxation = if formulation == Formulation::Vbd { 1.3 } else { 1.0 };
+    let fixed = Settings { dt_s: 0.01, substeps: 2, damping_per_s: 0.5, ..Settings::default() };
+    Settings { formulation, iterations, gravity_m_s2, relaxation, ..fixed }
 }

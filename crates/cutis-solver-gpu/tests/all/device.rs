@@ -1,19 +1,18 @@
-//! A device that goes away.
+//! A lost device, and failed measurements.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Constraint, Distance, DistanceMaterial, Eval, Real};
-use cutis_gpu::GpuOptions;
 use cutis_solver::{Formulation, Handle, Settings, Solver, SolverError, Stiffness, SystemBuilder};
 use cutis_solver_gpu::SolverGpu;
+use cutis_test_kit::gpu::on_each_adapter;
 use nalgebra::Point3;
 
 use crate::body::{Parts, body, settings};
-use crate::on_each_adapter;
 
-/// Every call says so, and the host keeps the state that it read last.
+/// Every call returns an error, and the host keeps the state of the last readback.
 #[test]
-fn a_lost_device_leaves_the_last_state_that_was_read() {
-    on_each_adapter(GpuOptions::default(), |gpu| {
+fn after_a_lost_device_the_last_known_state_remains() {
+    on_each_adapter(|gpu| {
         let parts = Parts::all(Formulation::Xpbd);
         let mut solver = SolverGpu::new(gpu, body(parts), settings(&parts, 1)).unwrap();
         solver.step(2).unwrap();
@@ -21,24 +20,24 @@ fn a_lost_device_leaves_the_last_state_that_was_read() {
         solver.step(1).unwrap();
         gpu.lose();
         let error = solver.step(1).unwrap_err();
-        let SolverError::Device { backend: "gpu", ref reason, time_s: said } = error else {
+        let SolverError::Device { backend: "gpu", ref reason, time_s: reported_s } = error else {
             panic!("{error}");
         };
         assert!(reason.contains("lost"), "{reason}");
-        assert_eq!(said, time_s);
-        assert!(solver.step(1).is_err(), "it stays lost");
+        assert_eq!(reported_s, time_s);
+        assert!(solver.step(1).is_err(), "the device stays lost");
         assert!(solver.residuals().is_err());
-        assert!(solver.positions().unwrap() == kept, "what the host has, it gives");
+        assert!(solver.positions().unwrap() == kept, "the host returns its copy");
         assert!(solver.simulation().system().positions() == kept);
         assert_eq!(solver.simulation().time_s(), time_s);
     });
 }
 
-/// Springs that claim a name which only the measure uses.
-struct Named;
+/// Springs whose WGSL declares a name that only the residual kernel uses, so that this kernel fails.
+struct NameClash;
 
-impl Constraint<2> for Named {
-    const NAME: &'static str = "named";
+impl Constraint<2> for NameClash {
+    const NAME: &'static str = "clash";
     const WGSL: &'static str = concat!(
         "const sums: f32 = 1.0;",
         "struct Params { rest_length: f32 }
@@ -63,10 +62,10 @@ impl Constraint<2> for Named {
     }
 }
 
-/// A look at the body that fails changes nothing: the run goes on as if nobody had asked.
+/// The run continues as if there had been no measurement.
 #[test]
-fn a_measure_that_fails_leaves_the_run_alone() {
-    on_each_adapter(GpuOptions::default(), |gpu| {
+fn a_failed_measurement_does_not_change_the_run() {
+    on_each_adapter(|gpu| {
         let new = || {
             let points = [0.0f32, 0.1, 0.2].map(|x| Point3::new(x, 0.0, 0.0));
             let springs = [[0, 1], [1, 2]];
@@ -75,7 +74,7 @@ fn a_measure_that_fails_leaves_the_run_alone() {
             let handle = Handle { vertices: vec![0], move_m: [0.0, 0.1, 0.0], over_s: 0.05 };
             let system = SystemBuilder::<f32>::new(&points, &[1.0f32; 3])
                 .unwrap()
-                .add_from_rest::<Named, 2>(&springs, &Default::default(), soft, &groups)
+                .add_from_rest::<NameClash, 2>(&springs, &Default::default(), soft, &groups)
                 .unwrap()
                 .handle(handle)
                 .unwrap()
@@ -89,7 +88,7 @@ fn a_measure_that_fails_leaves_the_run_alone() {
         solver.step(2).unwrap();
         let time_s = solver.time_s();
         let error = solver.residuals().unwrap_err();
-        assert!(error.to_string().contains("named: residual"), "{error}");
+        assert!(error.to_string().contains("clash: residual"), "{error}");
         assert_eq!(solver.time_s(), time_s);
         solver.step(1).unwrap();
         assert!(solver.positions().unwrap() == undisturbed.positions().unwrap());

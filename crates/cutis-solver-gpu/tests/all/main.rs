@@ -1,0 +1,7 @@
+//! The GPU backend against the reference solver, on every adapter of the machine.
+
+mod body;
+mod device;
+mod parity;
+mod readbacks;
+mod state;
