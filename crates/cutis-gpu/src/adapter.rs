@@ -1,4 +1,4 @@
-//! The adapters of the machine: what they are and in which order they stand.
+//! The adapters of the machine and their order.
 
 use std::{fmt, sync::LazyLock};
 
@@ -7,36 +7,37 @@ use crate::{GpuError, Limits, Select, limits};
 /// One adapter of the machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Adapter {
-    /// Place in the order of [`adapters`]: best hardware first, software last.
+    /// Index in the order of [`adapters`]: best hardware first, software last.
     pub index: usize,
-    /// The driver's name of the adapter.
+    /// Name of the adapter, as given by the driver.
     pub name: String,
-    /// What sort of adapter it is.
+    /// The type of the adapter.
     pub kind: AdapterKind,
-    /// The interface that it is reached by: `"vulkan"`, `"metal"` or `"dx12"`.
+    /// The graphics API of the adapter: `"vulkan"`, `"metal"` or `"dx12"`.
     pub api: &'static str,
     /// Name and version of the driver.
     pub driver: String,
-    /// What a device of it offers, unless only the baseline is asked for.
+    /// The limits of a device of this adapter, unless it is opened with baseline limits.
     pub limits: Limits,
-    /// Whether it can time its work.
+    /// True if the adapter can time its work.
     pub timestamps: bool,
-    /// Why it cannot be opened: the limit of WebGPU's baseline that it does not reach. None: it reaches them all.
+    /// The limit of WebGPU's baseline that the adapter does not reach, so that it cannot be opened.
+    /// `None` if it reaches all limits.
     pub lacking: Option<String>,
 }
 
-/// What sort of adapter it is, from best to last.
+/// The type of an adapter, from best to worst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum AdapterKind {
-    /// A card with its own memory.
+    /// A GPU with its own memory.
     Discrete,
     /// A GPU that shares the memory of the CPU.
     Integrated,
-    /// A GPU lent to a virtual machine.
+    /// A GPU of a virtual machine.
     Virtual,
-    /// The driver does not say.
+    /// The driver does not report the type.
     Unknown,
-    /// No GPU: the CPU computes.
+    /// A software implementation that runs on the CPU.
     Software,
 }
 
@@ -52,13 +53,13 @@ impl fmt::Display for AdapterKind {
     }
 }
 
-/// The adapters of this machine, each once, best hardware first and software last. No device is
-/// made. Empty when there is no driver.
+/// Lists the adapters of this machine without duplicates, best hardware first and software last. The
+/// list is empty if there is no driver. No device is opened.
 pub fn adapters() -> Vec<Adapter> {
     enumerate().into_iter().map(|(adapter, _)| adapter).collect()
 }
 
-/// The adapters with wgpu's handles.
+/// Lists the adapters with their wgpu handles.
 pub(crate) fn enumerate() -> Vec<(Adapter, wgpu::Adapter)> {
     let Some(instance) = instance() else { return Vec::new() };
     let mut found: Vec<_> = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()))
@@ -80,16 +81,16 @@ pub(crate) fn enumerate() -> Vec<(Adapter, wgpu::Adapter)> {
         .collect()
 }
 
-/// The adapter that `select` means.
+/// Returns the adapter that `select` selects.
 pub(crate) fn choose(select: &Select) -> Result<(Adapter, wgpu::Adapter), GpuError> {
     let mut all = enumerate();
     let described: Vec<Adapter> = all.iter().map(|(adapter, _)| adapter.clone()).collect();
-    let place = select.among(&described)?.index;
-    Ok(all.swap_remove(place))
+    let index = select.among(&described)?.index;
+    Ok(all.swap_remove(index))
 }
 
-/// One instance for the whole process, so that a resource of one device given to another is told apart by wgpu. None
-/// when no interface of this platform is built in.
+/// Returns the instance of the process. There is only one, so that wgpu can detect a resource of one
+/// device that is used with another. `None` if this build supports no graphics API of the platform.
 fn instance() -> Option<&'static wgpu::Instance> {
     static INSTANCE: LazyLock<Option<wgpu::Instance>> = LazyLock::new(|| {
         (!wgpu::Instance::enabled_backend_features().is_empty()).then(|| {
@@ -130,7 +131,7 @@ fn kind(device_type: wgpu::DeviceType) -> AdapterKind {
     }
 }
 
-/// Rank and name of an interface.
+/// Returns the rank and the name of a graphics API.
 fn api(backend: wgpu::Backend) -> (u8, &'static str) {
     match backend {
         wgpu::Backend::Vulkan => (0, "vulkan"),
@@ -142,9 +143,9 @@ fn api(backend: wgpu::Backend) -> (u8, &'static str) {
     }
 }
 
-/// Whether two entries mean the same piece of hardware, reached by two interfaces or two drivers. The place on the bus
-/// tells cards apart; where it is not given, equal names are the same adapter only across interfaces or in software
-/// (two equal cards stay two).
+/// True if two entries are the same hardware with two graphics APIs or two drivers. The PCI address
+/// distinguishes cards. Without it, entries of the same name are one adapter only if their APIs differ
+/// or if they are software, so that two equal cards remain two.
 fn same_adapter(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
     if (kind(a.device_type), a.vendor, a.device) != (kind(b.device_type), b.vendor, b.device) {
         return false;
@@ -160,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_ways_to_one_card_are_one_adapter_and_two_cards_are_two() {
+    fn one_card_with_two_apis_is_one_adapter_and_two_cards_are_two() {
         let info = |backend, device_type, bus: &str| wgpu::AdapterInfo {
             device_pci_bus_id: bus.to_owned(),
             name: "card".to_owned(),
@@ -177,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn hardware_comes_before_software() {
+    fn hardware_is_listed_before_software() {
         use AdapterKind::*;
         let mut kinds = [Software, Unknown, Virtual, Integrated, Discrete];
         kinds.sort();

@@ -1,4 +1,4 @@
-//! Typed memory of the device: making it and writing to it.
+//! Typed buffers on the device: allocation and upload.
 
 use std::{fmt, marker::PhantomData, ops::Range, sync::Arc};
 
@@ -9,14 +9,15 @@ use crate::{
     counters::{Memory, add},
 };
 
-/// Copies to and from buffers move whole words of 4 bytes.
+/// Copies to and from buffers consist of whole words of 4 bytes.
 pub(crate) const WORD: u64 = 4;
 
-/// Large contents go up in parts of this many bytes, so that no second copy of them has to fit in memory.
+/// Size of a part of an upload in bytes. Large contents are uploaded in parts, so that no complete
+/// second copy has to fit in memory.
 pub(crate) const PART: usize = 16 << 20;
 
-/// `len` elements of `T` on the device. The memory goes when the buffer and the bind groups made with it are dropped, and the
-/// device has done what was submitted with them.
+/// A buffer of `len` elements of `T` on the device. Its memory is freed when the buffer and the bind
+/// groups with it are dropped and the device has finished the work that uses them.
 pub struct Buffer<T> {
     pub(crate) raw: wgpu::Buffer,
     pub(crate) label: String,
@@ -26,34 +27,36 @@ pub struct Buffer<T> {
 }
 
 impl Gpu {
-    /// A storage buffer with these contents, for kernels to read and write.
+    /// Creates a storage buffer with the given contents, which kernels can read and write.
     ///
-    /// An empty slice gets the memory of one zeroed element, so that it can be bound; its length is 0.
+    /// A buffer with no elements has the memory of one zeroed element, so that it can be bound.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Limit`] beyond the largest buffer, [`GpuError::OutOfMemory`], [`GpuError::Lost`].
+    /// Returns [`GpuError::Limit`] if the contents exceed the largest buffer,
+    /// [`GpuError::OutOfMemory`] or [`GpuError::Lost`].
     pub fn buffer<T: Pod>(&self, label: &str, contents: &[T]) -> Result<Buffer<T>, GpuError> {
         let buffer = self.zeroed(label, contents.len())?;
         self.upload(&buffer, 0, contents)?;
         Ok(buffer)
     }
 
-    /// A storage buffer of `len` elements, every byte 0.
+    /// Creates a storage buffer of `len` elements with all bytes 0.
     ///
     /// # Errors
     ///
-    /// As [`Gpu::buffer`].
+    /// Returns the errors of [`Gpu::buffer`].
     pub fn zeroed<T: Pod>(&self, label: &str, len: usize) -> Result<Buffer<T>, GpuError> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         self.allocate(label, len, usage, self.limits().max_buffer_bytes)
     }
 
-    /// A uniform buffer with this value: parameters that every thread of a kernel reads.
+    /// Creates a uniform buffer with the given value, for parameters that every thread of a kernel
+    /// reads.
     ///
     /// # Errors
     ///
-    /// As [`Gpu::buffer`]; a value may have 64 KiB on any device.
+    /// Returns the errors of [`Gpu::buffer`]. On every device a value may have up to 64 KiB.
     pub fn uniform<T: Pod>(&self, label: &str, value: &T) -> Result<Buffer<T>, GpuError> {
         let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
         let buffer = self.allocate(label, 1, usage, self.shared.max_uniform_bytes)?;
@@ -61,13 +64,15 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// Writes `data` from element `offset` on. It takes effect before any pass that is submitted afterwards.
+    /// Writes `data` to the elements from `offset` on. The write takes effect before every pass that
+    /// is submitted later.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Range`] when the data do not fit in; [`GpuError::Alignment`] when they do not begin on a multiple of
-    /// 4 bytes, or neither end on one nor at the end of the buffer (both can only happen where `T` is smaller than 4
-    /// bytes); [`GpuError::Lost`].
+    /// Returns [`GpuError::Range`] if the data exceed the buffer, and [`GpuError::Lost`]. Returns
+    /// [`GpuError::Alignment`] if the data do not start at a multiple of 4 bytes, or end neither at
+    /// such a multiple nor at the end of the buffer. This can only happen for elements of less than 4
+    /// bytes.
     pub fn write<T: Pod>(&self, buffer: &Buffer<T>, offset: usize, data: &[T]) -> Result<(), GpuError> {
         self.upload(buffer, offset, data)?;
         add(&self.shared.tally.writes, 1);
@@ -124,7 +129,7 @@ impl Gpu {
         self.alive()
     }
 
-    /// Sends what was written on its way and waits for it, which frees the memory in between.
+    /// Submits all writes and waits for them, which frees wgpu's staging memory.
     pub(crate) fn flush(&self, what: &impl Fn() -> String) -> Result<(), GpuError> {
         let sent = self.checked(|fault| fault.of(what(), 0), || self.shared.queue.submit([]))?;
         self.poll(wgpu::PollType::Wait { submission_index: Some(sent), timeout: None })
@@ -132,13 +137,13 @@ impl Gpu {
 }
 
 impl<T> Buffer<T> {
-    /// All of it, to bind to a kernel.
+    /// Returns a binding of the whole buffer.
     pub fn whole(&self) -> Binding<'_> {
         Binding::buffer(&self.raw, &self.memory, &self.label, 0..self.bytes())
     }
 
-    /// These elements, to bind to a kernel. The first must lie on a multiple of 256 bytes; whether it does, and whether
-    /// the range lies within the buffer, is checked by [`Gpu::bind`].
+    /// Returns a binding of a range of elements. The first element must start at a multiple of 256
+    /// bytes. [`Gpu::bind`] checks this, and that the range is within the buffer.
     pub fn range(&self, range: Range<usize>) -> Binding<'_> {
         match self.bytes_of(|| format!("binding buffer '{}'", self.label), range.clone()) {
             Ok(bytes) if bytes.end > bytes.start => {
@@ -149,22 +154,23 @@ impl<T> Buffer<T> {
         }
     }
 
-    /// Elements.
+    /// Returns the number of elements.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether it has no elements.
+    /// True if the buffer has no elements.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Bytes on the device: those of the elements, padded to a multiple of 4, and never none.
+    /// Returns the memory on the device in bytes: that of the elements, padded to a multiple of 4 and
+    /// never 0.
     pub fn bytes(&self) -> u64 {
         self.raw.size()
     }
 
-    /// The bytes of a range of elements.
+    /// Returns the bytes of a range of elements.
     pub(crate) fn bytes_of(
         &self,
         what: impl Fn() -> String,
@@ -177,7 +183,7 @@ impl<T> Buffer<T> {
         Ok(range.start as u64 * size..range.end as u64 * size)
     }
 
-    /// The same bytes up to a whole word, where that takes in nothing but padding.
+    /// Extends a range of bytes to a whole word if the extension contains only padding.
     pub(crate) fn words_of(
         &self,
         what: impl Fn() -> String,

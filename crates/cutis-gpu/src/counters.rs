@@ -1,34 +1,34 @@
-//! Counts of what a device did: tests hold a frame to one submission and no readback with them.
+//! Counters of the work of a device. Tests use them to check the submissions and readbacks of a frame.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// What a [`Gpu`](crate::Gpu) did since it was opened, over all its handles and threads.
+/// Work of a [`Gpu`](crate::Gpu) since it was opened, over all its handles and threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Kernels compiled.
+    /// Compiled kernels.
     pub kernels: u64,
-    /// Buffers made, uniforms included.
+    /// Created buffers, including uniforms.
     pub buffers: u64,
-    /// Bytes of the buffers that live now (the staging buffer of reads excluded).
+    /// Bytes of all existing buffers, without the staging buffer of readbacks.
     pub buffer_bytes: u64,
-    /// Textures made.
+    /// Created textures.
     pub textures: u64,
-    /// Bytes of the textures that live now.
+    /// Bytes of all existing textures.
     pub texture_bytes: u64,
-    /// Passes submitted.
+    /// Submitted passes.
     pub submits: u64,
     /// Dispatches in the submitted passes.
     pub dispatches: u64,
-    /// Calls of `write` (the contents that a buffer is made with are not counted).
+    /// Calls of `write`. The initial contents of a buffer do not count.
     pub writes: u64,
     /// Calls of `read`.
     pub readbacks: u64,
-    /// Bytes that `read` returned.
+    /// Bytes returned by `read`.
     pub readback_bytes: u64,
 }
 
-/// The counters behind the snapshot.
+/// The atomic counters behind [`Counters`].
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
     pub(crate) kernels: AtomicU64,
@@ -44,7 +44,7 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// The counts now.
+    /// Returns the present counts.
     pub(crate) fn snapshot(&self) -> Counters {
         Counters {
             kernels: self.kernels.load(Relaxed),
@@ -66,7 +66,8 @@ pub(crate) fn add(counter: &AtomicU64, amount: u64) {
     counter.fetch_add(amount, Relaxed);
 }
 
-/// Memory of the device, counted as live until the last holder goes: a buffer or texture, and the groups that bind it.
+/// Memory of a buffer or texture. It counts as existing until the resource and all bind groups with it
+/// are dropped.
 #[derive(Debug)]
 pub(crate) struct Memory {
     tally: Arc<Tally>,
@@ -75,7 +76,7 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// Counts `bytes` in the counter that `live` names.
+    /// Adds `bytes` to the counter that `live` selects.
     pub(crate) fn new(tally: &Arc<Tally>, bytes: u64, live: fn(&Tally) -> &AtomicU64) -> Arc<Self> {
         add(live(tally), bytes);
         Arc::new(Self { tally: Arc::clone(tally), bytes, live })

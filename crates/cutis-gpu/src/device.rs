@@ -1,4 +1,4 @@
-//! An opened device: options, limits, error capture and loss.
+//! An open device: options, limits, error handling and loss.
 
 use std::{
     fmt,
@@ -15,26 +15,27 @@ use crate::{
     timing::Timing,
 };
 
-/// How to open a device.
+/// Options to open a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GpuOptions {
-    /// Which adapter.
+    /// The adapter to open.
     pub select: Select,
-    /// Ask for exactly WebGPU's default limits, however much more the adapter offers.
+    /// Use exactly WebGPU's default limits, even if the adapter offers more.
     pub baseline_limits: bool,
-    /// At most so many items per chunk (see [`Gpu::chunk_len`]), so that tests can force the splitting of small data.
+    /// Upper bound of the items per chunk (see [`Gpu::chunk_len`]). With it, tests can split small
+    /// data.
     pub chunk_cap: Option<usize>,
-    /// Time each pass, where the adapter can.
+    /// Time each pass if the adapter supports it, see [`Gpu::last_pass_ns`].
     pub timestamps: bool,
 }
 
-/// A handle to an opened device. Clones share the device; the last one to go closes it.
+/// A handle to an open device. Clones share the device, and dropping the last clone closes it.
 #[derive(Clone)]
 pub struct Gpu {
     pub(crate) shared: Arc<Shared>,
 }
 
-/// What the handles of one device share.
+/// Data that all handles of one device share.
 pub(crate) struct Shared {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -42,18 +43,20 @@ pub(crate) struct Shared {
     pub(crate) limits: Limits,
     pub(crate) max_uniform_bytes: u64,
     chunk_cap: Option<usize>,
+    /// The reason of a loss.
     lost: Arc<OnceLock<String>>,
-    stray: Arc<Mutex<Option<String>>>,
+    /// The first error that wgpu reported outside of a call.
+    uncaptured: Arc<Mutex<Option<String>>>,
     pub(crate) tally: Arc<Tally>,
     pub(crate) staging: Mutex<Staging>,
     pub(crate) timing: Option<Timing>,
 }
 
-/// What wgpu complained of.
+/// An error that wgpu reported.
 pub(crate) enum Fault {
-    /// A rule was broken; the message says which.
+    /// A call violated a rule, which the message describes.
     Invalid(String),
-    /// No memory left.
+    /// The device has no memory left.
     Memory,
 }
 
@@ -62,9 +65,10 @@ impl Gpu {
     ///
     /// # Errors
     ///
-    /// [`GpuError::NoAdapter`] when the machine has none (the message says what to install),
-    /// [`GpuError::NoSuchAdapter`] when the one asked for is not there (it lists what is), [`GpuError::Limit`] when the
-    /// adapter does not reach WebGPU's baseline, [`GpuError::Device`] when the driver refuses.
+    /// Returns [`GpuError::NoAdapter`] if the machine has no adapter (the message says what to
+    /// install), [`GpuError::NoSuchAdapter`] if the selected one does not exist (the message lists the
+    /// others), [`GpuError::Limit`] if the adapter does not reach WebGPU's baseline, and
+    /// [`GpuError::Device`] if the driver cannot open a device.
     pub fn open(options: &GpuOptions) -> Result<Gpu, GpuError> {
         let (adapter, handle) = choose(&options.select)?;
         let limits = requested(&handle.limits(), options.baseline_limits).map_err(
@@ -87,14 +91,14 @@ impl Gpu {
             .map_err(|error| GpuError::Device { adapter: adapter.name.clone(), reason: error.to_string() })?;
 
         let lost = Arc::new(OnceLock::new());
-        let told = Arc::clone(&lost);
+        let reason_of_loss = Arc::clone(&lost);
         device.set_device_lost_callback(move |reason, message| {
-            let _ = told.set(if message.is_empty() { format!("{reason:?}") } else { message });
+            let _ = reason_of_loss.set(if message.is_empty() { format!("{reason:?}") } else { message });
         });
-        let stray = Arc::new(Mutex::new(None));
-        let kept = Arc::clone(&stray);
+        let uncaptured = Arc::new(Mutex::new(None));
+        let first = Arc::clone(&uncaptured);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            lock(&kept).get_or_insert_with(|| readable(&error));
+            lock(&first).get_or_insert_with(|| message_of(&error));
         }));
 
         let timing = timed.then(|| Timing::new(&device, &queue));
@@ -107,7 +111,7 @@ impl Gpu {
                 max_uniform_bytes: limits.max_uniform_buffer_binding_size,
                 chunk_cap: options.chunk_cap,
                 lost,
-                stray,
+                uncaptured,
                 tally: Arc::default(),
                 staging: Mutex::default(),
                 timing,
@@ -117,61 +121,61 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// The adapter that was opened.
+    /// Returns the adapter of the device.
     pub fn adapter(&self) -> &Adapter {
         &self.shared.adapter
     }
 
-    /// The limits of the opened device.
+    /// Returns the limits of the device.
     pub fn limits(&self) -> &Limits {
         &self.shared.limits
     }
 
-    /// The largest number of items of `bytes` bytes each that one buffer, one binding and one dispatch of a thread per
-    /// item can take; no more than the cap of the options. At least 1: an item too large for the device is refused
-    /// with [`GpuError::Limit`] where its buffer is made.
+    /// Returns the largest number of items of `bytes` bytes each that fit one buffer, one binding and
+    /// one dispatch with a thread per item. [`GpuOptions::chunk_cap`] limits the result. The result is
+    /// at least 1. For an item that is too large for the device, the creation of its buffer returns
+    /// [`GpuError::Limit`].
     pub fn chunk_len(&self, bytes: usize) -> usize {
-        let Shared { limits, chunk_cap, .. } = &*self.shared;
-        let threads = u64::from(limits.max_workgroups) * WORKGROUP as u64;
-        let room = limits.max_binding_bytes.min(limits.max_buffer_bytes);
-        let fits = threads.min(room.checked_div(bytes as u64).unwrap_or(u64::MAX));
-        usize::try_from(fits).unwrap_or(usize::MAX).min(chunk_cap.unwrap_or(usize::MAX)).max(1)
+        let threads = u64::from(self.limits().max_workgroups) * WORKGROUP as u64;
+        self.binding_len(bytes).min(usize::try_from(threads).unwrap_or(usize::MAX))
     }
 
-    /// The largest number of items of `bytes` bytes each that one buffer and one binding can take, whatever the number of threads
-    /// that read them; no more than the cap of the options, and at least 1.
+    /// Returns the largest number of items of `bytes` bytes each that fit one buffer and one binding,
+    /// without a limit on the threads that read them. [`GpuOptions::chunk_cap`] limits the result. The
+    /// result is at least 1.
     pub fn binding_len(&self, bytes: usize) -> usize {
         let Shared { limits, chunk_cap, .. } = &*self.shared;
-        let room = limits.max_binding_bytes.min(limits.max_buffer_bytes);
-        let fits = room.checked_div(bytes as u64).unwrap_or(u64::MAX);
+        let most_bytes = limits.max_binding_bytes.min(limits.max_buffer_bytes);
+        let fits = most_bytes.checked_div(bytes as u64).unwrap_or(u64::MAX);
         usize::try_from(fits).unwrap_or(usize::MAX).min(chunk_cap.unwrap_or(usize::MAX)).max(1)
     }
 
-    /// What was done with this device since it was opened.
+    /// Returns the counters of the work since the device was opened.
     pub fn counters(&self) -> Counters {
         self.shared.tally.snapshot()
     }
 
-    /// Waits until all that was submitted is done, without reading anything: for timing work from the host.
+    /// Waits until all submitted work is done, without a readback. For example to time work from the
+    /// host.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Lost`]; [`GpuError::Wait`] when the driver cannot wait.
+    /// Returns [`GpuError::Lost`], or [`GpuError::Wait`] if the driver cannot wait.
     pub fn wait(&self) -> Result<(), GpuError> {
         self.flush(&|| "waiting for the device".to_owned())
     }
 
-    /// Destroys the device, as a reset of the driver would: every later call returns [`GpuError::Lost`]. For tests of
-    /// what becomes of a program whose GPU goes away.
+    /// Destroys the device like a reset of the driver. Every later call returns [`GpuError::Lost`].
+    /// For tests of programs whose GPU disappears.
     pub fn lose(&self) {
-        // Held so that no other thread has memory of the device mapped while it goes.
+        // The lock ensures that no other thread has memory of the device mapped.
         let _staging = lock(&self.shared.staging);
         let _ = self.shared.lost.set("it was destroyed on request".to_owned());
         self.shared.device.destroy();
         let _ = self.poll(wgpu::PollType::Poll);
     }
 
-    /// [`GpuError::Lost`] once the device is gone.
+    /// Returns [`GpuError::Lost`] if the device was lost.
     pub(crate) fn alive(&self) -> Result<(), GpuError> {
         match self.shared.lost.get() {
             None => Ok(()),
@@ -181,8 +185,8 @@ impl Gpu {
         }
     }
 
-    /// Runs `work` and turns what wgpu complains of meanwhile into an error. A device that was lost before or
-    /// meanwhile comes first; a complaint of an earlier call that nobody heard comes last.
+    /// Runs `work` and returns the errors that wgpu reports meanwhile. The loss of the device has
+    /// priority. An uncaptured error of an earlier call comes last.
     pub(crate) fn checked<R>(
         &self,
         explain: impl FnOnce(Fault) -> GpuError,
@@ -202,15 +206,16 @@ impl Gpu {
             return Err(explain(Fault::Memory));
         }
         if let Some(error) = invalid.or(failed) {
-            return Err(explain(Fault::Invalid(readable(&error))));
+            return Err(explain(Fault::Invalid(message_of(&error))));
         }
-        match lock(&self.shared.stray).take() {
+        match lock(&self.shared.uncaptured).take() {
             Some(message) => Err(GpuError::Validation { what: "an earlier call".to_owned(), message }),
             None => Ok(result),
         }
     }
 
-    /// Lets wgpu wait for the device. wgpu panics when the device is lost while it waits; here that is an error.
+    /// Waits for the device. wgpu panics if the device is lost during the wait. This function returns
+    /// an error.
     pub(crate) fn poll(&self, until: wgpu::PollType) -> Result<(), GpuError> {
         let polled = catch_unwind(AssertUnwindSafe(|| self.shared.device.poll(until)));
         self.alive()?;
@@ -222,7 +227,7 @@ impl Gpu {
         Err(GpuError::Wait { adapter: self.shared.adapter.name.clone(), reason })
     }
 
-    /// An error for a need that the device cannot meet.
+    /// Returns the error for a size beyond a limit of the device.
     pub(crate) fn over_limit(&self, what: String, needed: u64, available: u64) -> GpuError {
         GpuError::Limit { what, needed, available, adapter: self.shared.adapter.name.clone() }
     }
@@ -238,7 +243,7 @@ impl fmt::Debug for Gpu {
 }
 
 impl Fault {
-    /// The error for `what`, which asked for `bytes` bytes of memory.
+    /// Returns the error for `what`, which needed `bytes` bytes of memory.
     pub(crate) fn of(self, what: String, bytes: u64) -> GpuError {
         match self {
             Fault::Invalid(message) => GpuError::Validation { what, message },
@@ -247,13 +252,14 @@ impl Fault {
     }
 }
 
-/// Locks; a thread that panicked while it held the lock left nothing half done that matters here.
+/// Locks the mutex, even if a thread panicked while it held the lock. The data stay valid in that
+/// case.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// wgpu's message without its heading.
-fn readable(error: &wgpu::Error) -> String {
+/// Returns wgpu's message without its heading.
+fn message_of(error: &wgpu::Error) -> String {
     let text = error.to_string();
     text.strip_prefix("Validation Error\n\nCaused by:\n").unwrap_or(&text).trim().to_owned()
 }
@@ -266,9 +272,7 @@ mod tests {
         match Gpu::open(&GpuOptions::default()) {
             Ok(gpu) => Some(gpu),
             Err(error) => {
-                let required =
-                    ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
-                assert!(!required, "a GPU is required: {error}");
+                assert!(!cutis_test_kit::gpu::required(), "this test needs a GPU: {error}");
                 eprintln!("skipped: {error}");
                 None
             }
@@ -276,24 +280,24 @@ mod tests {
     }
 
     #[test]
-    fn a_wait_that_fails_is_not_a_device_that_cannot_be_opened() {
+    fn a_failed_wait_is_a_wait_error() {
         let (Some(gpu), Some(other)) = (first_gpu(), first_gpu()) else { return };
         for _ in 0..8 {
             other.shared.queue.submit([]);
         }
         let foreign = other.shared.queue.submit([]);
         let until = |index| wgpu::PollType::Wait { submission_index: Some(index), timeout: None };
-        assert_eq!(other.poll(until(foreign.clone())), Ok(()), "the control: on its own device");
+        assert_eq!(other.poll(until(foreign.clone())), Ok(()), "control: a wait on its own device");
         let error = gpu.poll(until(foreign)).unwrap_err();
         assert!(matches!(error, GpuError::Wait { .. }), "{error}");
         assert!(error.to_string().starts_with("waiting for the GPU '"), "{error}");
     }
 
     #[test]
-    fn an_error_that_nobody_heard_is_told_by_the_next_call_and_once() {
+    fn the_next_call_reports_an_uncaptured_error_once() {
         let Some(gpu) = first_gpu() else { return };
         let _ = gpu.shared.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("of no use"),
+            label: Some("without usage"),
             size: 4,
             usage: wgpu::BufferUsages::empty(),
             mapped_at_creation: false,
@@ -301,7 +305,7 @@ mod tests {
         match gpu.zeroed::<u32>("next", 1) {
             Err(GpuError::Validation { what, message }) => {
                 assert_eq!(what, "an earlier call");
-                assert!(message.contains("of no use"), "{message}");
+                assert!(message.contains("without usage"), "{message}");
             }
             other => panic!("{other:?}"),
         }

@@ -1,113 +1,113 @@
-//! What can go wrong on a GPU.
+//! Errors of GPU calls.
 
 use thiserror::Error;
 
-/// Why a call to the GPU failed. Messages name the adapter, buffer or kernel and say what would be right.
+/// An error of a GPU call. Messages name the adapter, buffer or kernel.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum GpuError {
-    /// The machine offers no adapter.
+    /// The machine has no adapter.
     #[error(
         "no GPU adapter found: install the driver of your graphics card, or a software one \
          (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)"
     )]
     NoAdapter,
-    /// There are adapters, but not the one that was asked for.
-    #[error("no GPU adapter '{asked}'; there is: {}", found.join(", "))]
+    /// The selected adapter does not exist.
+    #[error("no GPU adapter '{asked}'; expected one of: {}", found.join(", "))]
     NoSuchAdapter {
-        /// The name or index that was asked for.
+        /// The requested name or index.
         asked: String,
-        /// The adapters that can be opened, each as `index: name`.
+        /// The existing adapters, each as `index: name`.
         found: Vec<String>,
     },
-    /// The adapter was there, but gave no device.
+    /// The adapter exists, but its device cannot be opened.
     #[error("cannot open the GPU '{adapter}': {reason}")]
     Device {
         /// Name of the adapter.
         adapter: String,
-        /// The driver's reason.
+        /// The reason given by the driver.
         reason: String,
     },
-    /// More was asked for than the device offers.
+    /// A size exceeds a limit of the device.
     #[error("{what}: {needed} needed, the GPU '{adapter}' offers {available}")]
     Limit {
-        /// What the limit is on, and which.
+        /// The size and the object that it belongs to.
         what: String,
-        /// What was asked for.
+        /// The needed value.
         needed: u64,
-        /// What the device offers.
+        /// The limit of the device.
         available: u64,
         /// Name of the adapter.
         adapter: String,
     },
-    /// A kernel was refused by the shader compiler.
+    /// The shader compiler rejected a kernel.
     #[error("kernel '{label}': {message}")]
     Shader {
-        /// The kernel's label.
+        /// Label of the kernel.
         label: String,
-        /// The compiler's message, with the line of the source.
+        /// Message of the compiler, with the line of the source.
         message: String,
     },
-    /// A call broke a rule of the GPU.
+    /// A call violated a rule of the GPU.
     #[error("{what}: {message}")]
     Validation {
-        /// What was called, and on what.
+        /// The call and its object.
         what: String,
-        /// The rule that was broken.
+        /// The violated rule.
         message: String,
     },
-    /// A range does not lie within its buffer.
-    #[error("{what}: {start}..{end} lies outside of 0..{len}, or is empty where it may not be")]
+    /// A range exceeds its buffer, or is empty where this is not allowed.
+    #[error("{what}: {start}..{end} is not a range within 0..{len}, or is empty where this is not allowed")]
     Range {
-        /// What was called, and on what.
+        /// The call and its object.
         what: String,
-        /// First element asked for.
+        /// First element of the range.
         start: usize,
-        /// End of the elements asked for.
+        /// End of the range.
         end: usize,
-        /// Elements that there are.
+        /// Number of elements of the buffer.
         len: usize,
     },
-    /// A range of bytes does not start or end where the GPU needs it.
+    /// A range of bytes does not start or end at a multiple that the GPU requires.
     #[error("{what}: byte {offset} is not a multiple of {multiple}")]
     Alignment {
-        /// What was called, and on what.
+        /// The call and its object.
         what: String,
-        /// The byte in question.
+        /// The start or end of the range.
         offset: u64,
-        /// What it should be a multiple of.
+        /// The required multiple.
         multiple: u64,
     },
     /// The device has no memory left.
     #[error("{what}: the GPU has no room for {bytes} bytes")]
     OutOfMemory {
-        /// What the memory was for.
+        /// The object that needed memory.
         what: String,
-        /// How much was asked for.
+        /// The needed memory.
         bytes: u64,
     },
-    /// The device is gone: the driver was reset, the card removed, or the device destroyed.
+    /// The device was lost: the driver was reset, the card removed, or the device destroyed.
     #[error("the GPU '{adapter}' was lost: {reason}")]
     Lost {
         /// Name of the adapter.
         adapter: String,
-        /// The driver's reason.
+        /// The reason given by the driver.
         reason: String,
     },
-    /// The driver could not wait for work that was submitted.
+    /// The driver could not wait for submitted work.
     #[error("waiting for the GPU '{adapter}' failed: {reason}")]
     Wait {
         /// Name of the adapter.
         adapter: String,
-        /// The driver's reason.
+        /// The reason given by the driver.
         reason: String,
     },
-    /// Memory of the device could not be mapped for reading.
+    /// Device memory could not be mapped for a readback.
     #[error("cannot read {what} back from the GPU: {reason}")]
     Readback {
-        /// What was read.
+        /// The buffer.
         what: String,
-        /// Why it failed.
+        /// The error of the mapping.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Kernels, and the buffers that they work on.
+//! Compute kernels and their bind groups.
 
 use std::{borrow::Cow, fmt, ops::Range, sync::Arc};
 
@@ -8,25 +8,25 @@ use crate::{
     device::Fault,
 };
 
-/// A range of a buffer that is bound must start on a multiple of this many bytes (WebGPU's baseline).
+/// The range of a binding must start at a multiple of this number of bytes (WebGPU's baseline).
 const BINDING_ALIGNMENT: u64 = 256;
 
-/// A compiled compute kernel. Its bindings follow from the source: exactly those that its entry point uses.
+/// A compiled compute kernel. Its bindings are exactly those that the entry point uses in the source.
 pub struct Kernel {
     pub(crate) pipeline: wgpu::ComputePipeline,
     pub(crate) label: String,
 }
 
-/// The resources of one `@group` of one kernel. It keeps them alive, and serves no other kernel.
+/// The resources of one `@group` of one kernel. It keeps them alive and works with no other kernel.
 pub struct BindGroup {
     pub(crate) raw: wgpu::BindGroup,
     pub(crate) group: u32,
-    /// Counts as in use as long as the group is.
+    /// Memory that counts as existing as long as the group exists.
     _memory: Vec<Arc<Memory>>,
 }
 
-/// A resource to bind: made by [`Buffer::whole`](crate::Buffer::whole), [`Buffer::range`](crate::Buffer::range) and
-/// [`Texture3d::whole`](crate::Texture3d::whole).
+/// A resource to bind, from [`Buffer::whole`](crate::Buffer::whole),
+/// [`Buffer::range`](crate::Buffer::range) or [`Texture3d::whole`](crate::Texture3d::whole).
 #[derive(Clone, Debug)]
 pub struct Binding<'a>(Resource<'a>);
 
@@ -38,19 +38,20 @@ enum Resource<'a> {
 }
 
 impl Gpu {
-    /// Compiles the entry point `entry` of a WGSL source. Takes milliseconds to tenths of a second; compiled kernels
-    /// are not kept here, so compile each once.
+    /// Compiles the entry point `entry` of a WGSL source. This takes milliseconds to tenths of a
+    /// second. There is no cache, so compile each kernel once.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Shader`] with the compiler's message when the source is wrong, has no such entry point, or the entry
-    /// point is not `@compute @workgroup_size(64)`; [`GpuError::Lost`].
+    /// Returns [`GpuError::Shader`] with the compiler's message if the source is invalid, has no such
+    /// entry point, or the entry point is not `@compute @workgroup_size(64)`. Returns
+    /// [`GpuError::Lost`] if the device was lost.
     pub fn kernel(&self, label: &str, wgsl: &str, entry: &str) -> Result<Kernel, GpuError> {
         self.alive()?;
-        let refused = |message: String| GpuError::Shader { label: label.to_owned(), message };
-        check_entry(wgsl, entry).map_err(refused)?;
+        let shader_error = |message: String| GpuError::Shader { label: label.to_owned(), message };
+        check_entry(wgsl, entry).map_err(shader_error)?;
         let explain = |fault| match fault {
-            Fault::Invalid(message) => refused(message),
+            Fault::Invalid(message) => shader_error(message),
             Fault::Memory => fault.of(format!("kernel '{label}'"), wgsl.len() as u64),
         };
         let device = &self.shared.device;
@@ -71,14 +72,15 @@ impl Gpu {
         Ok(Kernel { pipeline, label: label.to_owned() })
     }
 
-    /// Binds resources to `@group(group)` of a kernel, each with its `@binding`. All that the kernel's entry point uses
-    /// of that group must be there, and nothing else.
+    /// Binds resources to `@group(group)` of a kernel, each with its `@binding`. The bindings must be
+    /// exactly those of this group that the kernel's entry point uses.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Validation`] when the bindings are not those of the kernel, [`GpuError::Range`] when a range does
-    /// not lie within its buffer or is empty, [`GpuError::Alignment`] when it does not start on a multiple of 256
-    /// bytes, [`GpuError::Limit`] when it is larger than a binding may be, [`GpuError::Lost`].
+    /// Returns [`GpuError::Validation`] if the bindings are not those of the kernel,
+    /// [`GpuError::Range`] if a range exceeds its buffer or is empty, [`GpuError::Alignment`] if it
+    /// does not start at a multiple of 256 bytes, [`GpuError::Limit`] if it exceeds the largest
+    /// binding, and [`GpuError::Lost`].
     pub fn bind(
         &self,
         kernel: &Kernel,
@@ -105,8 +107,8 @@ impl Gpu {
                 })
             },
         )?;
-        let held = bindings.iter().filter_map(|(_, Binding(resource))| resource.memory());
-        Ok(BindGroup { raw, group, _memory: held.cloned().collect() })
+        let memory = bindings.iter().filter_map(|(_, Binding(resource))| resource.memory());
+        Ok(BindGroup { raw, group, _memory: memory.cloned().collect() })
     }
 
     fn resource<'a>(
@@ -174,13 +176,6 @@ impl<'a> Binding<'a> {
     }
 }
 
-impl Kernel {
-    /// The label that it was compiled with.
-    pub fn label(&self) -> &str {
-        &self.label
-    }
-}
-
 impl fmt::Debug for Kernel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Kernel").field("label", &self.label).finish_non_exhaustive()
@@ -193,15 +188,15 @@ impl fmt::Debug for BindGroup {
     }
 }
 
-/// Parses the source and looks at the entry point, so that a kernel with another workgroup size is refused instead of
-/// running with the wrong number of threads.
+/// Parses the source and checks the entry point. A kernel with another workgroup size would run with
+/// a wrong number of threads.
 fn check_entry(wgsl: &str, entry: &str) -> Result<(), String> {
     let module =
         naga::front::wgsl::parse_str(wgsl).map_err(|error| error.emit_to_string(wgsl).trim().to_owned())?;
     let named = |point: &&naga::EntryPoint| point.name == entry;
     let Some(point) = module.entry_points.iter().find(named) else {
         let names: Vec<_> = module.entry_points.iter().map(|point| point.name.as_str()).collect();
-        return Err(format!("no entry point '{entry}'; there is: {}", names.join(", ")));
+        return Err(format!("no entry point '{entry}'; expected one of: {}", names.join(", ")));
     };
     if point.stage != naga::ShaderStage::Compute || point.workgroup_size != [WORKGROUP as u32, 1, 1] {
         let [x, y, z] = point.workgroup_size;

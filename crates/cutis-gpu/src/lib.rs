@@ -1,18 +1,20 @@
 //! Compute on any GPU, through wgpu.
 //!
-//! This is the only crate of Cutis that names wgpu. It offers what a solver needs and no more: adapters by name or
-//! index, typed buffers, volumes as integer textures, kernels in WGSL, one compute pass per submission, reading back.
-//! No type of wgpu shows in the public API.
+//! This is the only crate of Cutis that uses wgpu, and no type of wgpu appears in its public API. It
+//! provides adapters by name or index, typed buffers, volumes as integer textures, kernels in WGSL,
+//! one compute pass per submission, and readbacks.
 //!
-//! # What holds
+//! # Guarantees
 //!
-//! - Nothing panics on bad input, a bad shader or a device that is lost: every failure is a [`GpuError`].
-//! - Sizes are checked against the limits of the device before memory is asked for.
-//! - After the device is lost every call that reaches it returns [`GpuError::Lost`]; data on the host stay as they were.
-//! - Writes, passes and reads of one [`Gpu`] take effect in the order of the calls [`Gpu::write`], [`Pass::submit`] and
-//!   [`Gpu::read`], not in the order in which passes are recorded.
-//! - Every kernel has `@workgroup_size(64)` ([`WORKGROUP`]); a kernel with another one is refused.
-//! - Handles may be shared between threads.
+//! - Nothing panics on invalid input, an invalid shader or a lost device. Every failure is a
+//!   [`GpuError`].
+//! - Sizes are checked against the limits of the device before memory is allocated.
+//! - After the loss of the device, every call that uses it returns [`GpuError::Lost`]. Data on the host
+//!   do not change.
+//! - Writes, passes and reads of one [`Gpu`] take effect in the order of the calls of [`Gpu::write`],
+//!   [`Pass::submit`] and [`Gpu::read`], not in the order in which passes are recorded.
+//! - Every kernel has `@workgroup_size(64)` ([`WORKGROUP`]). [`Gpu::kernel`] rejects other sizes.
+//! - Threads can share handles.
 //!
 //! # Example
 //!
@@ -28,7 +30,7 @@
 //!
 //! fn main() -> Result<(), GpuError> {
 //!     let gpu = match Gpu::open(&GpuOptions::default()) {
-//!         Err(GpuError::NoAdapter) => return Ok(()), // nothing to run on
+//!         Err(GpuError::NoAdapter) => return Ok(()), // this machine has no adapter
 //!         opened => opened?,
 //!     };
 //!     let values = gpu.buffer("values", &[1.0_f32, 2.0, 3.0])?;
@@ -67,5 +69,5 @@ pub use pass::Pass;
 pub use select::Select;
 pub use texture::Texture3d;
 
-/// Threads of a workgroup in every kernel: `@compute @workgroup_size(64)`.
+/// Number of threads of a workgroup. Every kernel has `@compute @workgroup_size(64)`.
 pub const WORKGROUP: usize = 64;

@@ -1,16 +1,16 @@
-//! A compute pass: dispatches and copies in order, submitted at once.
+//! A compute pass: an ordered list of dispatches and copies that is submitted once.
 
 use std::{fmt, ops::Range};
 
 use crate::{BindGroup, Buffer, Gpu, GpuError, Kernel, WORKGROUP, counters::add};
 
-/// Work for the device, recorded in order and submitted once. Each dispatch sees what the ones before it wrote.
-/// Dropped without [`Pass::submit`], it does nothing.
+/// Work for the device, recorded in order and submitted once. Each dispatch sees the results of the
+/// ones before it. A pass that is dropped without [`Pass::submit`] does nothing.
 #[must_use = "a pass does nothing until it is submitted"]
 pub struct Pass<'gpu> {
     gpu: &'gpu Gpu,
     label: String,
-    // Declared before the encoder: it has to end before the encoder goes.
+    // Declared before the encoder, because it must be dropped first.
     open: Option<wgpu::ComputePass<'static>>,
     encoder: Option<wgpu::CommandEncoder>,
     dispatches: u64,
@@ -18,18 +18,18 @@ pub struct Pass<'gpu> {
 }
 
 impl Gpu {
-    /// Begins a pass. Nothing is sent to the device before [`Pass::submit`].
+    /// Starts a pass. Nothing is sent to the device before [`Pass::submit`].
     pub fn pass(&self, label: &str) -> Pass<'_> {
         Pass { gpu: self, label: label.to_owned(), open: None, encoder: None, dispatches: 0, error: None }
     }
 }
 
 impl Pass<'_> {
-    /// Runs a kernel with at least `threads` threads: the number is rounded up to whole workgroups, so a kernel has to
-    /// leave threads alone that have no item. None are started for 0. The groups may stand in any order.
+    /// Runs a kernel with `threads` threads, rounded up to whole workgroups. So a kernel must ignore
+    /// threads beyond its items. For 0 threads nothing runs. The order of the groups does not matter.
     ///
-    /// More threads than [`Gpu::chunk_len`] allows, or bind groups that are not the kernel's, are an error of
-    /// [`Pass::submit`].
+    /// [`Pass::submit`] returns an error for more threads than [`Gpu::chunk_len`] allows and for bind
+    /// groups of another kernel.
     pub fn dispatch(&mut self, kernel: &Kernel, groups: &[&BindGroup], threads: usize) {
         if threads == 0 || self.error.is_some() {
             return;
@@ -52,18 +52,18 @@ impl Pass<'_> {
 
     /// Copies elements of one buffer to another, from element `to_offset` on.
     ///
-    /// A range outside of its buffer, or elements smaller than 4 bytes that do not begin and end on a multiple of 4
-    /// bytes, are an error of [`Pass::submit`]; so is a copy within one buffer.
+    /// [`Pass::submit`] returns an error for a range that exceeds its buffer, for elements of less than
+    /// 4 bytes that do not start and end at a multiple of 4 bytes, and for a copy within one buffer.
     pub fn copy<T>(&mut self, from: &Buffer<T>, from_range: Range<usize>, to: &Buffer<T>, to_offset: usize) {
         if self.error.is_some() {
             return;
         }
         let what = || format!("pass '{}': copying buffer '{}' to '{}'", self.label, from.label, to.label);
-        let spans = from.bytes_of(what, from_range.clone()).and_then(|source| {
+        let ranges = from.bytes_of(what, from_range.clone()).and_then(|source| {
             let target = to.bytes_of(what, to_offset..to_offset.saturating_add(from_range.len()))?;
             Ok((from.words_of(what, &source)?, to.words_of(what, &target)?))
         });
-        match spans {
+        match ranges {
             Err(error) => self.error = Some(error),
             Ok((source, _)) if source.is_empty() => {}
             Ok((source, target)) => {
@@ -74,12 +74,12 @@ impl Pass<'_> {
         }
     }
 
-    /// Sends the work to the device, without waiting for it. A pass with nothing in it is not sent.
+    /// Submits the work to the device without waiting for it. An empty pass is not submitted.
     ///
     /// # Errors
     ///
-    /// The first error of the recording; [`GpuError::Validation`] when the device refuses the work;
-    /// [`GpuError::OutOfMemory`]; [`GpuError::Lost`]. Nothing was run then.
+    /// Returns the first error of the recording, [`GpuError::Validation`] if the device rejects the
+    /// work, [`GpuError::OutOfMemory`] or [`GpuError::Lost`]. In these cases nothing runs.
     pub fn submit(mut self) -> Result<(), GpuError> {
         self.gpu.alive()?;
         if let Some(error) = self.error {
@@ -99,7 +99,7 @@ impl Pass<'_> {
         Ok(())
     }
 
-    /// The open compute pass.
+    /// Returns the open compute pass, or opens one.
     fn compute(&mut self) -> &mut wgpu::ComputePass<'static> {
         let pass = match self.open.take() {
             Some(pass) => pass,

@@ -1,4 +1,4 @@
-//! Reading memory of the device, through one staging buffer that stays.
+//! Readback of device memory through one persistent staging buffer.
 
 use std::{ops::Range, sync::mpsc};
 
@@ -6,23 +6,25 @@ use bytemuck::Pod;
 
 use crate::{Buffer, Gpu, GpuError, buffer::WORD, counters::add, device::lock};
 
-/// The staging buffer grows up to this many bytes; larger reads go in parts.
-const LARGEST: u64 = 32 << 20;
+/// Largest size of the staging buffer in bytes. Larger readbacks are split into parts.
+const MAX_STAGING: u64 = 32 << 20;
 
-/// It starts with this many.
-const SMALLEST: u64 = 64 << 10;
+/// Initial size of the staging buffer in bytes.
+const MIN_STAGING: u64 = 64 << 10;
 
-/// The staging buffer, once something was read.
+/// The staging buffer, created by the first readback.
 #[derive(Default)]
 pub(crate) struct Staging(Option<wgpu::Buffer>);
 
 impl Gpu {
-    /// Reads these elements, after all that was submitted before. Waits for the device: a frame should not need it.
+    /// Reads a range of elements after all submitted work. This waits for the device, so avoid it
+    /// within a frame.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Range`] when the range does not lie within the buffer, [`GpuError::Readback`] when the memory cannot
-    /// be mapped, [`GpuError::Validation`] for a uniform buffer (those cannot be read), [`GpuError::Lost`].
+    /// Returns [`GpuError::Range`] if the range exceeds the buffer, [`GpuError::Readback`] if the
+    /// memory cannot be mapped, [`GpuError::Validation`] for a uniform buffer, which cannot be read,
+    /// and [`GpuError::Lost`].
     pub fn read<T: Pod>(&self, buffer: &Buffer<T>, range: Range<usize>) -> Result<Vec<T>, GpuError> {
         let what = || format!("reading buffer '{}'", buffer.label);
         self.alive()?;
@@ -34,7 +36,7 @@ impl Gpu {
         Ok(elements)
     }
 
-    /// Copies the bytes from `start` on into `into`, part by part.
+    /// Copies the bytes from `start` on into `into`, in parts.
     pub(crate) fn download(
         &self,
         from: &wgpu::Buffer,
@@ -47,7 +49,7 @@ impl Gpu {
         let mut at = start;
         while at < end {
             let first = at - at % WORD;
-            let last = end.next_multiple_of(WORD).min(first + LARGEST);
+            let last = end.next_multiple_of(WORD).min(first + MAX_STAGING);
             let stop = last.min(end);
             let part = &mut into[(at - start) as usize..(stop - start) as usize];
             if let Err(error) =
@@ -61,7 +63,7 @@ impl Gpu {
         Ok(())
     }
 
-    /// Copies whole words `words` of `from`, of which the first `skip` bytes are not wanted, into `into`.
+    /// Copies the whole words `words` of `from` into `into`, without their first `skip` bytes.
     fn download_part(
         &self,
         staging: &mut Staging,
@@ -74,22 +76,22 @@ impl Gpu {
         let size = words.end - words.start;
         let failed = |reason: String| GpuError::Readback { what: format!("buffer '{label}'"), reason };
         let target = self.staging(staging, size)?;
-        let (tell, answer) = mpsc::channel();
-        let sent = self.checked(
+        let (sender, receiver) = mpsc::channel();
+        let submitted = self.checked(
             |fault| fault.of(format!("reading buffer '{label}'"), size),
             || {
                 let mut encoder = self.shared.device.create_command_encoder(&Default::default());
                 encoder.copy_buffer_to_buffer(from, words.start, target, 0, size);
-                let sent = self.shared.queue.submit([encoder.finish()]);
+                let submitted = self.shared.queue.submit([encoder.finish()]);
                 target.map_async(wgpu::MapMode::Read, 0..size, move |mapped| {
-                    let _ = tell.send(mapped);
+                    let _ = sender.send(mapped);
                 });
-                sent
+                submitted
             },
         )?;
-        self.poll(wgpu::PollType::Wait { submission_index: Some(sent), timeout: None })?;
-        // The thread that brings the answer may be another one that polled at the same time, a moment later.
-        match answer.recv() {
+        self.poll(wgpu::PollType::Wait { submission_index: Some(submitted), timeout: None })?;
+        // Another thread that polls at the same time may run the callback a moment later.
+        match receiver.recv() {
             Ok(Ok(())) => {}
             Ok(Err(error)) => return Err(failed(error.to_string())),
             Err(_) => return Err(failed("the device did not answer".to_owned())),
@@ -100,13 +102,13 @@ impl Gpu {
         self.checked(|fault| fault.of(format!("reading buffer '{label}'"), size), || target.unmap())
     }
 
-    /// A staging buffer of at least `size` bytes.
+    /// Returns a staging buffer of at least `size` bytes, up to the largest size.
     fn staging<'a>(&self, staging: &'a mut Staging, size: u64) -> Result<&'a wgpu::Buffer, GpuError> {
         let fitting = staging.0.take().filter(|buffer| buffer.size() >= size);
         let buffer = match fitting {
             Some(buffer) => buffer,
             None => {
-                let size = size.next_power_of_two().clamp(SMALLEST, LARGEST);
+                let size = size.next_power_of_two().clamp(MIN_STAGING, MAX_STAGING);
                 let descriptor = wgpu::BufferDescriptor {
                     label: Some("staging of reads"),
                     size,

@@ -1,27 +1,29 @@
-//! The choice of one adapter: the first, by index or by name.
+//! Selection of an adapter by order, index or name.
 
 use std::{convert::Infallible, fmt, str::FromStr};
 
 use crate::{Adapter, GpuError};
 
-/// Which adapter to open.
+/// The adapter to open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Select {
-    /// The first of [`adapters`](fn@crate::adapters): the best hardware, a software adapter if there is nothing else.
+    /// The first of [`adapters`](fn@crate::adapters): the best hardware, or a software adapter if there
+    /// is no hardware.
     #[default]
     First,
-    /// The adapter with this [`Adapter::index`]; if there is none, the first whose name has this number in it.
+    /// The adapter with this [`Adapter::index`], else the first whose name contains this number.
     Index(usize),
-    /// The first adapter whose name has this part, upper or lower case alike.
+    /// The first adapter whose name contains this text, in upper or lower case.
     Name(String),
 }
 
 impl Select {
-    /// The one of `adapters`, as [`adapters`](fn@crate::adapters) lists them, that is meant.
+    /// Returns the selected adapter of a list from [`adapters`](fn@crate::adapters).
     ///
     /// # Errors
     ///
-    /// [`GpuError::NoAdapter`] if there is none at all, [`GpuError::NoSuchAdapter`] if none of them is meant.
+    /// Returns [`GpuError::NoAdapter`] for an empty list, and [`GpuError::NoSuchAdapter`] if no adapter
+    /// matches.
     pub fn among<'a>(&self, adapters: &'a [Adapter]) -> Result<&'a Adapter, GpuError> {
         if adapters.is_empty() {
             return Err(GpuError::NoAdapter);
@@ -45,8 +47,7 @@ impl Select {
 impl FromStr for Select {
     type Err = Infallible;
 
-    /// A number is an index (or, where there are not so many, a part of a name), `first` is the first, anything else a part of
-    /// a name.
+    /// Parses a selection: `first`, the index of an adapter, or a part of its name.
     fn from_str(text: &str) -> Result<Select, Infallible> {
         let text = text.trim();
         Ok(match text.parse() {
@@ -86,19 +87,19 @@ mod tests {
     }
 
     #[test]
-    fn an_adapter_is_chosen_by_order_index_and_part_of_the_name() {
+    fn an_adapter_is_selected_by_order_index_and_part_of_the_name() {
         let all = [adapter(0, "Fast Card 9000"), adapter(1, "llvmpipe (LLVM)")];
-        let chosen = |text: &str| text.parse::<Select>().unwrap().among(&all).map(|adapter| adapter.index);
-        assert_eq!(chosen("first"), Ok(0));
-        assert_eq!(chosen("1"), Ok(1));
-        assert_eq!(chosen("LLVMPIPE"), Ok(1));
-        assert_eq!(chosen("a"), Ok(0), "the first of several");
-        assert_eq!(chosen("9000"), Ok(0), "no index, but a part of a name");
+        let selected = |text: &str| text.parse::<Select>().unwrap().among(&all).map(|adapter| adapter.index);
+        assert_eq!(selected("first"), Ok(0));
+        assert_eq!(selected("1"), Ok(1));
+        assert_eq!(selected("LLVMPIPE"), Ok(1));
+        assert_eq!(selected("a"), Ok(0), "the first of several matches");
+        assert_eq!(selected("9000"), Ok(0), "not an index, but a part of a name");
         for missing in ["2", "other card"] {
-            let error = chosen(missing).unwrap_err().to_string();
+            let error = selected(missing).unwrap_err().to_string();
             assert_eq!(
                 error,
-                format!("no GPU adapter '{missing}'; there is: 0: Fast Card 9000, 1: llvmpipe (LLVM)")
+                format!("no GPU adapter '{missing}'; expected one of: 0: Fast Card 9000, 1: llvmpipe (LLVM)")
             );
         }
         assert_eq!(Select::Index(0).among(&[]), Err(GpuError::NoAdapter));
@@ -106,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_choice_is_written_as_it_is_read() {
+    fn a_displayed_selection_parses_to_itself() {
         for select in [Select::First, Select::Index(3), Select::Name("radeon".to_owned())] {
             assert_eq!(select.to_string().parse(), Ok(select));
         }

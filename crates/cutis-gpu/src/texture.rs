@@ -8,8 +8,8 @@ use crate::{
     counters::{Memory, add},
 };
 
-/// A volume on the device: signed 16-bit integers, x fastest. A kernel sees it as `texture_3d<i32>` and reads it with
-/// `textureLoad(volume, vec3<i32>(x, y, z), 0)`.
+/// A volume of signed 16-bit integers on the device, with x as the fastest axis. In a kernel it is a
+/// `texture_3d<i32>`, and `textureLoad(volume, vec3<i32>(x, y, z), 0)` reads a voxel.
 pub struct Texture3d {
     view: wgpu::TextureView,
     label: String,
@@ -18,12 +18,13 @@ pub struct Texture3d {
 }
 
 impl Gpu {
-    /// A volume of `shape` = `[nx, ny, nz]` voxels with these values, x fastest.
+    /// Creates a volume of `shape` = `[nx, ny, nz]` voxels with the given values, x fastest.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Limit`] when a side is longer than the device takes, [`GpuError::Validation`] when a side is 0 or
-    /// the number of voxels is not that of the shape, [`GpuError::OutOfMemory`], [`GpuError::Lost`].
+    /// Returns [`GpuError::Limit`] if a side exceeds the device's limit, [`GpuError::Validation`] if a
+    /// side is 0 or the number of values is not that of the shape, [`GpuError::OutOfMemory`], and
+    /// [`GpuError::Lost`].
     pub fn texture_3d(&self, label: &str, shape: [usize; 3], voxels: &[i16]) -> Result<Texture3d, GpuError> {
         let what = || format!("volume '{label}' of {} x {} x {} voxels", shape[0], shape[1], shape[2]);
         self.alive()?;
@@ -33,8 +34,7 @@ impl Gpu {
         }
         let voxel_count = shape.iter().try_fold(1_usize, |count, &side| count.checked_mul(side));
         if voxel_count != Some(voxels.len()) || voxels.is_empty() {
-            let message =
-                format!("{} values given; one per voxel, and at least one voxel, needed", voxels.len());
+            let message = format!("{} values; expected one per voxel, and at least one voxel", voxels.len());
             return Err(GpuError::Validation { what: what(), message });
         }
         let [nx, ny, nz] = shape.map(|side| side as u32); // within max_texture_3d
@@ -84,14 +84,9 @@ impl Gpu {
 }
 
 impl Texture3d {
-    /// The volume, to bind to a kernel.
+    /// Returns a binding of the volume.
     pub fn whole(&self) -> Binding<'_> {
         Binding::texture(&self.view, &self.memory)
-    }
-
-    /// Voxels along x, y and z.
-    pub fn shape(&self) -> [usize; 3] {
-        self.shape
     }
 }
 

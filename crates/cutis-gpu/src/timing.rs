@@ -1,14 +1,14 @@
-//! Timestamps of the last pass.
+//! Device time of the last pass, by timestamps.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::{Gpu, GpuError};
 
-/// Two timestamps: the begin of a pass and its end.
+/// Number of timestamps: the start of a pass and its end.
 const STAMPS: u32 = 2;
 const BYTES: u64 = STAMPS as u64 * size_of::<u64>() as u64;
 
-/// Where the device leaves the timestamps of the last submitted pass.
+/// Timestamps of the last submitted pass on the device.
 pub(crate) struct Timing {
     stamps: wgpu::QuerySet,
     resolved: wgpu::Buffer,
@@ -35,8 +35,8 @@ impl Timing {
         }
     }
 
-    /// What a compute pass writes: a pass that copies interrupt is several, of which the first stamps the begin and
-    /// each the end, so that the last one's end stays.
+    /// Returns the timestamps that a compute pass writes. Copies split a pass into several compute
+    /// passes. The first one writes the start, and each one overwrites the end.
     pub(crate) fn writes(&self, first: bool) -> wgpu::ComputePassTimestampWrites<'_> {
         wgpu::ComputePassTimestampWrites {
             query_set: &self.stamps,
@@ -45,7 +45,7 @@ impl Timing {
         }
     }
 
-    /// Keeps the timestamps, if the pass has any.
+    /// Stores the timestamps if the pass has any.
     pub(crate) fn resolve(&self, encoder: &mut wgpu::CommandEncoder, any: bool) {
         if any {
             encoder.resolve_query_set(&self.stamps, 0..STAMPS, &self.resolved, 0);
@@ -55,13 +55,14 @@ impl Timing {
 }
 
 impl Gpu {
-    /// Nanoseconds that the device took from the begin of the first dispatch to the end of the last one of the last
-    /// submitted pass. None when timestamps were not asked for, the adapter has none, or nothing was dispatched. Waits
-    /// for the device; not counted as a readback.
+    /// Returns the device time of the last submitted pass in nanoseconds, from the start of its first
+    /// dispatch to the end of its last. `None` if [`GpuOptions::timestamps`](crate::GpuOptions) is off,
+    /// the adapter does not support timestamps, or the pass had no dispatch. Waits for the device and
+    /// does not count as a readback.
     ///
     /// # Errors
     ///
-    /// [`GpuError::Readback`], [`GpuError::Lost`].
+    /// Returns [`GpuError::Readback`] or [`GpuError::Lost`].
     pub fn last_pass_ns(&self) -> Result<Option<u64>, GpuError> {
         self.alive()?;
         let Some(timing) = self.shared.timing.as_ref().filter(|timing| timing.any.load(Ordering::Relaxed))

@@ -1,32 +1,32 @@
-//! Kernels compute what they say, on every adapter.
+//! Results of kernels.
 
-mod common;
-
-use common::{DOUBLE, doubled, on_every_adapter, with_options};
 use cutis_gpu::{Gpu, GpuOptions};
+use cutis_test_kit::gpu::{on_each_adapter, on_each_adapter_with};
+
+use crate::{DOUBLE, doubled};
 
 const NUMBERS: [f32; 5] = [1.0, -2.5, 0.0, 3.25e7, 1.0e-30];
 
 #[test]
 fn a_kernel_doubles_numbers() {
-    on_every_adapter(|gpu| {
-        assert_eq!(doubled(&gpu, &NUMBERS), NUMBERS.map(|number| 2.0 * number));
-        assert_ne!(doubled(&gpu, &NUMBERS), NUMBERS);
+    on_each_adapter(|gpu| {
+        assert_eq!(doubled(gpu, &NUMBERS), NUMBERS.map(|number| 2.0 * number));
+        assert_ne!(doubled(gpu, &NUMBERS), NUMBERS);
     });
 }
 
 #[test]
-fn several_workgroups_and_a_part_of_one_are_all_done() {
-    on_every_adapter(|gpu| {
+fn a_dispatch_covers_several_workgroups_and_a_part_of_one() {
+    on_each_adapter(|gpu| {
         let numbers: Vec<f32> = (0..1000).map(|i| i as f32).collect();
         let expected: Vec<f32> = numbers.iter().map(|number| 2.0 * number).collect();
-        assert_eq!(doubled(&gpu, &numbers), expected);
+        assert_eq!(doubled(gpu, &numbers), expected);
     });
 }
 
 #[test]
 fn a_pass_runs_in_order_with_copies_between() {
-    on_every_adapter(|gpu| {
+    on_each_adapter(|gpu| {
         let from = gpu.buffer("from", &[1.0_f32, 2.0, 3.0, 4.0]).unwrap();
         let to = gpu.zeroed::<f32>("to", 4).unwrap();
         let kernel = gpu.kernel("double", DOUBLE, "double").unwrap();
@@ -44,8 +44,8 @@ fn a_pass_runs_in_order_with_copies_between() {
 }
 
 #[test]
-fn a_part_of_a_buffer_is_bound() {
-    on_every_adapter(|gpu| {
+fn a_kernel_writes_only_the_bound_part_of_a_buffer() {
+    on_each_adapter(|gpu| {
         let values = gpu.buffer("values", &[1.0_f32; 130]).unwrap();
         let kernel = gpu.kernel("double", DOUBLE, "double").unwrap();
         let group = gpu.bind(&kernel, 0, &[(0, values.range(64..128))]).unwrap();
@@ -70,18 +70,17 @@ fn a_kernel_reads_a_volume() {
             let at = vec3<u32>(id.x % params.nx, (id.x / params.nx) % params.ny, id.x / (params.nx * params.ny));
             out[id.x] = textureLoad(volume, at, 0).x + params.offset;
         }";
-    on_every_adapter(|gpu| {
+    on_each_adapter(|gpu| {
         let shape = [7, 5, 3];
         let voxels: Vec<i16> = (0..105).map(|i| (i * 611 - 32_000) as i16).collect();
         let volume = gpu.texture_3d("volume", shape, &voxels).unwrap();
-        assert_eq!(volume.shape(), shape);
         let out = gpu.zeroed::<i32>("out", voxels.len()).unwrap();
         let params = gpu.uniform("params", &[7, 5, 3, -1000]).unwrap();
         let kernel = gpu.kernel("shift", SUM, "shift").unwrap();
         let data = gpu.bind(&kernel, 0, &[(0, volume.whole()), (1, out.whole())]).unwrap();
         let settings = gpu.bind(&kernel, 1, &[(0, params.whole())]).unwrap();
         let mut pass = gpu.pass("shift");
-        pass.dispatch(&kernel, &[&settings, &data], voxels.len()); // groups in any order
+        pass.dispatch(&kernel, &[&settings, &data], voxels.len()); // the order of groups does not matter
         pass.submit().unwrap();
         let expected: Vec<i32> = voxels.iter().map(|&voxel| i32::from(voxel) - 1000).collect();
         assert_eq!(gpu.read(&out, 0..voxels.len()).unwrap(), expected);
@@ -89,19 +88,19 @@ fn a_kernel_reads_a_volume() {
 }
 
 #[test]
-fn the_baseline_computes_the_same() {
-    with_options(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
+fn baseline_limits_give_the_same_results() {
+    on_each_adapter_with(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
         assert_eq!(gpu.limits().max_buffer_bytes, 256 << 20);
         assert_eq!(gpu.limits().max_binding_bytes, 128 << 20);
         assert_eq!(gpu.limits().max_workgroups, 65_535);
         assert_eq!(gpu.limits().storage_buffers_per_stage, 8);
-        assert_eq!(doubled(&gpu, &NUMBERS), NUMBERS.map(|number| 2.0 * number));
+        assert_eq!(doubled(gpu, &NUMBERS), NUMBERS.map(|number| 2.0 * number));
     });
 }
 
 #[test]
-fn two_devices_and_two_threads_work_at_once() {
-    on_every_adapter(|gpu| {
+fn devices_and_threads_work_in_parallel() {
+    on_each_adapter(|gpu| {
         let options =
             GpuOptions { select: cutis_gpu::Select::Index(gpu.adapter().index), ..GpuOptions::default() };
         let second = Gpu::open(&options).unwrap();
@@ -120,10 +119,10 @@ fn two_devices_and_two_threads_work_at_once() {
     });
 }
 
-/// Any thread that waits for the device may be the one that is told that another one's read is ready.
+/// A thread that waits for the device may run the callback of another thread's read.
 #[test]
-fn reads_are_answered_while_other_threads_wait_for_the_device() {
-    on_every_adapter(|gpu| {
+fn reads_complete_while_other_threads_wait_for_the_device() {
+    on_each_adapter(|gpu| {
         let buffers = [1_u32, 2].map(|value| gpu.buffer("values", &[value; 16]).unwrap());
         let done = std::sync::atomic::AtomicUsize::new(0);
         let (gpu, done) = (&gpu, &done);
@@ -148,18 +147,18 @@ fn reads_are_answered_while_other_threads_wait_for_the_device() {
 }
 
 #[test]
-fn passes_are_timed_where_the_adapter_can() {
-    with_options(&GpuOptions { timestamps: true, ..GpuOptions::default() }, |gpu| {
+fn passes_are_timed_if_the_adapter_supports_it() {
+    on_each_adapter_with(&GpuOptions { timestamps: true, ..GpuOptions::default() }, |gpu| {
         assert_eq!(gpu.last_pass_ns(), Ok(None));
-        doubled(&gpu, &NUMBERS);
+        doubled(gpu, &NUMBERS);
         let readbacks = gpu.counters().readbacks;
         let time = gpu.last_pass_ns().unwrap();
         assert_eq!(time.is_some(), gpu.adapter().timestamps);
         assert_eq!(gpu.counters().readbacks, readbacks);
         assert!(time.is_none_or(|ns| ns < 60_000_000_000), "{time:?} ns");
     });
-    on_every_adapter(|gpu| {
-        doubled(&gpu, &NUMBERS);
-        assert_eq!(gpu.last_pass_ns(), Ok(None), "not asked for");
+    on_each_adapter(|gpu| {
+        doubled(gpu, &NUMBERS);
+        assert_eq!(gpu.last_pass_ns(), Ok(None), "timestamps are off");
     });
 }

@@ -1,12 +1,12 @@
-//! What goes wrong is told as a typed error, and the device goes on.
+//! Failures are typed errors, and the device continues to work.
 
-mod common;
-
-use common::{DOUBLE, doubled, on_every_adapter, with_options};
 use cutis_gpu::{Gpu, GpuError, GpuOptions, Select, adapters};
+use cutis_test_kit::gpu::{on_each_adapter, on_each_adapter_with};
 
-/// The message of a kernel that is refused.
-fn refusal(gpu: &Gpu, wgsl: &str) -> String {
+use crate::{DOUBLE, doubled};
+
+/// Returns the message of an invalid kernel.
+fn shader_error(gpu: &Gpu, wgsl: &str) -> String {
     match gpu.kernel("label", wgsl, "main") {
         Err(GpuError::Shader { label, message }) => {
             assert_eq!(label, "label");
@@ -17,66 +17,66 @@ fn refusal(gpu: &Gpu, wgsl: &str) -> String {
 }
 
 #[test]
-fn bad_wgsl_is_refused_with_the_compilers_message() {
-    on_every_adapter(|gpu| {
-        let syntax = refusal(&gpu, "@compute @workgroup_size(64)\nfn main() { let x = ; }");
+fn invalid_wgsl_returns_the_compilers_message() {
+    on_each_adapter(|gpu| {
+        let syntax = shader_error(gpu, "@compute @workgroup_size(64)\nfn main() { let x = ; }");
         assert!(syntax.contains("expected expression") && syntax.contains("wgsl:2:"), "{syntax}");
-        let types = refusal(&gpu, "@compute @workgroup_size(64)\nfn main() { let x: u32 = 1.5; }");
+        let types = shader_error(gpu, "@compute @workgroup_size(64)\nfn main() { let x: u32 = 1.5; }");
         assert!(types.contains("u32"), "{types}");
-        let entry = refusal(&gpu, DOUBLE);
-        assert_eq!(entry, "no entry point 'main'; there is: double");
-        let width = refusal(&gpu, "@compute @workgroup_size(32)\nfn main() {}");
+        let entry = shader_error(gpu, DOUBLE);
+        assert_eq!(entry, "no entry point 'main'; expected one of: double");
+        let width = shader_error(gpu, "@compute @workgroup_size(32)\nfn main() {}");
         assert!(width.contains("32 x 1 x 1") && width.contains("@workgroup_size(64)"), "{width}");
-        let stage = refusal(&gpu, "@fragment\nfn main() {}");
+        let stage = shader_error(gpu, "@fragment\nfn main() {}");
         assert!(stage.contains("must be @compute"), "{stage}");
-        let clash = refusal(
-            &gpu,
+        let clash = shader_error(
+            gpu,
             "@group(0) @binding(0) var<storage, read_write> a: array<f32>;
              @group(0) @binding(0) var<storage, read_write> b: array<f32>;
              @compute @workgroup_size(64) fn main() { a[0] = b[0]; }",
         );
         assert!(clash.contains("binding") || clash.contains("Binding"), "{clash}");
         assert_eq!(gpu.counters().kernels, 0);
-        assert_eq!(doubled(&gpu, &[4.0]), [8.0], "the device goes on");
+        assert_eq!(doubled(gpu, &[4.0]), [8.0], "the device still works");
     });
 }
 
 #[test]
-fn the_baseline_refuses_a_kernel_with_nine_storage_buffers() {
+fn the_baseline_rejects_a_kernel_with_nine_storage_buffers() {
     let source = |count: usize| {
         let declare = |i| format!("@group(0) @binding({i}) var<storage, read_write> b{i}: array<f32>;");
         let declared: String = (0..count).map(declare).collect();
         let used: String = (0..count).map(|i| format!("b{i}[0] = 1.0;")).collect();
         format!("{declared} @compute @workgroup_size(64) fn main() {{ {used} }}")
     };
-    with_options(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
+    on_each_adapter_with(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
         assert!(gpu.kernel("eight", &source(8), "main").is_ok());
-        let message = refusal(&gpu, &source(9));
+        let message = shader_error(gpu, &source(9));
         assert!(message.contains("StorageBuffers") || message.contains("storage"), "{message}");
     });
 }
 
 #[test]
-fn bindings_that_are_not_the_kernels_are_refused() {
-    on_every_adapter(|gpu| {
+fn bindings_of_another_kernel_are_rejected() {
+    on_each_adapter(|gpu| {
         let values = gpu.buffer("values", &[1.0_f32; 256]).unwrap();
         let params = gpu.uniform("params", &1_u32).unwrap();
         let volume = gpu.texture_3d("volume", [1, 1, 1], &[0]).unwrap();
         let kernel = gpu.kernel("double", DOUBLE, "double").unwrap();
-        let refused = |group, bindings: &[_]| match gpu.bind(&kernel, group, bindings) {
+        let assert_rejected = |group, bindings: &[_]| match gpu.bind(&kernel, group, bindings) {
             Err(GpuError::Validation { what, message }) => {
                 assert!(what.contains("kernel 'double'"), "{what}");
                 assert!(!message.is_empty() && !message.starts_with("Validation Error"), "{message}");
             }
             other => panic!("{other:?}"),
         };
-        refused(0, &[(1, values.whole())]);
-        refused(0, &[]);
-        refused(0, &[(0, values.whole()), (1, values.whole())]);
-        refused(0, &[(0, params.whole())]);
-        refused(0, &[(0, volume.whole())]);
-        refused(1, &[(0, values.whole())]);
-        refused(u32::MAX, &[]);
+        assert_rejected(0, &[(1, values.whole())]);
+        assert_rejected(0, &[]);
+        assert_rejected(0, &[(0, values.whole()), (1, values.whole())]);
+        assert_rejected(0, &[(0, params.whole())]);
+        assert_rejected(0, &[(0, volume.whole())]);
+        assert_rejected(1, &[(0, values.whole())]);
+        assert_rejected(u32::MAX, &[]);
         let misplaced = gpu.bind(&kernel, 0, &[(0, values.range(1..2))]);
         assert!(matches!(misplaced, Err(GpuError::Alignment { offset: 4, multiple: 256, .. })));
         assert!(gpu.bind(&kernel, 0, &[(0, values.whole())]).is_ok());
@@ -84,8 +84,8 @@ fn bindings_that_are_not_the_kernels_are_refused() {
 }
 
 #[test]
-fn a_binding_larger_than_the_device_takes_is_refused() {
-    with_options(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
+fn a_binding_beyond_the_limit_is_rejected() {
+    on_each_adapter_with(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
         let large = gpu.zeroed::<u32>("large", (128 << 20) / 4 + 1).unwrap();
         let kernel = gpu.kernel("double", DOUBLE, "double").unwrap();
         let bound = gpu.bind(&kernel, 0, &[(0, large.whole())]);
@@ -95,12 +95,12 @@ fn a_binding_larger_than_the_device_takes_is_refused() {
 }
 
 #[test]
-fn a_pass_with_something_wrong_in_it_is_refused_and_nothing_runs() {
-    on_every_adapter(|gpu| {
+fn an_invalid_pass_is_rejected_and_nothing_runs() {
+    on_each_adapter(|gpu| {
         let values = gpu.buffer("values", &[1.0_f32; 4]).unwrap();
         let kernel = gpu.kernel("double", DOUBLE, "double").unwrap();
         let group = gpu.bind(&kernel, 0, &[(0, values.whole())]).unwrap();
-        let refused = |pass: cutis_gpu::Pass<'_>| match pass.submit() {
+        let assert_rejected = |pass: cutis_gpu::Pass<'_>| match pass.submit() {
             Err(GpuError::Validation { what, .. }) => assert!(what.contains("pass 'wrong'"), "{what}"),
             other => panic!("{other:?}"),
         };
@@ -108,26 +108,26 @@ fn a_pass_with_something_wrong_in_it_is_refused_and_nothing_runs() {
         pass.dispatch(&kernel, &[&group], 4);
         pass.dispatch(&kernel, &[], 4);
         pass.copy(&values, 0..1, &values, 2);
-        refused(pass);
+        assert_rejected(pass);
 
         let twin = gpu.kernel("twin", DOUBLE, "double").unwrap();
         let mut pass = gpu.pass("wrong");
         pass.dispatch(&twin, &[&group], 4); // a bind group of another kernel
-        refused(pass);
+        assert_rejected(pass);
 
         let mut pass = gpu.pass("wrong");
         pass.copy(&values, 0..1, &values, 2); // within one buffer
-        refused(pass);
+        assert_rejected(pass);
 
         assert_eq!(gpu.counters().submits, 0);
         assert_eq!(gpu.read(&values, 0..4).unwrap(), [1.0; 4]);
-        assert_eq!(doubled(&gpu, &[4.0]), [8.0], "the device goes on");
+        assert_eq!(doubled(gpu, &[4.0]), [8.0], "the device still works");
     });
 }
 
 #[test]
-fn what_belongs_to_another_device_is_refused() {
-    on_every_adapter(|gpu| {
+fn resources_of_another_device_are_rejected() {
+    on_each_adapter(|gpu| {
         let options = GpuOptions { select: Select::Index(gpu.adapter().index), ..GpuOptions::default() };
         let other = Gpu::open(&options).unwrap();
         let foreign = other.buffer("foreign", &[1.0_f32; 4]).unwrap();
@@ -141,19 +141,19 @@ fn what_belongs_to_another_device_is_refused() {
         pass.dispatch(&foreign_kernel, &[&foreign_group], 4);
         assert!(matches!(pass.submit(), Err(GpuError::Validation { .. })));
         assert_eq!(other.read(&foreign, 0..4).unwrap(), [1.0; 4]);
-        assert_eq!(doubled(&gpu, &[4.0]), [8.0]);
+        assert_eq!(doubled(gpu, &[4.0]), [8.0]);
     });
 }
 
 #[test]
 fn a_uniform_is_not_read_and_not_larger_than_it_may_be() {
-    on_every_adapter(|gpu| {
+    on_each_adapter(|gpu| {
         let params = gpu.uniform("params", &[1_u32, 2]).unwrap();
         gpu.write(&params, 0, &[[3, 4]]).unwrap();
         assert!(matches!(gpu.read(&params, 0..1), Err(GpuError::Validation { .. })));
-        assert_eq!(doubled(&gpu, &[4.0]), [8.0], "the next read works");
+        assert_eq!(doubled(gpu, &[4.0]), [8.0], "the next read works");
     });
-    with_options(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
+    on_each_adapter_with(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
         assert!(gpu.uniform("fits", &[0_u8; 65_536]).is_ok());
         assert!(matches!(
             gpu.uniform("large", &[[0_u8; 65_536]; 2]),
@@ -163,9 +163,9 @@ fn a_uniform_is_not_read_and_not_larger_than_it_may_be() {
 }
 
 #[test]
-fn a_lost_device_is_told_by_every_call() {
+fn every_call_reports_a_lost_device() {
     let timed = GpuOptions { timestamps: true, ..GpuOptions::default() };
-    with_options(&timed, |gpu| {
+    on_each_adapter_with(&timed, |gpu| {
         let lost = |error: GpuError| match error {
             GpuError::Lost { adapter, reason } => {
                 assert_eq!(adapter, gpu.adapter().name);
@@ -179,11 +179,11 @@ fn a_lost_device_is_told_by_every_call() {
         let group = gpu.bind(&kernel, 0, &[(0, values.whole())]).unwrap();
         let mut begun = gpu.pass("begun before");
         begun.dispatch(&kernel, &[&group], 4);
-        let in_flight = doubled(&gpu, &[1.0]);
+        let in_flight = doubled(gpu, &[1.0]);
         assert_eq!(in_flight, [2.0]);
 
         gpu.lose();
-        gpu.lose(); // twice does no harm
+        gpu.lose(); // a second call has no effect
         begun.dispatch(&kernel, &[&group], 4);
         begun.copy(&values, 0..1, &values, 1);
         lost(begun.submit().unwrap_err());
@@ -214,19 +214,19 @@ fn a_lost_device_is_told_by_every_call() {
 
 #[test]
 fn a_device_may_be_lost_while_other_threads_use_it() {
-    on_every_adapter(|gpu| {
+    on_each_adapter(|gpu| {
         let values = gpu.buffer("values", &vec![1.0_f32; 1 << 20]).unwrap();
-        let (tell, heard) = std::sync::mpsc::channel();
+        let (sender, receiver) = std::sync::mpsc::channel();
         std::thread::scope(|scope| {
             for _ in 0..3 {
-                let (gpu, values, tell) = (gpu.clone(), &values, tell.clone());
+                let (gpu, values, sender) = (gpu.clone(), &values, sender.clone());
                 scope.spawn(move || {
                     let error = loop {
                         match gpu.read(values, 0..values.len()) {
                             Ok(read) => assert!(read.iter().all(|&value| value == 1.0)),
                             Err(error) => break error,
                         }
-                        let _ = tell.send(());
+                        let _ = sender.send(());
                         if let Err(error) = gpu.write(values, 0, &[1.0]) {
                             break error;
                         }
@@ -234,15 +234,15 @@ fn a_device_may_be_lost_while_other_threads_use_it() {
                     assert!(matches!(error, GpuError::Lost { .. }), "{error}");
                 });
             }
-            heard.iter().take(10).for_each(drop); // all of them are at work
+            receiver.iter().take(10).for_each(drop); // all threads have started
             gpu.lose();
         });
     });
 }
 
 #[test]
-fn a_new_device_works_after_one_was_lost() {
-    on_every_adapter(|gpu| {
+fn a_new_device_works_after_the_loss_of_another() {
+    on_each_adapter(|gpu| {
         gpu.lose();
         let options = GpuOptions { select: Select::Index(gpu.adapter().index), ..GpuOptions::default() };
         assert_eq!(doubled(&Gpu::open(&options).unwrap(), &[4.0]), [8.0]);
@@ -250,7 +250,7 @@ fn a_new_device_works_after_one_was_lost() {
 }
 
 #[test]
-fn adapters_are_listed_once_in_order_and_opened_by_name() {
+fn adapters_are_listed_once_in_order_and_open_by_name() {
     let all = adapters();
     assert_eq!(all, adapters(), "the order is stable");
     for (index, adapter) in all.iter().enumerate() {
@@ -274,7 +274,7 @@ fn adapters_are_listed_once_in_order_and_opened_by_name() {
     }
 }
 
-/// Runs this test again in a process that finds no driver.
+/// Runs this test again in a child process without a driver.
 #[cfg(target_os = "linux")]
 #[test]
 fn without_a_driver_the_message_says_what_to_install() {
@@ -287,7 +287,7 @@ fn without_a_driver_the_message_says_what_to_install() {
         return;
     }
     let child = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "without_a_driver_the_message_says_what_to_install"])
+        .args(["--exact", "errors::without_a_driver_the_message_says_what_to_install"])
         .env(CHILD, "1")
         .env("VK_DRIVER_FILES", "/nonexistent")
         .env("VK_ICD_FILENAMES", "/nonexistent")

@@ -1,15 +1,15 @@
-//! Data on the device: round trips, padding, parts, limits and counts.
-
-mod common;
+//! Data on the device: round trips, padding, parts, limits and counters.
 
 use std::ops::Range;
 
-use common::{DOUBLE, on_every_adapter, with_options};
 use cutis_gpu::{Counters, Gpu, GpuError, GpuOptions};
+use cutis_test_kit::gpu::{on_each_adapter, on_each_adapter_with};
+
+use crate::DOUBLE;
 
 #[test]
-fn what_was_written_is_read() {
-    on_every_adapter(|gpu| {
+fn reads_return_written_data() {
+    on_each_adapter(|gpu| {
         let numbers: Vec<[f32; 4]> = (0..1000).map(|i| [i as f32, -0.0, f32::INFINITY, 1.5]).collect();
         let buffer = gpu.buffer("numbers", &numbers).unwrap();
         assert_eq!((buffer.len(), buffer.bytes()), (1000, 16_000));
@@ -23,8 +23,8 @@ fn what_was_written_is_read() {
 }
 
 #[test]
-fn an_empty_buffer_has_memory_to_bind_but_no_elements() {
-    on_every_adapter(|gpu| {
+fn an_empty_buffer_can_be_bound() {
+    on_each_adapter(|gpu| {
         let empty = gpu.buffer::<[f32; 4]>("empty", &[]).unwrap();
         assert!(empty.is_empty());
         assert_eq!(empty.bytes(), 16);
@@ -39,8 +39,8 @@ fn an_empty_buffer_has_memory_to_bind_but_no_elements() {
 }
 
 #[test]
-fn small_elements_are_read_anywhere_and_written_on_words() {
-    on_every_adapter(|gpu| {
+fn small_elements_can_be_read_anywhere_but_written_only_in_words() {
+    on_each_adapter(|gpu| {
         let voxels: Vec<i16> = (0..7).map(|i| 100 - 50 * i).collect();
         let buffer = gpu.buffer("voxels", &voxels).unwrap();
         assert_eq!((buffer.len(), buffer.bytes()), (7, 16));
@@ -71,8 +71,8 @@ fn small_elements_are_read_anywhere_and_written_on_words() {
 }
 
 #[test]
-fn large_data_go_up_and_down_in_parts() {
-    on_every_adapter(|gpu| {
+fn large_data_are_transferred_in_parts() {
+    on_each_adapter(|gpu| {
         let voxels: Vec<i16> = (0..18_000_001).map(|i| (i * 7 % 60_013 - 30_000) as i16).collect();
         let buffer = gpu.buffer("voxels", &voxels).unwrap();
         for range in [0..1, 0..voxels.len(), 3..voxels.len(), 1..voxels.len() - 2] {
@@ -84,8 +84,8 @@ fn large_data_go_up_and_down_in_parts() {
 }
 
 #[test]
-fn a_large_volume_goes_up_in_parts() {
-    // Three voxels a thread, so that one dispatch within the baseline sees all of them.
+fn a_large_volume_is_uploaded_in_parts() {
+    // Each thread reads three voxels, so that one dispatch within the baseline covers all of them.
     const COUNT: &str = "
         @group(0) @binding(0) var volume: texture_3d<i32>;
         @group(0) @binding(1) var<storage, read_write> differing: atomic<u32>;
@@ -97,7 +97,7 @@ fn a_large_volume_goes_up_in_parts() {
                 if textureLoad(volume, at, 0).x != i32((i * 7u) % 60013u) - 30000 { atomicAdd(&differing, 1u); }
             }
         }";
-    with_options(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
+    on_each_adapter_with(&GpuOptions { baseline_limits: true, ..GpuOptions::default() }, |gpu| {
         let shape: [usize; 3] = [251, 129, 272]; // 17.6 MB: more than one part of the upload
         let count: usize = shape.iter().product();
         let mut voxels: Vec<i16> = (0..count).map(|i| ((i * 7 % 60_013) as i32 - 30_000) as i16).collect();
@@ -118,8 +118,8 @@ fn a_large_volume_goes_up_in_parts() {
 }
 
 #[test]
-fn absurd_sizes_are_refused_before_memory_is_asked_for() {
-    on_every_adapter(|gpu| {
+fn sizes_beyond_the_limits_are_rejected_before_allocation() {
+    on_each_adapter(|gpu| {
         let most = gpu.limits().max_buffer_bytes;
         for len in [usize::MAX, usize::MAX / 8, most as usize / 8 + 1] {
             match gpu.zeroed::<u64>("absurd", len) {
@@ -144,16 +144,16 @@ fn absurd_sizes_are_refused_before_memory_is_asked_for() {
                 "{shape:?}"
             );
         }
-        assert_eq!(gpu.counters(), Counters::default(), "nothing was made");
+        assert_eq!(gpu.counters(), Counters::default(), "nothing was created");
     });
 }
 
 #[test]
-fn ranges_outside_of_a_buffer_are_refused() {
-    on_every_adapter(|gpu| {
+fn ranges_outside_of_a_buffer_are_rejected() {
+    on_each_adapter(|gpu| {
         let buffer = gpu.buffer("four", &[1_u32, 2, 3, 4]).unwrap();
         let other = gpu.zeroed::<u32>("two", 2).unwrap();
-        #[allow(clippy::reversed_empty_ranges, reason = "that is the point")]
+        #[allow(clippy::reversed_empty_ranges, reason = "the test needs invalid ranges")]
         let outside: [Range<usize>; 4] = [0..5, 3..2, 5..5, usize::MAX - 1..usize::MAX];
         for range in outside {
             let error = gpu.read(&buffer, range.clone()).unwrap_err();
@@ -176,8 +176,8 @@ fn ranges_outside_of_a_buffer_are_refused() {
 }
 
 #[test]
-fn the_counters_count() {
-    on_every_adapter(|gpu| {
+fn counters_report_work_and_memory() {
+    on_each_adapter(|gpu| {
         let kernel = gpu.kernel("double", DOUBLE, "double").unwrap();
         let values = gpu.buffer("values", &[1.0_f32; 100]).unwrap();
         let before = gpu.counters();
@@ -217,19 +217,19 @@ fn the_counters_count() {
 }
 
 #[test]
-fn a_chunk_is_what_one_dispatch_and_one_binding_take() {
+fn a_chunk_fits_one_dispatch_and_one_binding() {
     let baseline = GpuOptions { baseline_limits: true, ..GpuOptions::default() };
     let lengths = |gpu: &Gpu| [0, 4, 16, 64, usize::MAX].map(|bytes| gpu.chunk_len(bytes));
-    with_options(&baseline, |gpu| {
+    on_each_adapter_with(&baseline, |gpu| {
         let threads = 65_535 * 64;
-        assert_eq!(lengths(&gpu), [threads, threads, threads, (128 << 20) / 64, 1]);
+        assert_eq!(lengths(gpu), [threads, threads, threads, (128 << 20) / 64, 1]);
     });
     for (cap, expected) in [(3, 3), (0, 1)] {
-        with_options(&GpuOptions { chunk_cap: Some(cap), ..baseline.clone() }, |gpu| {
-            assert_eq!(lengths(&gpu), [expected, expected, expected, expected, 1]);
+        on_each_adapter_with(&GpuOptions { chunk_cap: Some(cap), ..baseline.clone() }, |gpu| {
+            assert_eq!(lengths(gpu), [expected, expected, expected, expected, 1]);
         });
     }
-    with_options(&baseline, |gpu| {
+    on_each_adapter_with(&baseline, |gpu| {
         let values = gpu.buffer("values", &[1.0_f32]).unwrap();
         let kernel = gpu.kernel("double", DOUBLE, "double").unwrap();
         let group = gpu.bind(&kernel, 0, &[(0, values.whole())]).unwrap();
