@@ -1,15 +1,15 @@
-//! ChainMail's relaxation.
+//! The relaxation of the ChainMail model.
 
 use crate::link;
 
-/// The name of the entry point of [`relax`].
+/// Name of the entry point of [`relax`].
 pub const RELAX: &str = "relax";
-/// Words of a sweep in the buffer that counts moves.
+/// Number of words of a sweep in the buffer that counts moved elements.
 pub const SWEEP_WORDS: usize = 64;
-/// How many of them count: one for each coordinate and each half of a sweep, `2 · coordinate + odd`.
+/// Number of words in use: one per coordinate and parity, with the index `2 · coordinate + odd`.
 pub const SWEEP_HALVES: usize = 6;
 
-/// One coordinate of half the elements of a slab.
+/// Returns the source that relaxes one coordinate of the elements of one parity in a slab.
 pub fn relax() -> String {
     link(&[include_str!("../wgsl/chainmail/relax.wgsl")])
 }

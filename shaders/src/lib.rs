@@ -1,7 +1,7 @@
-//! The WGSL of Cutis, as text: parts of shaders, joined by plain concatenation.
+//! The WGSL sources of Cutis, as text: parts of shaders, joined by concatenation.
 //!
-//! There is no build script and no preprocessor. A shader is [`link`]ed from parts that lie in `wgsl/`; a variant is another
-//! choice of parts, not a condition inside one.
+//! There is no build script and no preprocessor. [`link`] joins a shader from parts in `wgsl/`. A
+//! variant is another selection of parts, without conditions inside a part.
 #![forbid(unsafe_code)]
 
 pub mod chainmail;
@@ -10,7 +10,7 @@ pub mod render;
 pub mod resample;
 pub mod solver;
 
-/// Joins parts to one source, in order, each beginning on a line of its own.
+/// Joins parts to one source, in order. Each part starts on a new line.
 pub fn link(parts: &[&str]) -> String {
     let mut source = String::with_capacity(parts.iter().map(|part| part.len() + 1).sum());
     for part in parts {

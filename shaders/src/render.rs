@@ -1,33 +1,37 @@
-//! Ray marching: the largest HU per block of a volume, and the light along rays, for skin alone or with wounds.
+//! Ray marching: the largest HU per block of a volume, and the light along rays, with or without
+//! wounds.
 
 use crate::link;
 
 const FIELD: &str = include_str!("../wgsl/render/field.wgsl");
 const BLOCK: &str = include_str!("../wgsl/render/block.wgsl");
 
-/// The name of the entry point of [`largest_per_block`].
+/// Name of the entry point of [`largest_per_block`].
 pub const LARGEST_PER_BLOCK: &str = "largest_per_block";
-/// The name of the entry point of [`raymarch`].
+/// Name of the entry point of [`raymarch`].
 pub const RAYMARCH: &str = "raymarch";
-/// Bytes of the uniform `View` that [`raymarch`] reads.
+/// Size in bytes of the uniform `View` that [`raymarch`] reads.
 pub const VIEW_BYTES: usize = 848;
 
-/// How a surface point gets its color.
+/// The color of surface points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Albedo {
-    /// All surface is skin.
+    /// The whole surface is skin.
     Skin,
-    /// Tissue by HU where a depth volume, binding 6, says that the surface was deep.
+    /// Tissue by HU where the surface was deep inside the body, according to a depth volume at
+    /// binding 6.
     Wound,
 }
 
-/// The largest HU of each block. Group 0: 0 the volume, 1 its slope and intercept, 2 the blocks.
+/// Returns the source that computes the largest HU of each block. Bindings of group 0: 0 the
+/// volume, 1 its slope and intercept, 2 the blocks.
 pub fn largest_per_block() -> String {
     link(&[FIELD, BLOCK, include_str!("../wgsl/render/largest.wgsl")])
 }
 
-/// Light along rays. Group 0: 0 and 1 as for [`largest_per_block`], 2 the view, 3 the blocks, 4 the rays, 5 what they found,
-/// 6 the depth volume for [`Albedo::Wound`].
+/// Returns the source that computes the light along rays. Bindings of group 0: 0 and 1 as for
+/// [`largest_per_block`], 2 the view, 3 the blocks, 4 the rays, 5 the results, and 6 the depth
+/// volume for [`Albedo::Wound`].
 pub fn raymarch(albedo: Albedo) -> String {
     let albedo = match albedo {
         Albedo::Skin => include_str!("../wgsl/render/skin.wgsl"),

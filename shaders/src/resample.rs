@@ -5,49 +5,50 @@ use crate::link;
 const GRID: &str = include_str!("../wgsl/resample/grid.wgsl");
 const TET: &str = include_str!("../wgsl/resample/tet.wgsl");
 const BOX: &str = include_str!("../wgsl/resample/box.wgsl");
+const MESH: &str = include_str!("../wgsl/resample/mesh.wgsl");
 const WALK: &str = include_str!("../wgsl/resample/walk.wgsl");
 
-/// The name of the entry point of [`place`].
+/// Name of the entry point of [`place`].
 pub const PLACE: &str = "place";
-/// The entry point of [`span`] for tets that exist now.
+/// Name of the entry point of [`span`] for the present tets.
 pub const SPAN: &str = "span";
-/// The entry point of [`span`] for tets that were removed.
+/// Name of the entry point of [`span`] for removed tets.
 pub const SPAN_REMOVED: &str = "span_removed";
-/// The name of the entry point of [`clear`].
+/// Name of the entry point of [`clear`].
 pub const CLEAR: &str = "clear";
-/// The entry point of [`claim`] and [`vacate`] that gives each tet a thread.
+/// Name of the entry point of [`claim`] and [`vacate`] with one thread per tet.
 pub const WALK_ALL: &str = "walk";
-/// The entry point of [`claim`] and [`vacate`] that gives each large tet a workgroup.
+/// Name of the entry point of [`claim`] and [`vacate`] with one workgroup per large tet.
 pub const WALK_LARGE: &str = "walk_large";
-/// The name of the entry point of [`gather`].
+/// Name of the entry point of [`gather`].
 pub const GATHER: &str = "gather";
 
-/// Positions of the vertices to places among the voxels.
+/// Returns the source that maps the positions of vertices to places among the voxels.
 pub fn place() -> String {
     link(&[GRID, include_str!("../wgsl/resample/place.wgsl")])
 }
 
-/// The slices that each tet comes near.
+/// Returns the source that computes the slices that each tet touches.
 pub fn span() -> String {
-    link(&[GRID, TET, BOX, include_str!("../wgsl/resample/span.wgsl")])
+    link(&[GRID, TET, BOX, MESH, include_str!("../wgsl/resample/span.wgsl")])
 }
 
-/// A slab as nobody has claimed it.
+/// Returns the source that resets a slab.
 pub fn clear() -> String {
     link(&[GRID, include_str!("../wgsl/resample/clear.wgsl")])
 }
 
-/// Deformed tets claim voxels.
+/// Returns the source with which deformed tets claim voxels.
 pub fn claim() -> String {
-    link(&[GRID, TET, BOX, WALK, include_str!("../wgsl/resample/claim.wgsl")])
+    link(&[GRID, TET, BOX, MESH, WALK, include_str!("../wgsl/resample/claim.wgsl")])
 }
 
-/// Tets at rest mark the voxels that the body may have left.
+/// Returns the source with which tets at rest mark the voxels that the body may have left.
 pub fn vacate() -> String {
-    link(&[GRID, TET, BOX, WALK, include_str!("../wgsl/resample/vacate.wgsl")])
+    link(&[GRID, TET, BOX, MESH, WALK, include_str!("../wgsl/resample/vacate.wgsl")])
 }
 
-/// Voxels take their values.
+/// Returns the source that computes the values of voxels.
 pub fn gather() -> String {
-    link(&[GRID, TET, include_str!("../wgsl/resample/gather.wgsl")])
+    link(&[GRID, TET, MESH, include_str!("../wgsl/resample/gather.wgsl")])
 }

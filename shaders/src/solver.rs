@@ -1,11 +1,13 @@
-//! The passes of the solver: joined for a constraint, a formulation and a way of storing.
+//! The passes of the solver, joined for a constraint, a formulation and a storage layout.
 //!
-//! A constraint brings `struct Params` (scalars only) and `fn eval(x: array<vec3f, N>, p: Params) -> Eval`. What a joined
-//! source declares beside it, and a constraint therefore may not: `N`, `Eval`, `hidden_zero`, `inverse_reach_squared` (which it may
-//! set), `exact` and `exact3` (both of which it may call), `Settings`, `is_finite`,
-//! `quotient_or_zero`, `multiplier_change`, `multiplier_of`, `keep_multiplier`, `stiffness_of`, `vertices`, `settings`,
-//! `VertexForce`, `Share`, `forces`, `shape`, `places`, `shares`, `tuples`, `params`, `stiffness`, `multipliers`, `points`, `found`, `inverse_rest_size`, `partial`, `sums` and the
-//! entry points.
+//! A constraint declares `struct Params` (scalars only) and
+//! `fn eval(x: array<vec3f, N>, p: Params) -> Eval`. It may call `exact` and `exact3`, and set
+//! `inverse_reach_squared`. It must not declare the names of a joined source: `N`, `Eval`,
+//! `hidden_zero`, `inverse_reach_squared`, `exact`, `exact3`, `Settings`, `is_finite`,
+//! `quotient_or_zero`, `multiplier_change`, `multiplier_of`, `keep_multiplier`, `stiffness_of`,
+//! `vertices`, `settings`, `VertexForce`, `VertexEntries`, `forces`, `shape`, `entries`, `ranges`,
+//! `tuples`, `params`, `stiffness`, `multipliers`, `points`, `found`, `inverse_rest_size`,
+//! `workgroup_sums`, `sums` and the entry points.
 
 use crate::link;
 
@@ -14,56 +16,56 @@ const FINITE: &str = include_str!("../wgsl/solver/finite.wgsl");
 const QUOTIENT: &str = include_str!("../wgsl/solver/quotient.wgsl");
 const SETTINGS: &str = include_str!("../wgsl/solver/settings.wgsl");
 
-/// How a value becomes a correction.
+/// The formula that turns a value into a correction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// A share of the error per projection.
+    /// PBD: a fraction of the error per projection.
     Pbd,
-    /// A compliance.
+    /// XPBD: a compliance.
     Xpbd,
 }
 
-/// Where the stiffness of a constraint lies: binding 2 of group 1.
+/// Storage of the stiffness, at binding 2 of group 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stiffness {
-    /// One number for the kind, a uniform.
+    /// One value for the kind, in a uniform buffer.
     Uniform,
-    /// A number for each constraint, a storage buffer.
+    /// One value per constraint, in a storage buffer.
     Each,
 }
 
-/// What becomes of the multipliers: binding 3 of group 1, where there are any.
+/// Treatment of the multipliers, at binding 3 of group 1 if they are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiplier {
-    /// There is one iteration: none are kept.
+    /// A single iteration, which stores no multipliers.
     None,
-    /// The first of several iterations: they begin at zero.
+    /// The first of several iterations, which starts at zero.
     First,
     /// A later iteration.
     Next,
 }
 
-/// The name of the entry point of [`project`].
+/// Name of the entry point of [`project`].
 pub const PROJECT: &str = "project";
-/// The name of the entry point of [`vertex_force`].
+/// Name of the entry point of [`vertex_force`].
 pub const VERTEX_FORCE: &str = "vertex_force";
-/// The name of the entry point of [`descend`].
+/// Name of the entry point of [`descend`].
 pub const DESCEND: &str = "descend";
-/// The name of the entry point of [`residual`].
+/// Name of the entry point of [`residual`].
 pub const RESIDUAL: &str = "residual";
-/// The name of the entry point of [`evaluate`].
+/// Name of the entry point of [`evaluate`].
 pub const EVALUATE: &str = "evaluate";
-/// The name of the entry point of [`kinematic`].
+/// Name of the entry point of [`kinematic`].
 pub const KINEMATIC: &str = "kinematic";
-/// The name of the entry point of [`gather`].
+/// Name of the entry point of [`gather`].
 pub const GATHER: &str = "gather";
 
-/// What a constraint over `arity` vertices stands below.
+/// Returns the declarations that a constraint over `arity` vertices needs.
 fn head(arity: usize) -> String {
     format!("const N: u32 = {arity}u;\n{EVAL}")
 }
 
-/// Projection of one chunk of a color.
+/// Returns the source that projects one chunk of a color.
 pub fn project(
     arity: usize,
     constraint: &str,
@@ -88,37 +90,39 @@ pub fn project(
     link(&[&head(arity), constraint, SETTINGS, FINITE, QUOTIENT, rule, stiffness, multiplier, project])
 }
 
-/// What the constraints of a kind do to the vertices of a chunk.
+/// Returns the source that computes the forces of a kind on the vertices of a chunk.
 pub fn vertex_force(arity: usize, constraint: &str) -> String {
     link(&[&head(arity), constraint, include_str!("../wgsl/solver/vertex_force.wgsl")])
 }
 
-/// The steps of the vertices of a chunk of one color.
+/// Returns the source that moves the vertices of a chunk of one color.
 pub fn descend() -> String {
     link(&[FINITE, include_str!("../wgsl/solver/descend.wgsl")])
 }
 
-/// Sum of squares and largest value over rest size, per workgroup.
+/// Returns the source that computes, per workgroup, the sum of squares and the largest value over
+/// the rest size.
 pub fn residual(arity: usize, constraint: &str) -> String {
     link(&[&head(arity), constraint, include_str!("../wgsl/solver/residual.wgsl")])
 }
 
-/// Value and gradients on their own.
+/// Returns the source that computes values and gradients, for tests.
 pub fn evaluate(arity: usize, constraint: &str) -> String {
     link(&[&head(arity), constraint, include_str!("../wgsl/solver/evaluate.wgsl")])
 }
 
-/// The passes over vertices: `predict`, `predict_next`, `finish_and_predict`, `finish`, `check`, `restore`.
+/// Returns the source of the passes over vertices, with the entry points `predict`, `predict_next`,
+/// `finish_and_predict`, `finish`, `check`, `restore`.
 pub fn vertices() -> String {
     link(&[SETTINGS, FINITE, include_str!("../wgsl/solver/vertices.wgsl")])
 }
 
-/// Kinematic vertices along their paths.
+/// Returns the source that moves kinematic vertices along their paths.
 pub fn kinematic() -> String {
     include_str!("../wgsl/solver/kinematic.wgsl").to_owned()
 }
 
-/// Positions of chosen vertices, side by side.
+/// Returns the source that collects the positions of some vertices.
 pub fn gather() -> String {
     include_str!("../wgsl/solver/gather.wgsl").to_owned()
 }

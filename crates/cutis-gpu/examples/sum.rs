@@ -9,7 +9,7 @@ use cutis_gpu::{Gpu, GpuError, GpuOptions, Select, WORKGROUP, adapters};
 const SUM: &str = "
     @group(0) @binding(0) var<storage, read> numbers: array<u32>;
     @group(0) @binding(1) var<storage, read_write> sums: array<u32>;
-    var<workgroup> partial: array<u32, 64>;
+    var<workgroup> part_sums: array<u32, 64>;
 
     @compute @workgroup_size(64)
     fn sum(
@@ -22,12 +22,12 @@ const SUM: &str = "
         for (var i = id.x; i < arrayLength(&numbers); i += 64u * workgroups.x) {
             total += numbers[i];
         }
-        partial[local] = total;
+        part_sums[local] = total;
         for (var half = 32u; half > 0u; half /= 2u) {
             workgroupBarrier();
-            if local < half { partial[local] += partial[local + half]; }
+            if local < half { part_sums[local] += part_sums[local + half]; }
         }
-        if local == 0u { sums[workgroup.x] = partial[0]; }
+        if local == 0u { sums[workgroup.x] = part_sums[0]; }
     }";
 
 fn main() -> Result<(), GpuError> {

@@ -53,8 +53,8 @@ impl fmt::Display for AdapterKind {
     }
 }
 
-/// Lists the adapters of this machine without duplicates, best hardware first and software last. The
-/// list is empty if there is no driver. No device is opened.
+/// Lists the adapters of this machine without duplicates, best hardware first and software last.
+/// The list is empty if there is no driver. No device is opened.
 pub fn adapters() -> Vec<Adapter> {
     enumerate().into_iter().map(|(adapter, _)| adapter).collect()
 }
@@ -89,8 +89,9 @@ pub(crate) fn choose(select: &Select) -> Result<(Adapter, wgpu::Adapter), GpuErr
     Ok(all.swap_remove(index))
 }
 
-/// Returns the instance of the process. There is only one, so that wgpu can detect a resource of one
-/// device that is used with another. `None` if this build supports no graphics API of the platform.
+/// Returns the instance of the process. There is only one, so that wgpu can detect a resource of
+/// one device that is used with another. `None` if this build supports no graphics API of the
+/// platform.
 fn instance() -> Option<&'static wgpu::Instance> {
     static INSTANCE: LazyLock<Option<wgpu::Instance>> = LazyLock::new(|| {
         (!wgpu::Instance::enabled_backend_features().is_empty()).then(|| {
@@ -144,8 +145,8 @@ fn api(backend: wgpu::Backend) -> (u8, &'static str) {
 }
 
 /// True if two entries are the same hardware with two graphics APIs or two drivers. The PCI address
-/// distinguishes cards. Without it, entries of the same name are one adapter only if their APIs differ
-/// or if they are software, so that two equal cards remain two.
+/// distinguishes cards. Without it, entries of the same name are one adapter only if their APIs
+/// differ or if they are software, so that two equal cards remain two.
 fn same_adapter(a: &wgpu::AdapterInfo, b: &wgpu::AdapterInfo) -> bool {
     if (kind(a.device_type), a.vendor, a.device) != (kind(b.device_type), b.vendor, b.device) {
         return false;

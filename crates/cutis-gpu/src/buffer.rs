@@ -16,8 +16,8 @@ pub(crate) const WORD: u64 = 4;
 /// second copy has to fit in memory.
 pub(crate) const PART: usize = 16 << 20;
 
-/// A buffer of `len` elements of `T` on the device. Its memory is freed when the buffer and the bind
-/// groups with it are dropped and the device has finished the work that uses them.
+/// A buffer of `len` elements of `T` on the device. Its memory is freed when the buffer and the
+/// bind groups with it are dropped and the device has finished the work that uses them.
 pub struct Buffer<T> {
     pub(crate) raw: wgpu::Buffer,
     pub(crate) label: String,
@@ -64,15 +64,15 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// Writes `data` to the elements from `offset` on. The write takes effect before every pass that
-    /// is submitted later.
+    /// Writes `data` to the elements from `offset` on. The write takes effect before every pass
+    /// that is submitted later.
     ///
     /// # Errors
     ///
     /// Returns [`GpuError::Range`] if the data exceed the buffer, and [`GpuError::Lost`]. Returns
     /// [`GpuError::Alignment`] if the data do not start at a multiple of 4 bytes, or end neither at
-    /// such a multiple nor at the end of the buffer. This can only happen for elements of less than 4
-    /// bytes.
+    /// such a multiple nor at the end of the buffer. This can only happen for elements of less than
+    /// 4 bytes.
     pub fn write<T: Pod>(&self, buffer: &Buffer<T>, offset: usize, data: &[T]) -> Result<(), GpuError> {
         self.upload(buffer, offset, data)?;
         add(&self.shared.tally.writes, 1);
@@ -164,8 +164,8 @@ impl<T> Buffer<T> {
         self.len == 0
     }
 
-    /// Returns the memory on the device in bytes: that of the elements, padded to a multiple of 4 and
-    /// never 0.
+    /// Returns the memory on the device in bytes: that of the elements, padded to a multiple of 4
+    /// and never 0.
     pub fn bytes(&self) -> u64 {
         self.raw.size()
     }

@@ -1,4 +1,5 @@
-//! Counters of the work of a device. Tests use them to check the submissions and readbacks of a frame.
+//! Counters of the work of a device. Tests use them to check the submissions and readbacks of a
+//! frame.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -66,8 +67,8 @@ pub(crate) fn add(counter: &AtomicU64, amount: u64) {
     counter.fetch_add(amount, Relaxed);
 }
 
-/// Memory of a buffer or texture. It counts as existing until the resource and all bind groups with it
-/// are dropped.
+/// Memory of a buffer or texture. It counts as existing until the resource and all bind groups with
+/// it are dropped.
 #[derive(Debug)]
 pub(crate) struct Memory {
     tally: Arc<Tally>,

@@ -66,8 +66,8 @@ impl Gpu {
     /// # Errors
     ///
     /// Returns [`GpuError::NoAdapter`] if the machine has no adapter (the message says what to
-    /// install), [`GpuError::NoSuchAdapter`] if the selected one does not exist (the message lists the
-    /// others), [`GpuError::Limit`] if the adapter does not reach WebGPU's baseline, and
+    /// install), [`GpuError::NoSuchAdapter`] if the selected one does not exist (the message lists
+    /// the others), [`GpuError::Limit`] if the adapter does not reach WebGPU's baseline, and
     /// [`GpuError::Device`] if the driver cannot open a device.
     pub fn open(options: &GpuOptions) -> Result<Gpu, GpuError> {
         let (adapter, handle) = choose(&options.select)?;
@@ -131,18 +131,18 @@ impl Gpu {
         &self.shared.limits
     }
 
-    /// Returns the largest number of items of `bytes` bytes each that fit one buffer, one binding and
-    /// one dispatch with a thread per item. [`GpuOptions::chunk_cap`] limits the result. The result is
-    /// at least 1. For an item that is too large for the device, the creation of its buffer returns
-    /// [`GpuError::Limit`].
+    /// Returns the largest number of items of `bytes` bytes each that fit one buffer, one binding
+    /// and one dispatch with a thread per item. [`GpuOptions::chunk_cap`] limits the result. The
+    /// result is at least 1. For an item that is too large for the device, the creation of its
+    /// buffer returns [`GpuError::Limit`].
     pub fn chunk_len(&self, bytes: usize) -> usize {
         let threads = u64::from(self.limits().max_workgroups) * WORKGROUP as u64;
         self.binding_len(bytes).min(usize::try_from(threads).unwrap_or(usize::MAX))
     }
 
-    /// Returns the largest number of items of `bytes` bytes each that fit one buffer and one binding,
-    /// without a limit on the threads that read them. [`GpuOptions::chunk_cap`] limits the result. The
-    /// result is at least 1.
+    /// Returns the largest number of items of `bytes` bytes each that fit one buffer and one
+    /// binding, without a limit on the threads that read them. [`GpuOptions::chunk_cap`] limits the
+    /// result. The result is at least 1.
     pub fn binding_len(&self, bytes: usize) -> usize {
         let Shared { limits, chunk_cap, .. } = &*self.shared;
         let most_bytes = limits.max_binding_bytes.min(limits.max_buffer_bytes);
@@ -155,8 +155,8 @@ impl Gpu {
         self.shared.tally.snapshot()
     }
 
-    /// Waits until all submitted work is done, without a readback. For example to time work from the
-    /// host.
+    /// Waits until all submitted work is done, without a readback. For example to time work from
+    /// the host.
     ///
     /// # Errors
     ///
@@ -214,8 +214,8 @@ impl Gpu {
         }
     }
 
-    /// Waits for the device. wgpu panics if the device is lost during the wait. This function returns
-    /// an error.
+    /// Waits for the device. wgpu panics if the device is lost during the wait. This function
+    /// returns an error.
     pub(crate) fn poll(&self, until: wgpu::PollType) -> Result<(), GpuError> {
         let polled = catch_unwind(AssertUnwindSafe(|| self.shared.device.poll(until)));
         self.alive()?;

@@ -11,7 +11,8 @@ use crate::{
 /// The range of a binding must start at a multiple of this number of bytes (WebGPU's baseline).
 const BINDING_ALIGNMENT: u64 = 256;
 
-/// A compiled compute kernel. Its bindings are exactly those that the entry point uses in the source.
+/// A compiled compute kernel. Its bindings are exactly those that the entry point uses in the
+/// source.
 pub struct Kernel {
     pub(crate) pipeline: wgpu::ComputePipeline,
     pub(crate) label: String,
@@ -43,8 +44,8 @@ impl Gpu {
     ///
     /// # Errors
     ///
-    /// Returns [`GpuError::Shader`] with the compiler's message if the source is invalid, has no such
-    /// entry point, or the entry point is not `@compute @workgroup_size(64)`. Returns
+    /// Returns [`GpuError::Shader`] with the compiler's message if the source is invalid, has no
+    /// such entry point, or the entry point is not `@compute @workgroup_size(64)`. Returns
     /// [`GpuError::Lost`] if the device was lost.
     pub fn kernel(&self, label: &str, wgsl: &str, entry: &str) -> Result<Kernel, GpuError> {
         self.alive()?;
@@ -72,8 +73,8 @@ impl Gpu {
         Ok(Kernel { pipeline, label: label.to_owned() })
     }
 
-    /// Binds resources to `@group(group)` of a kernel, each with its `@binding`. The bindings must be
-    /// exactly those of this group that the kernel's entry point uses.
+    /// Binds resources to `@group(group)` of a kernel, each with its `@binding`. The bindings must
+    /// be exactly those of this group that the kernel's entry point uses.
     ///
     /// # Errors
     ///
@@ -188,8 +189,8 @@ impl fmt::Debug for BindGroup {
     }
 }
 
-/// Parses the source and checks the entry point. A kernel with another workgroup size would run with
-/// a wrong number of threads.
+/// Parses the source and checks the entry point. A kernel with another workgroup size would run
+/// with a wrong number of threads.
 fn check_entry(wgsl: &str, entry: &str) -> Result<(), String> {
     let module =
         naga::front::wgsl::parse_str(wgsl).map_err(|error| error.emit_to_string(wgsl).trim().to_owned())?;

@@ -1,18 +1,19 @@
 //! Compute on any GPU, through wgpu.
 //!
-//! This is the only crate of Cutis that uses wgpu, and no type of wgpu appears in its public API. It
-//! provides adapters by name or index, typed buffers, volumes as integer textures, kernels in WGSL,
-//! one compute pass per submission, and readbacks.
+//! This is the only crate of Cutis that uses wgpu, and no type of wgpu appears in its public API.
+//! It provides adapters by name or index, typed buffers, volumes as integer textures, kernels in
+//! WGSL, one compute pass per submission, and readbacks.
 //!
 //! # Guarantees
 //!
 //! - Nothing panics on invalid input, an invalid shader or a lost device. Every failure is a
 //!   [`GpuError`].
 //! - Sizes are checked against the limits of the device before memory is allocated.
-//! - After the loss of the device, every call that uses it returns [`GpuError::Lost`]. Data on the host
-//!   do not change.
-//! - Writes, passes and reads of one [`Gpu`] take effect in the order of the calls of [`Gpu::write`],
-//!   [`Pass::submit`] and [`Gpu::read`], not in the order in which passes are recorded.
+//! - After the loss of the device, every call that uses it returns [`GpuError::Lost`]. Data on the
+//!   host do not change.
+//! - Writes, passes and reads of one [`Gpu`] take effect in the order of the calls of
+//!   [`Gpu::write`], [`Pass::submit`] and [`Gpu::read`], not in the order in which passes are
+//!   recorded.
 //! - Every kernel has `@workgroup_size(64)` ([`WORKGROUP`]). [`Gpu::kernel`] rejects other sizes.
 //! - Threads can share handles.
 //!

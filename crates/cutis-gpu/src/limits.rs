@@ -51,9 +51,9 @@ impl fmt::Display for Shortfall {
     }
 }
 
-/// Returns the limits to request from an adapter that offers `offered`. They are exactly the baseline,
-/// or the baseline with higher values that help compute kernels. Alignments stay those of the
-/// baseline, so that offsets are valid on every device. A thread index always fits in 32 bits.
+/// Returns the limits to request from an adapter that offers `offered`. They are exactly the
+/// baseline, or the baseline with higher values that help compute kernels. Alignments stay those of
+/// the baseline, so that offsets are valid on every device. A thread index always fits in 32 bits.
 pub(crate) fn requested(offered: &wgpu::Limits, baseline_only: bool) -> Result<wgpu::Limits, Shortfall> {
     let baseline = wgpu::Limits::default();
     let mut missing = None;

@@ -25,11 +25,12 @@ impl Gpu {
 }
 
 impl Pass<'_> {
-    /// Runs a kernel with `threads` threads, rounded up to whole workgroups. So a kernel must ignore
-    /// threads beyond its items. For 0 threads nothing runs. The order of the groups does not matter.
+    /// Runs a kernel with `threads` threads, rounded up to whole workgroups. So a kernel must
+    /// ignore threads beyond its items. For 0 threads nothing runs. The order of the groups does
+    /// not matter.
     ///
-    /// [`Pass::submit`] returns an error for more threads than [`Gpu::chunk_len`] allows and for bind
-    /// groups of another kernel.
+    /// [`Pass::submit`] returns an error for more threads than [`Gpu::chunk_len`] allows and for
+    /// bind groups of another kernel.
     pub fn dispatch(&mut self, kernel: &Kernel, groups: &[&BindGroup], threads: usize) {
         if threads == 0 || self.error.is_some() {
             return;
@@ -52,8 +53,9 @@ impl Pass<'_> {
 
     /// Copies elements of one buffer to another, from element `to_offset` on.
     ///
-    /// [`Pass::submit`] returns an error for a range that exceeds its buffer, for elements of less than
-    /// 4 bytes that do not start and end at a multiple of 4 bytes, and for a copy within one buffer.
+    /// [`Pass::submit`] returns an error for a range that exceeds its buffer, for elements of less
+    /// than 4 bytes that do not start and end at a multiple of 4 bytes, and for a copy within one
+    /// buffer.
     pub fn copy<T>(&mut self, from: &Buffer<T>, from_range: Range<usize>, to: &Buffer<T>, to_offset: usize) {
         if self.error.is_some() {
             return;

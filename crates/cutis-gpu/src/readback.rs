@@ -23,8 +23,8 @@ impl Gpu {
     /// # Errors
     ///
     /// Returns [`GpuError::Range`] if the range exceeds the buffer, [`GpuError::Readback`] if the
-    /// memory cannot be mapped, [`GpuError::Validation`] for a uniform buffer, which cannot be read,
-    /// and [`GpuError::Lost`].
+    /// memory cannot be mapped, [`GpuError::Validation`] for a uniform buffer, which cannot be
+    /// read, and [`GpuError::Lost`].
     pub fn read<T: Pod>(&self, buffer: &Buffer<T>, range: Range<usize>) -> Result<Vec<T>, GpuError> {
         let what = || format!("reading buffer '{}'", buffer.label);
         self.alive()?;

@@ -7,8 +7,8 @@ use crate::{Adapter, GpuError};
 /// The adapter to open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Select {
-    /// The first of [`adapters`](fn@crate::adapters): the best hardware, or a software adapter if there
-    /// is no hardware.
+    /// The first of [`adapters`](fn@crate::adapters): the best hardware, or a software adapter if
+    /// there is no hardware.
     #[default]
     First,
     /// The adapter with this [`Adapter::index`], else the first whose name contains this number.
@@ -22,8 +22,8 @@ impl Select {
     ///
     /// # Errors
     ///
-    /// Returns [`GpuError::NoAdapter`] for an empty list, and [`GpuError::NoSuchAdapter`] if no adapter
-    /// matches.
+    /// Returns [`GpuError::NoAdapter`] for an empty list, and [`GpuError::NoSuchAdapter`] if no
+    /// adapter matches.
     pub fn among<'a>(&self, adapters: &'a [Adapter]) -> Result<&'a Adapter, GpuError> {
         if adapters.is_empty() {
             return Err(GpuError::NoAdapter);

@@ -8,8 +8,8 @@ use crate::{
     counters::{Memory, add},
 };
 
-/// A volume of signed 16-bit integers on the device, with x as the fastest axis. In a kernel it is a
-/// `texture_3d<i32>`, and `textureLoad(volume, vec3<i32>(x, y, z), 0)` reads a voxel.
+/// A volume of signed 16-bit integers on the device, with x as the fastest axis. In a kernel it is
+/// a `texture_3d<i32>`, and `textureLoad(volume, vec3<i32>(x, y, z), 0)` reads a voxel.
 pub struct Texture3d {
     view: wgpu::TextureView,
     label: String,
@@ -22,9 +22,9 @@ impl Gpu {
     ///
     /// # Errors
     ///
-    /// Returns [`GpuError::Limit`] if a side exceeds the device's limit, [`GpuError::Validation`] if a
-    /// side is 0 or the number of values is not that of the shape, [`GpuError::OutOfMemory`], and
-    /// [`GpuError::Lost`].
+    /// Returns [`GpuError::Limit`] if a side exceeds the device's limit, [`GpuError::Validation`]
+    /// if a side is 0 or the number of values is not that of the shape, [`GpuError::OutOfMemory`],
+    /// and [`GpuError::Lost`].
     pub fn texture_3d(&self, label: &str, shape: [usize; 3], voxels: &[i16]) -> Result<Texture3d, GpuError> {
         let what = || format!("volume '{label}' of {} x {} x {} voxels", shape[0], shape[1], shape[2]);
         self.alive()?;

@@ -55,10 +55,11 @@ impl Timing {
 }
 
 impl Gpu {
-    /// Returns the device time of the last submitted pass in nanoseconds, from the start of its first
-    /// dispatch to the end of its last. `None` if [`GpuOptions::timestamps`](crate::GpuOptions) is off,
-    /// the adapter does not support timestamps, or the pass had no dispatch. Waits for the device and
-    /// does not count as a readback.
+    /// Returns the device time of the last submitted pass in nanoseconds, from the start of its
+    /// first dispatch to the end of its last. `None` if
+    /// [`GpuOptions::timestamps`](crate::GpuOptions) is off, the adapter does not support
+    /// timestamps, or the pass had no dispatch. Waits for the device and does not count as a
+    /// readback.
     ///
     /// # Errors
     ///

@@ -73,6 +73,10 @@ impl<T: Scalar> Solver<T> for SolverCpu<T> {
         "cpu"
     }
 
+    fn simulation(&self) -> &Simulation<T> {
+        &self.simulation
+    }
+
     fn step(&mut self, frames: usize) -> Result<(), SolverError> {
         self.run(frames, |parallel| parallel)
     }
@@ -81,16 +85,7 @@ impl<T: Scalar> Solver<T> for SolverCpu<T> {
         self.run(frames, |parallel| Timed::new(parallel, profile))
     }
 
-    fn restore(
-        &mut self,
-        positions: &[Point3<T>],
-        velocities: &[Vector3<T>],
-        frame: u64,
-    ) -> Result<(), SolverError> {
-        self.simulation.restore(positions, velocities, frame)
-    }
-
-    fn simulation(&self) -> &Simulation<T> {
-        &self.simulation
+    fn restore(&mut self, x: &[Point3<T>], v: &[Vector3<T>], frame: u64) -> Result<(), SolverError> {
+        self.simulation.restore(x, v, frame)
     }
 }

@@ -99,7 +99,8 @@ fn steps_allocate_nothing_and_memory_is_only_for_parts_in_use() {
     let descending = SolverReference::new(body(true), descent).unwrap();
     assert_eq!(descending.bytes().last().map(|part| part.name), Some("incidences"));
 
-    // A vertex has 4 + 3 + 3 numbers. A spring has two indices and a length, plus the color offsets.
+    // A vertex has 4 + 3 + 3 numbers. A spring has two indices and a length, plus the color
+    // offsets.
     let lattice = Kuhn::new([30, 20, 20], 0.1);
     let solver = SolverReference::new(body(false), settings(1)).unwrap();
     let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();

@@ -19,8 +19,8 @@ pub(crate) struct DeviceBody {
     pub(crate) previous: Buffer<[f32; 4]>,
     pub(crate) velocities: Buffer<[f32; 4]>,
     pub(crate) settings: Buffer<[f32; 8]>,
-    /// Three numbers: the first vertex that is not finite, the number of finite substeps, and 1 once a
-    /// substep has started after one that was not finite.
+    /// Three numbers: the first vertex that is not finite, the number of finite substeps, and 1
+    /// once a substep has started after one that was not finite.
     pub(crate) status: Buffer<u32>,
     pub(crate) predict: VertexKernel,
     /// Prediction after `finish`. Only for vertex block descent, which reads the velocities from

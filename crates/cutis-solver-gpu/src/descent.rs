@@ -3,8 +3,8 @@
 //!
 //! Each vertex of a constraint reads it, and the vertices of a constraint have different colors. So
 //! constraints are stored by **slab** and not by color. A slab is a range of vertices whose
-//! constraints fit one binding per array. All colors of a slab share its arrays. A body that fits the
-//! device's bindings is one slab, and each of its constraints is stored once.
+//! constraints fit one binding per array. All colors of a slab share its arrays. A body that fits
+//! the device's bindings is one slab, and each of its constraints is stored once.
 
 use std::ops::Range;
 
@@ -172,8 +172,8 @@ impl SlabConstraints {
         })
     }
 
-    /// Binds the constraints at the vertices `indices` of a chunk. Returns the group and the number of
-    /// vertices with constraints, or `None` if there are none.
+    /// Binds the constraints at the vertices `indices` of a chunk. Returns the group and the number
+    /// of vertices with constraints, or `None` if there are none.
     fn bind(
         &self,
         gpu: &Gpu,
@@ -214,8 +214,8 @@ impl SlabConstraints {
     }
 }
 
-/// Returns ranges of vertices whose constraints and entries fit one binding per array. A vertex that
-/// needs more is a slab on its own, and its buffers exceed the device's limits.
+/// Returns ranges of vertices whose constraints and entries fit one binding per array. A vertex
+/// that needs more is a slab on its own, and its buffers exceed the device's limits.
 fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u32>> {
     let mut order = descent.groups().order.clone();
     order.sort_unstable();

@@ -55,8 +55,8 @@ impl Handles {
         Ok(Some(Self { kernel, shared, chunks, frame, paths }))
     }
 
-    /// Uploads the displacement of each handle at the end of each substep, from `clock` to the end of
-    /// its frame. `done` is the number of substeps since the status was cleared.
+    /// Uploads the displacement of each handle at the end of each substep, from `clock` to the end
+    /// of its frame. `done` is the number of substeps since the status was cleared.
     pub(crate) fn write_paths(
         &self,
         gpu: &Gpu,

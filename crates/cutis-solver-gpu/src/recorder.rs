@@ -39,8 +39,8 @@ impl<'a> Recorder<'a> {
     }
 
     /// Submits the recorded work and starts a new pass. With a profile, waits for the work and adds
-    /// its duration: by the timestamps of the device if it was opened with them, else by the clock of
-    /// the host, which includes the submission and the wait.
+    /// its duration: by the timestamps of the device if it was opened with them, else by the clock
+    /// of the host, which includes the submission and the wait.
     ///
     /// # Errors
     /// Returns the errors of the device.

@@ -49,8 +49,8 @@ impl Reduction {
         Ok(Self { name: set.name(), kernel, shared, chunks, count })
     }
 
-    /// Returns `C` over the rest size at the present state. Ratios and sums over 64 ratios are `f32`.
-    /// The sums over workgroups are `f64`.
+    /// Returns `C` over the rest size at the present state. Ratios and sums over 64 ratios are
+    /// `f32`. The sums over workgroups are `f64`.
     pub(crate) fn run(&self, gpu: &Gpu) -> Result<Residual, GpuError> {
         let mut pass = gpu.pass("residual");
         for (group, threads, _) in &self.chunks {

@@ -17,8 +17,8 @@ use crate::{GpuSolverError, device_bytes};
 
 /// Number of frames between two readbacks of the status.
 const FRAMES_PER_CHECK: u64 = 64;
-/// Number of dispatches after which a frame continues in another submission, which limits the memory
-/// of a command buffer.
+/// Number of dispatches after which a frame continues in another submission, which limits the
+/// memory of a command buffer.
 const DISPATCHES_PER_SUBMIT: usize = 1 << 16;
 /// Number of threads after which a frame continues in another submission. A submission then takes
 /// much less than the two seconds after which desktop systems reset a device.
@@ -26,8 +26,8 @@ const THREADS_PER_SUBMIT: usize = 1 << 28;
 
 /// The solver on a GPU.
 ///
-/// The host keeps a copy of the body from the last readback. If the device is lost, that copy remains,
-/// and the clock of [`simulation`](Solver::simulation) returns to its time.
+/// The host keeps a copy of the body from the last readback. If the device is lost, that copy
+/// remains, and the clock of [`simulation`](Solver::simulation) returns to its time.
 pub struct SolverGpu {
     gpu: Gpu,
     /// Contains the clock of the device and the host's copy of the body at the time `read_at`.
@@ -35,8 +35,8 @@ pub struct SolverGpu {
     read_at: Clock,
     /// True if the host's copy is up to date.
     host_current: bool,
-    /// True if the device's state is invalid, because a step failed on it. The run then continues from
-    /// the host's copy.
+    /// True if the device's state is invalid, because a step failed on it. The run then continues
+    /// from the host's copy.
     device_stale: bool,
     body: DeviceBody,
     constraints: Constraints,
@@ -124,12 +124,12 @@ impl From<GpuError> for StepError {
 }
 
 impl SolverGpu {
-    /// Builds a solver for `system` on `gpu`. It uploads the body and compiles one kernel per kind and
-    /// one per pass over the vertices.
+    /// Builds a solver for `system` on `gpu`. It uploads the body and compiles one kernel per kind
+    /// and one per pass over the vertices.
     ///
     /// # Errors
-    /// Returns the errors of [`Simulation::new`], and [`GpuSolverError::Gpu`] for a body that exceeds
-    /// the device's limits or a kind with invalid WGSL.
+    /// Returns the errors of [`Simulation::new`], and [`GpuSolverError::Gpu`] for a body that
+    /// exceeds the device's limits or a kind with invalid WGSL.
     pub fn new(gpu: &Gpu, system: System<f32>, settings: Settings) -> Result<Self, GpuSolverError> {
         let simulation = Simulation::new(system, settings)?;
         let body = DeviceBody::new(gpu, &simulation)?;
@@ -163,8 +163,8 @@ impl SolverGpu {
         &self.gpu
     }
 
-    /// Returns the buffer of positions relative to [`System::origin`] (m) and inverse masses (1/kg).
-    /// Other kernels can use the body through it without a readback.
+    /// Returns the buffer of positions relative to [`System::origin`] (m) and inverse masses
+    /// (1/kg). Other kernels can use the body through it without a readback.
     pub fn vertices(&self) -> &Buffer<[f32; 4]> {
         &self.body.vertices
     }
@@ -250,16 +250,16 @@ impl SolverGpu {
         }
     }
 
-    /// Returns the error of a step. The state on the device is then invalid, and the clock returns to
-    /// the time of the host's copy.
+    /// Returns the error of a step. The state on the device is then invalid, and the clock returns
+    /// to the time of the host's copy.
     fn step_error(&mut self, error: &GpuError) -> SolverError {
         self.simulation.set_clock(self.read_at);
         (self.host_current, self.device_stale) = (true, true);
         self.device_error(error)
     }
 
-    /// Returns the error of a readback, which leaves the state on the device valid unless the device
-    /// is lost.
+    /// Returns the error of a readback, which leaves the state on the device valid unless the
+    /// device is lost.
     fn read_error(&mut self, error: &GpuError) -> SolverError {
         match error {
             GpuError::Lost { .. } => self.step_error(error),
@@ -315,13 +315,8 @@ impl Solver<f32> for SolverGpu {
         done.map_err(|error| self.solver_error(error))
     }
 
-    fn restore(
-        &mut self,
-        positions: &[Point3<f32>],
-        velocities: &[Vector3<f32>],
-        frame: u64,
-    ) -> Result<(), SolverError> {
-        self.simulation.restore(positions, velocities, frame)?;
+    fn restore(&mut self, x: &[Point3<f32>], v: &[Vector3<f32>], frame: u64) -> Result<(), SolverError> {
+        self.simulation.restore(x, v, frame)?;
         (self.host_current, self.device_stale, self.read_at) = (true, true, self.simulation.clock());
         self.upload_if_stale().map_err(|error| self.step_error(&error))
     }
@@ -352,9 +347,9 @@ impl Solver<f32> for SolverGpu {
         Ok(found.iter().map(|&[x, y, z, _]| Point3::new(x, y, z) + origin).collect())
     }
 
-    /// Computes residuals by reduction on the device. Sums of squares over 64 constraints are `f32`, so
-    /// that the relative difference to the CPU's is about 1e-7. For vertex block descent, the host
-    /// reads the body and computes the residuals.
+    /// Computes residuals by reduction on the device. Sums of squares over 64 constraints are
+    /// `f32`, so that the relative difference to the CPU's is about 1e-7. For vertex block descent,
+    /// the host reads the body and computes the residuals.
     fn residuals(&mut self) -> Result<Vec<Residual>, SolverError> {
         match self.reduce().map_err(|error| self.read_error(&error))? {
             Some(residuals) => Ok(residuals),

@@ -3,9 +3,9 @@
 //! Soundness for constraints: (1) A batch checks when it is built that each index is below the
 //! number of vertices, and `Groups::verify` checks that no two constraints of one color share a
 //! vertex. The fields of a batch are private and never change. (2) [`Colored`] borrows the vertices
-//! mutably for its whole lifetime, so that no other code reads or moves them. (3) A chunk is a range
-//! of one color, and an atomic counter that only grows hands out each chunk once. So two threads
-//! never access the same vertex or the same multiplier.
+//! mutably for its whole lifetime, so that no other code reads or moves them. (3) A chunk is a
+//! range of one color, and an atomic counter that only grows hands out each chunk once. So two
+//! threads never access the same vertex or the same multiplier.
 //!
 //! Soundness for vertices: (1) A `Descent` and the system that it was built from are owned by one
 //! `Simulation`. Its incidences are those of the system's kinds. `Groups::verify_vertices` checks
@@ -25,8 +25,8 @@ use nalgebra::{Point3, Vector3};
 use crate::batch::{ConstraintChunk, Load, Store, VertexChunk};
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
 
-/// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so that
-/// a tiny body has several.
+/// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so
+/// that a tiny body has several.
 const CHUNK: usize = if cfg!(miri) { 8 } else { 1024 };
 
 /// One color of one kind, shared between the threads that project it.

@@ -22,13 +22,12 @@
 //!   passes visits the colors in ascending order, and the second half in descending order. For
 //!   linear forces with `A = M/h² + K`, let `W` be the operator that the first half applies to an
 //!   error. Both halves together apply `S = W*W`, where `W*` is the adjoint of `W` in the inner
-//!   product of `A`. So the eigenvalues of `(I − S)(I − A⁻¹M/h²)` are between 0 and 1. With
-//!   `Q = I − (I − S)(I − A⁻¹M/h²)`, the eigenvalues of `x_{n+1} = Q(2x_n − x_{n−1})` satisfy
-//!   `|λ|² = q ≤ 1` for an eigenvalue `q` of `Q`. So no motion grows, for any stiffness, step length,
-//!   `ω` and number of iterations.
-//!   With ascending passes only, `Q` is not symmetric, and motions do grow. A change of direction in
-//!   every iteration is equally stable but needs more iterations, because two passes that follow
-//!   each other in opposite directions repeat much of the same work.
+//!   product of `A`. So the eigenvalues of `(I − S)(I − A⁻¹M/h²)` are between 0 and 1. Let
+//!   `Q = I − (I − S)(I − A⁻¹M/h²)`. The eigenvalues `λ` of `x_{n+1} = Q(2x_n − x_{n−1})` satisfy
+//!   `|λ|² = q ≤ 1` for an eigenvalue `q` of `Q`. So no motion grows, for any stiffness, step
+//!   length, `ω` and number of iterations. With ascending passes only, `Q` is not symmetric, and
+//!   motions do grow. A change of direction in every iteration is equally stable but needs more
+//!   iterations, because two successive passes in opposite directions repeat much of the same work.
 //! - **Over-relaxation.** A step may be `ω` times as long, `0 < ω < 2`, as in successive
 //!   over-relaxation.
 
@@ -55,8 +54,8 @@ impl<T: Real> VertexForce<T> {
         Self { force: Vector3::zeros(), diagonal: Vector3::zeros(), mixed: Vector3::zeros() }
     }
 
-    /// Adds a constraint with the value `c`, the gradient `g` at this vertex, a compliance and a rest
-    /// size.
+    /// Adds a constraint with the value `c`, the gradient `g` at this vertex, a compliance and a
+    /// rest size.
     #[inline(always)]
     pub fn add(&mut self, c: T, g: &Vector3<T>, compliance: T, rest_size: T) {
         let zero = T::zero();

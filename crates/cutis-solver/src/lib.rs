@@ -14,8 +14,8 @@
 //! - [`Formulation::Xpbd`] (Macklin et al. 2016): `Δλ = (−C − α̃λ)/(Σ w|∇C|² + α̃)` and
 //!   `Δx_i = w_i ∇_iC Δλ`, with `α̃ = α/h²` and `λ = 0` at the start of every substep.
 //! - [`Formulation::Vbd`] (Chen et al. 2024): vertex block descent with the same energies `½C²/α`.
-//!   The energy of the implicit step decreases vertex by vertex. See [`VertexForce`] for the force on
-//!   a vertex, and `descent.rs` for the differences to the source.
+//!   The energy of the implicit step decreases vertex by vertex. See [`VertexForce`] for the force
+//!   on a vertex, and `descent.rs` for the differences to the source.
 //!
 //! A note that is not legal advice: US patent 11,270,041 B2 is said to read on accumulating λ over
 //! iterations. `Pbd` and `Vbd` have no λ, and `Xpbd` with one iteration per substep neither stores
@@ -43,8 +43,9 @@
 //! ```
 //!
 //! # Unsafe code
-//! Only `colored.rs` contains unsafe code. Its types [`Colored`] and [`ColoredVertices`] let several
-//! threads move the vertices of one color. The rest of this crate and the backends are safe code.
+//! Only `colored.rs` contains unsafe code. Its types [`Colored`] and [`ColoredVertices`] let
+//! several threads move the vertices of one color. The rest of this crate and the backends are safe
+//! code.
 
 mod batch;
 mod builder;

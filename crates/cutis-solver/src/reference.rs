@@ -59,13 +59,8 @@ impl<T: Scalar> Solver<T> for SolverReference<T> {
         self.simulation.run(frames, &Timed::new(Serial, profile))
     }
 
-    fn restore(
-        &mut self,
-        positions: &[Point3<T>],
-        velocities: &[Vector3<T>],
-        frame: u64,
-    ) -> Result<(), SolverError> {
-        self.simulation.restore(positions, velocities, frame)
+    fn restore(&mut self, x: &[Point3<T>], v: &[Vector3<T>], frame: u64) -> Result<(), SolverError> {
+        self.simulation.restore(x, v, frame)
     }
 
     fn simulation(&self) -> &Simulation<T> {

@@ -5,7 +5,8 @@ use cutis_constraints::Scalar;
 
 use crate::{Kind, Settings};
 
-/// One color of one kind. The constraints `start..end` may be projected in any order or in parallel.
+/// One color of one kind. The constraints `start..end` may be projected in any order or in
+/// parallel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sweep {
     /// Index of the kind, in the order in which the kinds were added.
@@ -30,8 +31,8 @@ pub struct ColorPass {
 }
 
 /// The schedule of a frame. Each of the `substeps` predicts positions, moves handles, runs
-/// `iterations` iterations and updates velocities. An iteration is all sweeps in order, or the color
-/// passes of vertex block descent.
+/// `iterations` iterations and updates velocities. An iteration is all sweeps in order, or the
+/// color passes of vertex block descent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {
     /// Number of substeps of a frame.

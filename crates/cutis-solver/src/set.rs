@@ -43,20 +43,21 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     /// # Panics
     /// Panics if there is no such constraint.
     fn rest_size(&self, k: usize) -> T;
-    /// Returns the WGSL source of the kind, [`Constraint::WGSL`](cutis_constraints::Constraint::WGSL).
+    /// Returns the WGSL source of the kind,
+    /// [`Constraint::WGSL`](cutis_constraints::Constraint::WGSL).
     fn wgsl(&self) -> &'static str;
     /// Returns the stiffness, with values per constraint in the order of the colors.
     fn stiffness(&self) -> &Stiffness<T>;
-    /// Returns `C` over the rest size at the given positions. Constraints with a rest size of zero do
-    /// not count.
+    /// Returns `C` over the rest size at the given positions. Constraints with a rest size of zero
+    /// do not count.
     fn residual(&self, vertices: &[Vertex<T>]) -> Residual;
-    /// Returns `Σ ½C²/α` in joules over the constraints with `α > 0`, or `None` for a PBD stiffness,
-    /// which defines no energy.
+    /// Returns `Σ ½C²/α` in joules over the constraints with `α > 0`, or `None` for a PBD
+    /// stiffness, which defines no energy.
     fn elastic_energy(&self, vertices: &[Vertex<T>]) -> Option<f64>;
     /// Finds the first constraint that is violated by more than `tolerance` of its rest size but
-    /// cannot act, because its gradient is zero at every vertex that can move. Returns its index and
-    /// its value over its rest size. Constraints with a rest size of zero or without a vertex that
-    /// can move do not count.
+    /// cannot act, because its gradient is zero at every vertex that can move. Returns its index
+    /// and its value over its rest size. Constraints with a rest size of zero or without a vertex
+    /// that can move do not count.
     fn collapsed(&self, vertices: &[Vertex<T>], tolerance: f64) -> Option<(usize, f64)>;
     /// Returns `C` of constraint `k` in `f64` with its vertices at `x`, and writes the gradients to
     /// `grad`. Use it to compute energies and forces without a solver.
@@ -83,8 +84,8 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     fn colors(&self) -> usize {
         self.offsets().len().saturating_sub(1)
     }
-    /// Returns the constraints of `color` as a range of indices. The range is empty for a color that
-    /// does not exist.
+    /// Returns the constraints of `color` as a range of indices. The range is empty for a color
+    /// that does not exist.
     fn range(&self, color: usize) -> Range<usize> {
         match self.offsets().get(color..color.saturating_add(2)) {
             Some(&[start, end]) => start as usize..end as usize,

@@ -5,14 +5,15 @@ use crate::SolverError;
 /// The method that turns the value of a constraint into a correction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formulation {
-    /// PBD with a stiffness in `[0, 1]` per iteration (Müller et al. 2007). The result depends on the
-    /// number of iterations and the time step.
+    /// PBD with a stiffness in `[0, 1]` per iteration (Müller et al. 2007). The result depends on
+    /// the number of iterations and the time step.
     Pbd,
-    /// XPBD with a compliance `1/k` of the energy `½kC²`, in m/N for a length (Macklin et al. 2016).
+    /// XPBD with a compliance `1/k` of the energy `½kC²`, in m/N for a length (Macklin et al.
+    /// 2016).
     Xpbd,
-    /// Vertex block descent with the compliances of XPBD (Chen et al. 2024). It lowers the energy of
-    /// the step vertex by vertex. A body at rest is in equilibrium for any number of iterations and
-    /// substeps.
+    /// Vertex block descent with the compliances of XPBD (Chen et al. 2024). It lowers the energy
+    /// of the step vertex by vertex. A body at rest is in equilibrium for any number of iterations
+    /// and substeps.
     Vbd,
 }
 

@@ -1,5 +1,5 @@
-//! The stepping loop of all CPU backends. It defines the order of the passes. An [`Execute`] defines
-//! how a pass is distributed over threads.
+//! The stepping loop of all CPU backends. It defines the order of the passes. An [`Execute`]
+//! defines how a pass is distributed over threads.
 
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
@@ -58,8 +58,8 @@ impl<T: Scalar> Simulation<T> {
     /// multiplier starts at zero and is used once.
     ///
     /// # Errors
-    /// Returns [`SolverError::Setting`] for a setting out of range, [`SolverError::Formulation`] for
-    /// a kind whose stiffness is for another formulation, and the errors of [`Descent::new`].
+    /// Returns [`SolverError::Setting`] for a setting out of range, [`SolverError::Formulation`]
+    /// for a kind whose stiffness is for another formulation, and the errors of [`Descent::new`].
     pub fn new(system: System<T>, settings: Settings) -> Result<Self, SolverError> {
         settings.validate()?;
         for kind in &system.kinds {
@@ -143,7 +143,8 @@ impl<T: Scalar> Simulation<T> {
         self.clock = clock;
     }
 
-    /// Sets the state in the solver's own coordinates. For backends that keep the state on a device.
+    /// Sets the state in the solver's own coordinates. For backends that keep the state on a
+    /// device.
     ///
     /// # Errors
     /// Returns [`SolverError::VertexLength`] unless both arrays have one element per vertex. The
@@ -174,8 +175,8 @@ impl<T: Scalar> Simulation<T> {
     ///
     /// # Errors
     /// Returns [`SolverError::NotFinite`] as soon as a position is not finite after a substep. The
-    /// state is then that at the start of this substep, with all velocities zero, and can be stepped
-    /// again.
+    /// state is then that at the start of this substep, with all velocities zero, and can be
+    /// stepped again.
     pub fn run(&mut self, frames: usize, execute: &impl Execute<T>) -> Result<(), SolverError> {
         let mut started = false;
         let end = self.clock.frame.saturating_add(frames as u64);
@@ -199,11 +200,11 @@ impl<T: Scalar> Simulation<T> {
         Ok(())
     }
 
-    /// Continues from a saved state: positions in the caller's coordinates (m), velocities (m/s) and
-    /// the number of completed frames.
+    /// Continues from a saved state: positions in the caller's coordinates (m), velocities (m/s)
+    /// and the number of completed frames.
     ///
-    /// With the results of [`System::positions`] and [`System::velocities`] after `frame` frames, the
-    /// run has the same bits as one without interruption if [`System::origin`] is zero.
+    /// With the results of [`System::positions`] and [`System::velocities`] after `frame` frames,
+    /// the run has the same bits as one without interruption if [`System::origin`] is zero.
     ///
     /// # Errors
     /// Returns an error for wrong lengths or values that are not finite. The state is then
@@ -219,8 +220,8 @@ impl<T: Scalar> Simulation<T> {
         Ok(())
     }
 
-    /// Predicts positions. If another substep came before, updates the velocities first. Vertex block
-    /// descent reads the velocities from memory, so that it cannot combine the two passes.
+    /// Predicts positions. If another substep came before, updates the velocities first. Vertex
+    /// block descent reads the velocities from memory, so that it cannot combine the two passes.
     fn begin_substep(&mut self, after_another: bool, execute: &impl Execute<T>) {
         match (after_another, &self.method) {
             (true, Method::Project(_)) => self.run_pass(VertexPass::FinishAndPredict, execute),

@@ -9,9 +9,9 @@ use crate::{
 
 /// A backend with a body. The trait is object-safe, and measurements are computed on request.
 ///
-/// A backend may keep the state on a device. Methods that access the state therefore take `&mut
-/// self` and can fail. They read from the device only what they need. On a CPU backend they read
-/// nothing and never fail.
+/// A backend may keep the state on a device. Methods that access the state therefore take
+/// `&mut self` and can fail. They read from the device only what they need. On a CPU backend they
+/// read nothing and never fail.
 pub trait Solver<T: Scalar>: Send {
     /// Returns the name of the backend in reports.
     fn name(&self) -> &'static str;
@@ -23,10 +23,10 @@ pub trait Solver<T: Scalar>: Send {
     /// [`SolverError::Device`] if a device fails.
     fn step(&mut self, frames: usize) -> Result<(), SolverError>;
 
-    /// Runs `frames` frames with the bits of [`step`](Self::step) and adds the duration of each part
-    /// to `profile`. On a CPU backend the overhead is negligible. On a device the host waits for each
-    /// part, so that the parts take longer than a plain step. After an error, the profile contains
-    /// the parts that ran before it.
+    /// Runs `frames` frames with the bits of [`step`](Self::step) and adds the duration of each
+    /// part to `profile`. On a CPU backend the overhead is negligible. On a device the host waits
+    /// for each part, so that the parts take longer than a plain step. After an error, the profile
+    /// contains the parts that ran before it.
     ///
     /// # Errors
     /// Returns the errors of [`step`](Self::step).
@@ -34,11 +34,12 @@ pub trait Solver<T: Scalar>: Send {
         profile.time(StepProfile::STEP, || self.step(frames))
     }
 
-    /// Continues from a saved state: positions in the caller's coordinates (m), velocities (m/s) and
-    /// the number of completed frames.
+    /// Continues from a saved state: positions in the caller's coordinates (m), velocities (m/s)
+    /// and the number of completed frames.
     ///
     /// # Errors
-    /// Returns the errors of [`Simulation::restore`], and [`SolverError::Device`] if a device fails.
+    /// Returns the errors of [`Simulation::restore`], and [`SolverError::Device`] if a device
+    /// fails.
     fn restore(
         &mut self,
         positions: &[Point3<T>],

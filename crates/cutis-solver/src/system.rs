@@ -162,8 +162,8 @@ impl<T: Scalar> System<T> {
         self.kinds.iter().map(|kind| kind.residual(&self.vertices)).collect()
     }
 
-    /// Checks that every violated constraint can act at the present positions. A constraint counts as
-    /// violated if its value is more than `tolerance` times its rest size.
+    /// Checks that every violated constraint can act at the present positions. A constraint counts
+    /// as violated if its value is more than `tolerance` times its rest size.
     ///
     /// # Errors
     /// Returns [`SolverError::Collapsed`] for the first violated constraint without a gradient.
@@ -199,8 +199,8 @@ impl<T: Scalar> System<T> {
         Energy { kinetic_j, elastic_j, gravity_j }
     }
 
-    /// Returns the linear momentum, the angular momentum about the center of mass, and the center of
-    /// mass.
+    /// Returns the linear momentum, the angular momentum about the center of mass, and the center
+    /// of mass.
     pub fn momentum(&self) -> Momentum {
         let (mut total, mut center, mut linear) = (0.0, Vector3::zeros(), Vector3::zeros());
         for (mass, x, velocity) in self.masses() {

@@ -1,33 +1,34 @@
-// Half a sweep of ChainMail's relaxation: one coordinate of those elements of a slab whose i + j + k is even, or odd. The twin of
-// `Plane::relax`.
+// Half a sweep of the ChainMail relaxation: one coordinate of the elements of a slab with even, or
+// odd, i + j + k. The same operations as `Plane::relax`.
 //
-// Such elements have neighbors of the other kind only, so that no thread reads what another writes. All numbers are whole, and
-// sums wrap as they do in Rust.
+// All neighbors of such an element have the other parity, so that no thread reads an element that
+// another thread writes. All numbers are integers, and sums wrap as in Rust.
 struct Slab {
-    // Elements of a row, rows of a plane, planes.
+    // Number of elements of a row, rows of a plane, and planes.
     columns: u32,
     rows: u32,
     planes: u32,
-    // Number of its first plane.
+    // Index of the first plane.
     first: u32,
-    // Planes of the slab before.
+    // Number of planes of the slab below.
     planes_below: u32,
-    // Words of a plane in `elements`.
+    // Number of words of a plane in `elements`.
     pitch: u32,
     unused_1: u32, unused_2: u32,
 }
 
-// What is moved.
+// The coordinate and the parity of the elements to move.
 struct Half {
     coordinate: u32,
-    // 0: elements whose i + j + k is even; 1: odd.
+    // 0 for elements with even i + j + k, 1 for odd.
     odd: u32,
     materials: u32,
     unused: u32,
 }
 
 @group(0) @binding(0) var<uniform> slab: Slab;
-// Two elements to a word: links and whether it is held in the low byte, the material above. A plane more at either end.
+// Two elements per word. The low byte of an element has its links and whether it is held, and the
+// high byte its material. There is an additional plane at each end.
 @group(0) @binding(1) var<storage, read> elements: array<u32>;
 @group(0) @binding(2) var<storage, read_write> x: array<i32>;
 @group(0) @binding(3) var<storage, read> below: array<i32>;
@@ -35,29 +36,32 @@ struct Half {
 @group(1) @binding(0) var<uniform> half: Half;
 // Lowest and highest difference along a link, by the pair of materials at its ends and its axis.
 @group(1) @binding(1) var<storage, read> bounds: array<vec2i>;
-// By material: the least distance that an element is moved for.
+// The smallest displacement of an element, by material. Smaller ones are ignored.
 @group(1) @binding(2) var<storage, read> least: array<i32>;
-// How many moved in the sweep before, and in this one. Each has a word for every coordinate and half, which none can overflow.
+// Numbers of elements that moved in the sweep before and in this one, with one word per coordinate
+// and parity, so that no word overflows.
 @group(2) @binding(0) var<storage, read_write> moved: array<atomic<u32>, 128>;
 
-// Words of a sweep in `moved`.
+// Number of words of a sweep in `moved`.
 const SWEEP: u32 = 64u;
 const HALVES: u32 = 6u;
 const NO_MATERIAL: u32 = 255u;
-// Bits of an element: the links to those after it along each axis, to those before it, and fixed or grabbed.
+// Bits of an element: links to the next elements along each axis, links to the previous elements,
+// and two bits for fixed and grabbed elements.
 const AFTER: u32 = 1u;
 const BEFORE: u32 = 8u;
 const HELD: u32 = 192u;
-// The length of a link at rest.
+// Rest length of a link.
 const STEP: i32 = 65536;
-// More than six neighbors within their bounds can ask for together, and few enough to be doubled.
+// Larger than the sum of the requests of six neighbors within their bounds, and small enough to be
+// doubled.
 const MOST_ASKED: u32 = 1073741824u;
 
 var<workgroup> goes_on: u32;
 var<workgroup> moved_here: atomic<u32>;
 
-// What neighbors ask of an element: how many there are, how far they want it to go together, and between what it stays within
-// the bounds of its links.
+// The requests of the neighbors of an element: their number, the sum of the requested
+// displacements, and the interval of displacements that keep all links within their bounds.
 struct Asked {
     count: u32,
     sum: i32,
@@ -65,13 +69,13 @@ struct Asked {
     highest: i32,
 }
 
-// Bits and material of an element; plane 0 is that below the slab.
+// Bits and material of an element. Plane 0 is the plane below the slab.
 fn element(plane: u32, place: u32) -> u32 {
     return (elements[plane * slab.pitch + place / 2u] >> (16u * (place & 1u))) & 0xffffu;
 }
 
-// What is asked once a neighbor along `axis` has asked that is `apart` from the element. `pairs` is where the bounds of the
-// element's material begin.
+// Adds the request of a neighbor along `axis` at the difference `apart`. `pairs` is the index of
+// the first pair of the element's material.
 fn ask(so_far: Asked, apart: i32, pairs: u32, neighbor: u32, axis: u32, after: bool) -> Asked {
     let bound = bounds[3u * (pairs + (neighbor >> 8u)) + axis];
     let rest = select(0, STEP, axis == half.coordinate);
@@ -81,16 +85,17 @@ fn ask(so_far: Asked, apart: i32, pairs: u32, neighbor: u32, axis: u32, after: b
     return Asked(so_far.count + 1u, so_far.sum + asked, max(so_far.lowest, low), min(so_far.highest, high));
 }
 
-// The nearest integer to a mean, of two that are equally near the one nearer to 0.
+// The mean, rounded to the nearest integer, with ties toward 0.
 fn mean(sum: i32, count: u32) -> i32 {
     let size = min(select(u32(sum), 0u - u32(sum), sum < 0), MOST_ASKED);
     let nearest = i32((2u * size + count - 1u) / (2u * count));
     return select(nearest, -nearest, sum < 0);
 }
 
-// How far an element goes.
+// The displacement of an element.
 fn way(asked: Asked, k: i32) -> i32 {
-    // An element of a link that is beyond its bounds stays: a way that keeps the others may not be there.
+    // An element with a link beyond its bounds does not move, because a displacement that keeps the
+    // other links within their bounds may not exist.
     if (asked.count == 0u || asked.lowest > 0 || asked.highest < 0) {
         return 0;
     }
@@ -98,7 +103,7 @@ fn way(asked: Asked, k: i32) -> i32 {
     return select(max(min(by, asked.highest), asked.lowest), 0, abs(by) < k);
 }
 
-// Moves one element of the half; 1 if it moved.
+// Moves one element of this parity. Returns 1 if it moved.
 fn relax_one(number: u32) -> u32 {
     let columns = (slab.columns + 1u) / 2u;
     let row = number / columns;
@@ -155,7 +160,7 @@ fn relax_one(number: u32) -> u32 {
     return select(0u, 1u, by != 0);
 }
 
-// Whether anything moved in the sweep before.
+// True if any element moved in the sweep before.
 fn moved_before() -> bool {
     var any = 0u;
     for (var word = 0u; word < HALVES; word++) {

@@ -1,4 +1,4 @@
-// Distance: an edge keeps its length. The twin of `Distance::eval`.
+// Distance: an edge keeps its length. The same operations as `Distance::eval`.
 struct Params {
     rest_length: f32,
 }

@@ -1,4 +1,4 @@
-// Skin tension, energy form. The twin of `SkinTension::eval`.
+// Skin tension, energy form. The same operations as `SkinTension::eval`.
 struct Params {
     rest_area: f32,
     amplification: f32,

@@ -1,4 +1,4 @@
-// Skin tension, paper form. The twin of `SkinTensionPaper::eval`.
+// Skin tension, paper form. The same operations as `SkinTensionPaper::eval`.
 struct Params {
     rest_area: f32,
     amplification: f32,

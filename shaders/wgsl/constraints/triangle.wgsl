@@ -1,10 +1,11 @@
-// Area of a triangle and its gradient, shared by the two forms of skin tension. The twin of `triangle::area_and_gradient`.
+// Area of a triangle and its gradient, used by both forms of skin tension. The same operations as
+// `triangle::area_and_gradient`.
 struct Area {
     area: f32,
     grad: array<vec3f, N>,
 }
 
-// (8 · machine epsilon)² = 2⁻⁴⁰: below it the normal of a triangle is rounding noise.
+// (8 · machine epsilon)² = 2⁻⁴⁰. Below this value the normal of a triangle is rounding noise.
 const NOISE_SQUARED: f32 = 1.0 / 1099511627776.0;
 
 fn area_and_gradient(x: array<vec3f, N>) -> Area {
@@ -20,13 +21,14 @@ fn area_and_gradient(x: array<vec3f, N>) -> Area {
     return Area(n_length * 0.5, array<vec3f, N>(-(grad2 + grad3), grad2, grad3));
 }
 
-// max(0, c)/rest_area: relative stretch of the area; 0 if the rest area is 0.
+// The relative stretch of the area, max(0, c)/rest_area. It is 0 if the rest area is 0.
 fn stretch(c: f32, rest_area: f32) -> f32 {
     let stretched = c > 0.0 && rest_area > 0.0;
     return select(0.0, c / select(1.0, rest_area, stretched), stretched);
 }
 
-// 1/r², as far as a projection follows the gradient. The twin of `triangle::inverse_reach_squared`.
+// 1/r² for the largest distance r of a projection along the gradient. The same operations as
+// `triangle::inverse_reach_squared`.
 fn inverse_reach_squared_of(x: array<vec3f, N>, rest_area: f32) -> f32 {
     let e2 = x[1] - x[0];
     let e3 = x[2] - x[0];

@@ -1,4 +1,4 @@
-// Volume: a tetrahedron keeps its signed volume. The twin of `Volume::eval`.
+// Volume: a tetrahedron keeps its signed volume. The same operations as `Volume::eval`.
 struct Params {
     rest_volume: f32,
 }

@@ -1,6 +1,6 @@
 // Hounsfield units of a volume at any position, by trilinear interpolation.
 
-// Padding below air counts as air.
+// Padding values below air count as air.
 const AIR_HU: f32 = -1024.0;
 
 // HU = slope · stored + intercept.
@@ -38,7 +38,7 @@ fn sample(field: texture_3d<i32>, scale: Scale, position: vec3f) -> f32 {
     return near + part.z * (far - near);
 }
 
-// HU of the volume that is shown.
+// HU of the rendered volume.
 fn hu_at(position: vec3f) -> f32 {
     return sample(volume, volume_scale, position);
 }

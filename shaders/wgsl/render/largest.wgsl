@@ -1,4 +1,5 @@
-// The largest HU in every block, a thread per block. A block needs the voxels at its far faces too, so those belong to two.
+// The largest HU in each block, with one thread per block. Interpolation in a block also reads the
+// voxels on its upper faces, so that those voxels belong to two blocks.
 
 @group(0) @binding(2) var<storage, read_write> largest: array<f32>;
 

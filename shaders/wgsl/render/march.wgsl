@@ -1,13 +1,14 @@
-// Where a ray meets the surface, in steps from its start.
+// The intersection of a ray with the surface, in steps from the start of the ray.
 
-// Halvings of the step in which the surface lies.
+// Number of bisections of the step that crosses the surface.
 const HALVINGS: u32 = 6u;
-// More steps than any ray has.
+// Larger than the number of steps of any ray.
 const FAR: f32 = 1e30;
 
 @group(0) @binding(3) var<storage, read> largest: array<f32>;
 
-// How many steps a ray at `position` may go before it leaves its block, or −1 if that may hold surface.
+// The number of steps until a ray at `position` leaves its block, or −1 if the block may contain
+// surface.
 fn free_steps(position: vec3f) -> f32 {
     let shape = block_shape(textureDimensions(volume));
     let block = min(vec3u(max(position, vec3f(0.0))) / SIDE, shape - 1u);
@@ -20,7 +21,7 @@ fn free_steps(position: vec3f) -> f32 {
     return max(min(steps.x, min(steps.y, steps.z)), 0.0);
 }
 
-// The crossing within the step before `n`.
+// The crossing within the step that ends at `n`.
 fn refine(start: vec3f, n: f32) -> f32 {
     if (n == 0.0) {
         return 0.0;
@@ -38,14 +39,14 @@ fn refine(start: vec3f, n: f32) -> f32 {
     return inside;
 }
 
-// First point at or above the threshold; −1 if there is none up to `length`.
+// The first point at or above the threshold, or −1 if there is none up to `length`.
 fn march(start: vec3f, length: f32) -> f32 {
     var n = 0.0;
     while (n <= length) {
         let position = start + view.step * n;
         let free = free_steps(position);
         if (free >= 0.0) {
-            // The next sample behind the block's wall; the samples stay a step apart.
+            // Continue with the first sample behind the block. Samples stay a whole step apart.
             n = max(floor(n + free), n) + 1.0;
             continue;
         }

@@ -1,5 +1,6 @@
-// A thread per ray: xyz is its start as a continuous index, w its length in steps, below 0 if it meets nothing. Found are the
-// linear light and, as w, the steps to the surface; −1 if there is none.
+// One thread per ray. xyz of a ray is its start as a continuous index, and w is its length in
+// steps, negative for a ray that misses the volume. The result is the linear light, with the number
+// of steps to the surface as w, or −1 without surface.
 
 @group(0) @binding(4) var<storage, read> rays: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> found: array<vec4f>;

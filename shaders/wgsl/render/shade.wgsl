@@ -1,10 +1,10 @@
-// Light from a surface point: its color under light from the viewer's side, with ambient occlusion.
+// Light from a surface point, with a light source on the viewer's side and ambient occlusion.
 
-// Parts of the occlusion's reach at which tissue is looked for.
+// Fractions of the occlusion's reach at which the volume is sampled.
 const REACHES: array<f32, 3> = array(0.2, 0.5, 1.0);
 
-// ∂HU/∂index: central differences over one voxel to either side, averaged over the position and its six neighbors;
-// 14 times as large.
+// 14 times ∂HU/∂index, from central differences over one voxel to each side, averaged over the
+// position and its six neighbors.
 fn index_gradient(position: vec3f) -> vec3f {
     let x = vec3f(1.0, 0.0, 0.0);
     let y = vec3f(0.0, 1.0, 0.0);
@@ -15,13 +15,13 @@ fn index_gradient(position: vec3f) -> vec3f {
         + across(position, z, x).yxx * vec3f(1.0, 0.0, 1.0);
 }
 
-// The differences over one and two voxels.
+// The sum of the differences over one and over two voxels.
 fn along(position: vec3f, axis: vec3f) -> f32 {
     return hu_at(position + axis) - hu_at(position - axis)
         + hu_at(position + 2.0 * axis) - hu_at(position - 2.0 * axis);
 }
 
-// The differences along `a` and along `b` between the four neighbors that lie along both.
+// The differences along `a` and along `b` between the four diagonal neighbors.
 fn across(position: vec3f, a: vec3f, b: vec3f) -> vec2f {
     let both = hu_at(position + a + b);
     let first = hu_at(position + a - b);
@@ -44,7 +44,7 @@ fn normal_at(index: vec3f) -> vec3f {
     return select(outward / max(length, 1e-30), view.toward, length == 0.0);
 }
 
-// Share of the ambient light that reaches the point: 1 on a convex body, less in a cleft.
+// Fraction of the ambient light that reaches the point: 1 on a convex body, less in a cleft.
 fn openness(index: vec3f, normal: vec3f) -> f32 {
     if (view.occlusion == 0.0) {
         return 1.0;
@@ -77,7 +77,7 @@ fn cut_face(index: vec3f) -> vec3f {
 fn surface(index: vec3f) -> vec3f {
     let normal = normal_at(index);
     let open = openness(index, normal);
-    // Light that has been through flesh is red: the less of it comes, the more so.
+    // Light that scatters in tissue becomes red, more so where less light arrives.
     let root = sqrt(open);
     let base = albedo(index, normal) * vec3f(open, open * root, open * root * sqrt(root));
     let diffuse = max(dot(normal, view.light), 0.0);

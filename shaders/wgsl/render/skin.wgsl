@@ -1,4 +1,4 @@
-// All surface is skin.
+// The whole surface is skin.
 fn albedo(index: vec3f, normal: vec3f) -> vec3f {
     return view.skin;
 }

@@ -1,4 +1,4 @@
-// Skin, or tissue by its HU where the surface was deep at rest.
+// Skin, or tissue by its HU where the surface was deep inside the body at rest.
 
 @group(0) @binding(6) var depth: texture_3d<i32>;
 

@@ -1,7 +1,9 @@
-// Each deformed tet claims the voxels that it holds or comes near: the smallest key wins.
+// Each deformed tet claims the voxels whose centers it holds or touches within the tolerance. The
+// smallest key wins.
 @group(0) @binding(4) var<storage, read_write> owners: array<atomic<u32>>;
 
-// In the key of a tet that only comes near a center: any tet that holds it wins.
+// Flag in the key of a tet that touches a center only within the tolerance, so that every tet that
+// holds the center wins.
 const NEAR: u32 = 0x80000000u;
 
 fn span_of(t: u32) -> u32 {

@@ -1,4 +1,4 @@
-// A slab that nobody has claimed.
+// Resets a slab: no voxel has an owner or a mark, and the lists of large tets are empty.
 @group(0) @binding(0) var<uniform> slab: Slab;
 @group(0) @binding(1) var<storage, read_write> owners: array<u32>;
 @group(0) @binding(2) var<storage, read_write> marks: array<u32>;

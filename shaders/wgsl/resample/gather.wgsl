@@ -1,6 +1,7 @@
-// Each voxel of the slab takes its value: through its owner, air where the body has gone, else what it was. A thread fills two
-// voxels, the halves of one word. One dispatch serves the voxels that the tets of its chunk own, if those touch the slab; the one
-// of the first chunk serves the voxels without an owner too.
+// Each voxel of the slab gets its value: a voxel with an owner from the rest shape, a voxel that
+// the body left becomes air, and the others keep their value. A thread fills two voxels, the halves
+// of one word. A dispatch fills the voxels that the tets of its chunk own, if the chunk touches the
+// slab. The dispatch of the first chunk also fills the voxels without an owner.
 @group(0) @binding(0) var<uniform> grid: Grid;
 @group(0) @binding(1) var<uniform> slab: Slab;
 @group(0) @binding(2) var<storage, read> owners: array<u32>;
@@ -9,15 +10,13 @@
 @group(0) @binding(5) var<storage, read_write> values: array<u32>;
 @group(0) @binding(6) var source: texture_3d<i32>;
 @group(0) @binding(7) var<storage, read> reaches: array<vec2u>;
-@group(1) @binding(0) var<uniform> chunk: Chunk;
-@group(1) @binding(1) var<storage, read> tets: array<vec4u>;
 @group(1) @binding(2) var<storage, read> places: array<vec4f>;
 @group(1) @binding(3) var<storage, read> rest_places: array<vec4f>;
 
 const NONE: u32 = 0xffffffffu;
 const NEAR: u32 = 0x80000000u;
 
-// Covered, moved, vacated and folded voxels.
+// Numbers of covered, moved, vacated and folded voxels.
 var<workgroup> counted: array<atomic<u32>, 4>;
 
 fn mark(plane: u32, voxel: u32) -> u32 {
@@ -36,8 +35,8 @@ fn between(a: f32, b: f32, fraction: f32) -> f32 {
     return a + fraction * (b - a);
 }
 
-// The trilinear value at a place, rounded to the nearest stored value, halves upwards. Where padding meets anything else it
-// counts as the nearest value that is none.
+// The trilinear value at a place, rounded to the nearest stored value, halves upwards. Next to
+// other values, padding counts as the nearest value that is not padding.
 fn trilinear(place: vec3f) -> i32 {
     let first = vec3f(grid.first_x, grid.first_y, grid.first_z);
     let last = vec3f(grid.last_x, grid.last_y, grid.last_z);
@@ -68,15 +67,10 @@ fn trilinear(place: vec3f) -> i32 {
     return i32(floor(between(y0, y1, f.z) + 0.5));
 }
 
-// Where a point of a deformed tet was at rest. A point just outside is held in the tet, however thin that is.
+// The rest place of a point in a deformed tet. A point just outside is moved into the tet, even a
+// very thin one.
 fn rest_place(corners: vec4u, point: vec3f, held: bool) -> vec3f {
-    let tet = tet_of(
-        places[corners.x].xyz,
-        places[corners.y].xyz,
-        places[corners.z].xyz,
-        places[corners.w].xyz,
-        grid.tolerance,
-    );
+    let tet = tet_of(corners_of(corners), grid.tolerance);
     let height = heights(tet, row_of(tet, point.y, point.z), point.x);
     let inner = max(height, vec4f(0.0));
     let sum = ((inner.x + inner.y) + inner.z) + inner.w;

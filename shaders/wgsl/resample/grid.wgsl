@@ -1,22 +1,23 @@
-// The volume, the region of it that is filled, and the way from the positions of vertices to it.
+// The volume, its region to fill, and the map from positions to voxels.
 //
-// Places are voxel indices relative to the voxel `center` of the volume, so that the numbers are small near the body.
+// A place is a voxel index relative to the voxel `center` of the volume, so that the numbers are
+// small near the body.
 struct Grid {
     // place = linear · position + offset
     xx: f32, xy: f32, xz: f32,
     yx: f32, yy: f32, yz: f32,
     zx: f32, zy: f32, zz: f32,
     offset_x: f32, offset_y: f32, offset_z: f32,
-    // A length in voxels below which two positions cannot be told apart.
+    // Accuracy of a position in voxels.
     tolerance: f32,
-    // The region: place of its first voxel, and its shape.
+    // The region: the place of its first voxel, and its shape.
     region_x: f32, region_y: f32, region_z: f32,
     columns: u32, rows: u32, slices: u32,
-    // The volume: places of its first and last voxel, and its voxel at place zero.
+    // The volume: the places of its first and last voxel, and the voxel at place zero.
     first_x: f32, first_y: f32, first_z: f32,
     last_x: f32, last_y: f32, last_z: f32,
     center_i: i32, center_j: i32, center_k: i32,
-    // Stored values: what a vacated voxel becomes, and the range that is no padding.
+    // Stored values: air for vacated voxels, and the range of values that are not padding.
     air: i32, scanned_low: i32, scanned_high: i32,
     unused: u32,
 }
@@ -26,21 +27,21 @@ struct Slab {
     first: u32,
     slices: u32,
     voxels: u32,
-    // Number of lists of large tets; their lengths come first in `large`.
+    // Number of lists of large tets. `large` starts with their lengths.
     lists: u32,
-    // Where the counts of this slab begin in `counters`.
+    // Index of the first count of this slab in `counters`.
     counts: u32,
     unused_1: u32, unused_2: u32, unused_3: u32,
 }
 
-// Tets that lie side by side in one buffer.
+// Tets in one buffer.
 struct Chunk {
-    // Number of its first tet among all.
+    // Index of the first tet among all tets.
     first: u32,
     count: u32,
-    // How many of them, the first ones, are the body's.
+    // Number of tets of the body, which come first.
     body: u32,
-    // Its list of large tets.
+    // Index of the list of large tets.
     list: u32,
 }
 

@@ -1,4 +1,5 @@
-// Positions of the vertices → places; w is 1 where a vertex is not where it was at rest, down to the last bit.
+// Maps the positions of the vertices to places. w is 1 if the position of a vertex differs from
+// that at rest in any bit.
 @group(0) @binding(0) var<uniform> grid: Grid;
 @group(0) @binding(1) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(2) var<storage, read> rest: array<vec4f>;

@@ -1,22 +1,22 @@
-// The voxels of a slab that each tet holds or comes near: `take` is called for each. A thread walks a tet alone, unless that is
-// large: then it goes on a list, and the threads of a workgroup share its rows. The order does not matter to the result.
+// Calls `take` for each voxel of a slab whose center a tet holds or touches within the tolerance.
+// One thread processes a small tet. A large tet goes to a list, and the threads of a workgroup
+// process its rows. The result does not depend on the order.
 //
-// The source joined to this declares `span_of`, the slices of a tet, and `take`.
+// The source joined to this declares `take` and `span_of`, the slices of a tet.
 @group(0) @binding(0) var<uniform> grid: Grid;
 @group(0) @binding(1) var<uniform> slab: Slab;
-// Three bits for each voxel, 32 voxels to a word: held strictly by a body tet, by two, and left by the body.
+// Three bits per voxel, in planes of 32 voxels per word: strictly inside a tet of the body, inside
+// two of them, and left by the body.
 @group(0) @binding(2) var<storage, read_write> marks: array<atomic<u32>>;
-// Lengths of the lists, then the one that is in use: numbers of tets in their chunk.
+// The lengths of the lists, then the present list: indices of tets in their chunk.
 @group(0) @binding(3) var<storage, read_write> large: array<atomic<u32>>;
-// First slice and end of all that a list's tets come near.
+// First slice and end of the tets of each list.
 @group(0) @binding(5) var<storage, read> reaches: array<vec2u>;
-@group(1) @binding(0) var<uniform> chunk: Chunk;
-@group(1) @binding(1) var<storage, read> tets: array<vec4u>;
 @group(1) @binding(2) var<storage, read> spans: array<vec2u>;
-// Places of the vertices: now, or at rest.
+// Places of the vertices, now or at rest.
 @group(1) @binding(3) var<storage, read> places: array<vec4f>;
 
-// More voxels than this are shared.
+// Tets with more voxels than this are large.
 const LARGE: u32 = 1024u;
 
 // Words of one plane of `marks`.
@@ -24,29 +24,17 @@ fn plane() -> u32 {
     return (slab.voxels + 31u) / 32u;
 }
 
-// The part of a tet's box in this slab, which it touches.
-fn box_in_slab(corners: vec4u) -> Box {
-    var covered = box_of(
-        places[corners.x].xyz,
-        places[corners.y].xyz,
-        places[corners.z].xyz,
-        places[corners.w].xyz,
-    );
+// The part of a tet's box in this slab. The tet must touch the slab.
+fn box_in_slab(vertices: vec4u) -> Box {
+    var covered = box_of(corners_of(vertices));
     covered.first.z = max(covered.first.z, slab.first);
     covered.end.z = min(covered.end.z, slab.first + slab.slices);
     return covered;
 }
 
-// Rows `start`, `start + step` … of the tet's box.
+// Processes the rows `start`, `start + step`, … of the tet's box.
 fn walk_rows(t: u32, covered: Box, start: u32, step: u32) {
-    let corners = tets[t];
-    let tet = tet_of(
-        places[corners.x].xyz,
-        places[corners.y].xyz,
-        places[corners.z].xyz,
-        places[corners.w].xyz,
-        grid.tolerance,
-    );
+    let tet = tet_of(corners_of(tets[t]), grid.tolerance);
     let rows = covered.end.y - covered.first.y;
     let count = rows * (covered.end.z - covered.first.z);
     for (var r = start; r < count; r += step) {
@@ -63,8 +51,8 @@ fn walk_rows(t: u32, covered: Box, start: u32, step: u32) {
     }
 }
 
-// Puts a tet on the list if it is large and there is room.
-fn is_left_to_others(t: u32, covered: Box) -> bool {
+// Adds a tet to the list if it is large and the list has space. Returns true if it did.
+fn is_deferred(t: u32, covered: Box) -> bool {
     let size = covered.end - covered.first;
     if size.x * size.y * size.z <= LARGE {
         return false;
@@ -89,7 +77,7 @@ fn walk(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
             continue;
         }
         let covered = box_in_slab(tets[t]);
-        if !is_left_to_others(t, covered) {
+        if !is_deferred(t, covered) {
             walk_rows(t, covered, 0u, 1u);
         }
     }

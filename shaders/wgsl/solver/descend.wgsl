@@ -1,14 +1,14 @@
-// Moves the vertices of a chunk of one color, and leaves their forces at zero. The twin of `DescentStep::moved`.
+// Moves the vertices of a chunk of one color and resets their forces to zero. The same operations
+// as `DescentStep::moved`.
 struct VertexForce {
     force: vec4f,
     diagonal: vec4f,
     mixed: vec4f,
 }
 
-// The numbers of a substep. The twin of `DescentStep`.
+// Constants of a substep, as in `DescentStep`.
 struct Descent {
-    // Gravity times h².
-    fall: vec3f,
+    gravity_h_squared: vec3f,
     h: f32,
     inverse_h_squared: f32,
     relaxation: f32,
@@ -19,9 +19,9 @@ struct Descent {
 @group(0) @binding(2) var<storage, read> previous: array<vec4f>;
 @group(0) @binding(3) var<storage, read> velocities: array<vec4f>;
 @group(0) @binding(4) var<uniform> descent: Descent;
-@group(1) @binding(0) var<storage, read> chosen: array<u32>;
+@group(1) @binding(0) var<storage, read> indices: array<u32>;
 
-// Four times the machine epsilon: what rounding leaves of a matrix, over its trace.
+// Four times the machine epsilon: the rounding error of a matrix over its trace.
 const NOISE: f32 = 0x1p-21f;
 
 fn finite_or_zero(value: f32) -> f32 {
@@ -30,14 +30,14 @@ fn finite_or_zero(value: f32) -> f32 {
 
 @compute @workgroup_size(64)
 fn descend(@builtin(global_invocation_id) id: vec3u) {
-    if (id.x >= arrayLength(&chosen)) {
+    if (id.x >= arrayLength(&indices)) {
         return;
     }
-    let v = chosen[id.x];
+    let v = indices[id.x];
     let vertex = vertices[v];
     let found = forces[id.x];
     let inertia = descent.inverse_h_squared / vertex.w;
-    let goal = (previous[v].xyz + velocities[v].xyz * descent.h) + descent.fall;
+    let goal = (previous[v].xyz + velocities[v].xyz * descent.h) + descent.gravity_h_squared;
     let f = found.force.xyz + (goal - vertex.xyz) * inertia;
     let d = found.diagonal.xyz;
     let least = max((d.x + d.y + d.z) * NOISE, inertia);

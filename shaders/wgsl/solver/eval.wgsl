@@ -1,17 +1,19 @@
-// What a constraint returns, and what its `eval` may call. `N`, the number of vertices, stands above.
+// The result of a constraint, and functions that its `eval` may call. `N`, the number of vertices,
+// is declared above.
 struct Eval {
     c: f32,
     grad: array<vec3f, N>,
 }
 
-// 1/r² with the longest way r on which a projection follows the gradient; an `eval` may set it. Zero: no limit.
+// 1/r² for the largest distance r of a projection along the gradient. An `eval` may set it. Zero
+// means no limit.
 var<private> inverse_reach_squared: f32;
 
-// Zero, and no compiler can know: entry points set it to whether there are no constraints at all.
+// Always zero, but compilers cannot know it: entry points set it to 1 if there are no constraints.
 var<private> hidden_zero: u32;
 
-// The value itself, behind a wall that optimizers do not see through. Drivers turn `a * b + a * c` into `a * (b + c)`, which
-// rounds differently; `a` behind such a wall is not the same `a`.
+// Returns the value unchanged, in a form that optimizers cannot analyze. Drivers replace
+// `a * b + a * c` by `a * (b + c)`, which rounds differently. They cannot do so with `exact(a * b)`.
 fn exact(value: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(value) | hidden_zero);
 }

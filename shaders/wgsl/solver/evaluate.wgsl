@@ -1,7 +1,7 @@
-// Value and gradients of constraints on their own, `N` positions after `N` positions: for tests of a constraint.
+// Values and gradients of constraints, for tests. Each constraint has `N` consecutive positions.
 @group(0) @binding(0) var<storage, read> points: array<vec4f>;
 @group(0) @binding(1) var<storage, read> params: array<Params>;
-// Per constraint `N` vectors: a gradient, and the value in the fourth component.
+// `N` vectors per constraint: the gradients, with the value as fourth component.
 @group(0) @binding(2) var<storage, read_write> found: array<vec4f>;
 
 @compute @workgroup_size(64)

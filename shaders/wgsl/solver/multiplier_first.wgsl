@@ -1,4 +1,4 @@
-// The first of several iterations: the multiplier begins at zero and is kept.
+// The first of several iterations. The multiplier starts at zero and is stored.
 @group(1) @binding(3) var<storage, read_write> multipliers: array<f32>;
 
 fn multiplier_of(k: u32) -> f32 {

@@ -1,4 +1,4 @@
-// A later iteration: the multiplier goes on from the one before.
+// A later iteration. The multiplier continues from the iteration before.
 @group(1) @binding(3) var<storage, read_write> multipliers: array<f32>;
 
 fn multiplier_of(k: u32) -> f32 {

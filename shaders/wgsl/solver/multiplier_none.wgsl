@@ -1,4 +1,4 @@
-// One iteration: the multiplier begins at zero and is not kept.
+// A single iteration. The multiplier starts at zero and is not stored.
 fn multiplier_of(k: u32) -> f32 {
     return 0.0;
 }

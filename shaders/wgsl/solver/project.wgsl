@@ -1,4 +1,5 @@
-// Projects a chunk of one color of one kind: no two of its constraints share a vertex. The twin of `project`.
+// Projects a chunk of one color of one kind. Two of its constraints never share a vertex. The same
+// operations as `project`.
 @group(0) @binding(0) var<storage, read_write> vertices: array<vec4f>;
 @group(0) @binding(1) var<uniform> settings: Settings;
 @group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;

@@ -1,10 +1,11 @@
-// Value over rest size of a chunk of constraints: per workgroup the sum of squares and the largest absolute value.
+// Value over rest size of a chunk of constraints: the sum of squares and the largest absolute value
+// per workgroup.
 @group(0) @binding(0) var<storage, read> vertices: array<vec4f>;
 @group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;
 @group(1) @binding(1) var<storage, read> params: array<Params>;
-// Zero where there is no rest size to compare with.
+// Zero for constraints with a rest size of zero.
 @group(1) @binding(2) var<storage, read> inverse_rest_size: array<f32>;
-@group(1) @binding(3) var<storage, read_write> partial: array<vec2f>;
+@group(1) @binding(3) var<storage, read_write> workgroup_sums: array<vec2f>;
 
 var<workgroup> sums: array<vec2f, 64>;
 
@@ -34,6 +35,6 @@ fn residual(
         }
     }
     if (local == 0u) {
-        partial[group.x] = sums[0];
+        workgroup_sums[group.x] = sums[0];
     }
 }

@@ -1,4 +1,4 @@
-// The numbers of a substep. The twin of `Integrator`.
+// Constants of a substep, as in `Integrator`.
 struct Settings {
     gravity_h: vec3f,
     h: f32,

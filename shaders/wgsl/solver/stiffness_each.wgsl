@@ -1,4 +1,4 @@
-// A stiffness for each constraint.
+// One stiffness per constraint.
 @group(1) @binding(2) var<storage, read> stiffness: array<f32>;
 
 fn stiffness_of(k: u32) -> f32 {

@@ -1,5 +1,5 @@
-// What the constraints of one kind do to the vertices of a chunk: force, and the matrix of its quadratic model. The twin of
-// `VertexForce::add`.
+// The forces of one kind of constraint on the vertices of a chunk, and the matrices of their
+// quadratic models. The same operations as `VertexForce::add`.
 struct VertexForce {
     force: vec4f,
     // Entries xx, yy, zz.
@@ -8,9 +8,9 @@ struct VertexForce {
     mixed: vec4f,
 }
 
-// A vertex of the chunk, and its part of `places`.
-struct Share {
-    vertex: u32,
+// The position of a vertex in the chunk, and the range of its `entries`.
+struct VertexEntries {
+    position: u32,
     start: u32,
     end: u32,
 }
@@ -19,25 +19,25 @@ struct Share {
 @group(0) @binding(1) var<storage, read_write> forces: array<VertexForce>;
 @group(1) @binding(0) var<storage, read> tuples: array<array<u32, N>>;
 @group(1) @binding(1) var<storage, read> params: array<Params>;
-// Inverse compliance, and the size of the rest size.
+// Inverse compliance and absolute rest size.
 @group(1) @binding(2) var<storage, read> shape: array<vec2f>;
-// Constraint times N plus which of its vertices.
-@group(1) @binding(3) var<storage, read> places: array<u32>;
-@group(1) @binding(4) var<storage, read> shares: array<Share>;
+// Index of a constraint times N, plus the position of the vertex in its tuple.
+@group(1) @binding(3) var<storage, read> entries: array<u32>;
+@group(1) @binding(4) var<storage, read> ranges: array<VertexEntries>;
 
 @compute @workgroup_size(64)
 fn vertex_force(@builtin(global_invocation_id) id: vec3u) {
-    if (id.x >= arrayLength(&shares)) {
+    if (id.x >= arrayLength(&ranges)) {
         return;
     }
     hidden_zero = select(0u, 1u, arrayLength(&tuples) == 0u);
-    let share = shares[id.x];
-    var force = forces[share.vertex].force.xyz;
-    var diagonal = forces[share.vertex].diagonal.xyz;
-    var mixed = forces[share.vertex].mixed.xyz;
-    for (var n = share.start; n < share.end; n++) {
-        let k = places[n] / N;
-        let slot = places[n] % N;
+    let range = ranges[id.x];
+    var force = forces[range.position].force.xyz;
+    var diagonal = forces[range.position].diagonal.xyz;
+    var mixed = forces[range.position].mixed.xyz;
+    for (var n = range.start; n < range.end; n++) {
+        let k = entries[n] / N;
+        let corner = entries[n] % N;
         var tuple = tuples[k];
         var x: array<vec3f, N>;
         for (var i = 0u; i < N; i++) {
@@ -45,7 +45,7 @@ fn vertex_force(@builtin(global_invocation_id) id: vec3u) {
         }
         var found = eval(x, params[k]);
         let c = exact(found.c);
-        let g = exact3(found.grad[slot]);
+        let g = exact3(found.grad[corner]);
         let stiffness = shape[k].x;
         let kg = exact3(g * stiffness);
         let stretch = max(c, 0.0);
@@ -57,7 +57,7 @@ fn vertex_force(@builtin(global_invocation_id) id: vec3u) {
         diagonal = diagonal + (exact3(kg * g) + vec3f(curvature));
         mixed = mixed + exact3(vec3f(kg.x * g.y, kg.x * g.z, kg.y * g.z));
     }
-    forces[share.vertex].force = vec4f(force, 0.0);
-    forces[share.vertex].diagonal = vec4f(diagonal, 0.0);
-    forces[share.vertex].mixed = vec4f(mixed, 0.0);
+    forces[range.position].force = vec4f(force, 0.0);
+    forces[range.position].diagonal = vec4f(diagonal, 0.0);
+    forces[range.position].mixed = vec4f(mixed, 0.0);
 }

@@ -1,14 +1,14 @@
-// The passes over vertices: prediction, velocity update, both in one, a look at finiteness, the way back. The twin of
-// `Integrator::run`.
+// The passes over vertices: prediction, velocity update, both combined, the check for finite
+// positions, and the reset. The same operations as `Integrator::run`.
 //
-// A body that left the finite numbers stays where it is: `check` notes the first such vertex, and no later pass of the step
-// overwrites `previous`, so that `restore` leads back to the start of that substep.
+// `check` stores the first vertex whose position is not finite. After that no pass of the step
+// overwrites `previous`, so that `restore` resets the state to the start of that substep.
 struct Status {
-    // The first vertex that is not finite; NONE while all are.
+    // The first vertex that is not finite, or NONE.
     vertex: atomic<u32>,
-    // Substeps that ended finite.
+    // Number of substeps with a finite result.
     substeps: u32,
-    // 1 once a substep has begun after one that did not.
+    // 1 once a substep has started after one that was not finite.
     failed: u32,
 }
 
@@ -18,7 +18,7 @@ const NONE: u32 = 0xffffffffu;
 @group(0) @binding(1) var<storage, read_write> previous: array<vec4f>;
 @group(0) @binding(2) var<storage, read_write> velocities: array<vec4f>;
 @group(0) @binding(3) var<uniform> settings: Settings;
-// The first vertex of this part of the body.
+// Index of the first vertex of this part of the body.
 @group(0) @binding(4) var<uniform> first: u32;
 @group(0) @binding(5) var<storage, read_write> status: Status;
 
@@ -34,7 +34,7 @@ fn predict_from(i: u32, velocity: vec3f) {
     }
 }
 
-// Whether the substep before ended finite. The first thread counts it.
+// True if the result of the substep before is finite. The first thread counts the substep.
 fn goes_on(i: u32) -> bool {
     let finite = atomicLoad(&status.vertex) == NONE;
     if (first + i == 0u) {
@@ -55,7 +55,7 @@ fn predict(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// After `finish` of the substep before.
+// Runs after `finish` of the substep before.
 @compute @workgroup_size(64)
 fn predict_next(@builtin(global_invocation_id) id: vec3u) {
     let i = id.x;

@@ -42,7 +42,8 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
     let count = lattice.positions.len();
     let masses: Vec<f64> = (0..count).map(|n| (n % 12).min(1) as f64 * (0.5 + (n % 7) as f64)).collect();
     let skin: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(5).collect();
-    // Each compliance scales with its power of the length, so that a scaled body moves the same way.
+    // Each compliance scales with its power of the length, so that a scaled body moves the same
+    // way.
     let stiffness = |count: usize, compliance: f64| {
         let value = |n: usize| if parts.each { (1 + n % 3) as f64 } else { 1.0 };
         let unit = match parts.formulation {

@@ -1,7 +1,7 @@
 //! A lost device, and failed measurements.
 
 use cutis_coloring::greedy;
-use cutis_constraints::{Constraint, Distance, DistanceMaterial, Eval, Real};
+use cutis_constraints::{Constraint, Distance, Eval, Real};
 use cutis_solver::{Formulation, Handle, Settings, Solver, SolverError, Stiffness, SystemBuilder};
 use cutis_solver_gpu::SolverGpu;
 use cutis_test_kit::gpu::on_each_adapter;
@@ -33,7 +33,8 @@ fn after_a_lost_device_the_last_known_state_remains() {
     });
 }
 
-/// Springs whose WGSL declares a name that only the residual kernel uses, so that this kernel fails.
+/// Springs whose WGSL declares a name that only the residual kernel uses, so that this kernel
+/// fails.
 struct NameClash;
 
 impl Constraint<2> for NameClash {
@@ -49,10 +50,10 @@ impl Constraint<2> for NameClash {
         }"
     );
     type Params<T: Real> = [T; 1];
-    type Material = DistanceMaterial;
+    type Material = ();
 
-    fn from_rest<T: Real>(x: &[Point3<T>; 2], material: &DistanceMaterial) -> [T; 1] {
-        Distance::from_rest(x, material)
+    fn from_rest<T: Real>(x: &[Point3<T>; 2], _: &()) -> [T; 1] {
+        Distance::from_rest(x, &Default::default())
     }
     fn eval<T: Real>(x: &[Point3<T>; 2], params: &[T; 1]) -> Eval<T, 2> {
         Distance::eval(x, params)
@@ -74,7 +75,7 @@ fn a_failed_measurement_does_not_change_the_run() {
             let handle = Handle { vertices: vec![0], move_m: [0.0, 0.1, 0.0], over_s: 0.05 };
             let system = SystemBuilder::<f32>::new(&points, &[1.0f32; 3])
                 .unwrap()
-                .add_from_rest::<NameClash, 2>(&springs, &Default::default(), soft, &groups)
+                .add_from_rest::<NameClash, 2>(&springs, &(), soft, &groups)
                 .unwrap()
                 .handle(handle)
                 .unwrap()

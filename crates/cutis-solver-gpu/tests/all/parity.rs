@@ -1,5 +1,5 @@
-//! Results equal those of the reference solver: bit for bit on software adapters, within rounding on
-//! hardware. Controls must differ.
+//! Results equal those of the reference solver: bit for bit on software adapters, within rounding
+//! on hardware. Controls must differ.
 
 use std::time::Instant;
 

@@ -66,8 +66,8 @@ fn overflowing() -> System<f32> {
         .build()
 }
 
-/// As on the CPU, the error names the vertex, and the state is reset to the start of the substep and
-/// can be stepped again.
+/// As on the CPU, the error names the vertex, and the state is reset to the start of the substep
+/// and can be stepped again.
 #[test]
 fn overflow_resets_the_state_to_the_start_of_its_substep() {
     let settings = Settings { dt_s: 12.0, substeps: 6, ..Settings::default() };

@@ -131,7 +131,7 @@ fn threads_take_each_chunk_once() {
 
 #[test]
 #[should_panic(expected = "vertices that do not exist")]
-fn a_set_for_more_vertices_is_refused() {
+fn a_set_for_more_vertices_is_rejected() {
     let mut system = system(false);
     let (vertices, kinds) = system.projection_parts();
     let (vertices, step) = (&mut vertices[..7], Step::Pbd);
@@ -140,7 +140,7 @@ fn a_set_for_more_vertices_is_refused() {
 
 #[test]
 #[should_panic(expected = "one multiplier per constraint")]
-fn too_few_multipliers_are_refused() {
+fn too_few_multipliers_are_rejected() {
     let mut system = system(false);
     let (vertices, kinds) = system.projection_parts();
     let (multipliers, step) = (&mut [0.0; 6][..], Step::Pbd);

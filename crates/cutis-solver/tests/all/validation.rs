@@ -1,4 +1,5 @@
-//! Input validation and its error messages, the state after numbers that overflow, and measurements.
+//! Input validation and its error messages, the state after numbers that overflow, and
+//! measurements.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Volume};
@@ -66,8 +67,8 @@ fn errors_name_invalid_constraints() {
     assert!(matches!(error, SolverError::KindLength { found: 1, expected: 2, .. }), "{error}");
     let error = add(&EDGES, &[[1.0], [f64::INFINITY]], soft(), &groups()).unwrap();
     assert!(matches!(error, SolverError::Parameter { constraint: 1, parameter: 0, .. }), "{error}");
-    // Both edges in one group is wrong because they share vertex 1. The other group is wrong because
-    // it contains an edge twice.
+    // Both edges in one group is wrong because they share vertex 1. The other group is wrong
+    // because it contains an edge twice.
     for (order, offsets) in [(vec![0, 1], vec![0, 2]), (vec![0, 0], vec![0, 1, 2])] {
         let error = add(&EDGES, &[[1.0]; 2], soft(), &Groups { order, offsets }).unwrap();
         assert!(matches!(error, SolverError::Groups { kind: "distance", .. }), "{error}");

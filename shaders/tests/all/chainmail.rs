@@ -1,11 +1,11 @@
-//! The relaxation of ChainMail.
+//! The relaxation of the ChainMail model.
 
 use cutis_shaders::chainmail;
 
 use crate::{assert_baseline, size_of_struct, validated};
 
 #[test]
-fn the_relaxation_is_valid_and_has_its_entry_point() {
+fn the_source_is_valid_and_has_its_entry_point() {
     assert_baseline("relax", &chainmail::relax(), &[chainmail::RELAX]);
 }
 
@@ -17,7 +17,7 @@ fn uniforms_are_whole_blocks_of_sixteen_bytes() {
 }
 
 #[test]
-fn the_words_of_a_sweep_are_those_of_the_shader() {
+fn the_shader_has_the_same_number_of_words() {
     let source = chainmail::relax();
     let has = |text: String| assert!(source.contains(&text), "{text}");
     has(format!("const SWEEP: u32 = {}u;", chainmail::SWEEP_WORDS));
@@ -25,9 +25,9 @@ fn the_words_of_a_sweep_are_those_of_the_shader() {
     has(format!("array<atomic<u32>, {}>", 2 * chainmail::SWEEP_WORDS));
 }
 
-/// The control: a source that does not validate is seen.
+/// Control: invalid changes of the source are errors.
 #[test]
-fn broken_relaxations_are_seen() {
+fn invalid_changes_are_rejected() {
     let broken = |from: &str, to: &str| {
         let source = chainmail::relax();
         assert!(source.contains(from), "{from}");

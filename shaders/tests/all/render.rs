@@ -18,9 +18,9 @@ fn the_view_has_the_stated_size() {
     assert_eq!(bytes as usize, render::VIEW_BYTES);
 }
 
-/// The control.
+/// Control: a field that does not exist is an error.
 #[test]
-fn a_field_that_is_not_there_is_seen() {
+fn an_unknown_field_is_rejected() {
     let broken = render::raymarch(Albedo::Wound).replace("view.skin +", "view.skins +");
     assert!(validated(&broken).is_err());
 }

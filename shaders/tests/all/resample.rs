@@ -4,7 +4,7 @@ use cutis_shaders::resample;
 
 use crate::{assert_baseline, size_of_struct, validated};
 
-/// Name, source and entry points.
+/// Returns the name, the source and the entry points of each pass.
 fn sources() -> [(&'static str, String, Vec<&'static str>); 6] {
     let walks = || vec![resample::WALK_ALL, resample::WALK_LARGE];
     [
@@ -31,9 +31,9 @@ fn uniforms_are_whole_blocks_of_sixteen_bytes() {
     }
 }
 
-/// The control: a source that does not validate is seen.
+/// Control: invalid changes of a source are errors.
 #[test]
-fn broken_passes_are_seen() {
+fn invalid_changes_are_rejected() {
     let broken = |source: String, from: &str, to: &str| {
         assert!(source.contains(from), "{from}");
         validated(&source.replace(from, to)).is_err()

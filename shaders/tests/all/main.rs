@@ -8,10 +8,10 @@ mod solver;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, TypeInner};
 
-/// Storage buffers that a kernel may use on any device.
-const MOST_STORAGE_BUFFERS: usize = 8;
+/// Number of storage buffers that every device supports in a kernel.
+const MAX_STORAGE_BUFFERS: usize = 8;
 
-/// The source as naga sees it, or what is wrong with it.
+/// Parses and validates a source, and returns the module or the error message.
 fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
     let module = naga::front::wgsl::parse_str(source).map_err(|error| error.emit_to_string(source))?;
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
@@ -19,7 +19,8 @@ fn validated(source: &str) -> Result<(Module, ModuleInfo), String> {
     Ok((module, info))
 }
 
-/// A source must be valid, have exactly these entry points, each of 64 threads and with no more buffers than the baseline has.
+/// Checks that a source is valid and has exactly these entry points, each with 64 threads and
+/// within the baseline's number of buffers.
 fn assert_baseline(what: &str, source: &str, entries: &[&str]) {
     let (module, info) = validated(source).unwrap_or_else(|message| panic!("{what}: {message}"));
     let found: Vec<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
@@ -31,11 +32,11 @@ fn assert_baseline(what: &str, source: &str, entries: &[&str]) {
             !used[*handle].is_empty() && matches!(variable.space, AddressSpace::Storage { .. })
         });
         let count = buffers.count();
-        assert!(count <= MOST_STORAGE_BUFFERS, "{what}, {}: {count} storage buffers", entry.name);
+        assert!(count <= MAX_STORAGE_BUFFERS, "{what}, {}: {count} storage buffers", entry.name);
     }
 }
 
-/// Bytes of the struct `name`.
+/// Returns the size of the struct `name` in bytes.
 fn size_of_struct(source: &str, name: &str) -> u32 {
     let (module, _) = validated(source).unwrap_or_else(|message| panic!("{name}: {message}"));
     let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
@@ -45,9 +46,9 @@ fn size_of_struct(source: &str, name: &str) -> u32 {
     }
 }
 
-/// The control: what a source leaves undefined, or a ninth buffer, is seen.
+/// Control: an undefined name and a ninth buffer are errors.
 #[test]
-fn invalid_sources_are_seen() {
+fn invalid_sources_are_rejected() {
     assert!(validated("fn f() -> f32 { return x; }").is_err());
     let buffers: String =
         (0..9).map(|n| format!("@group(0) @binding({n}) var<storage, read_write> b{n}: f32;")).collect();

@@ -43,10 +43,10 @@ fn parameters_have_no_padding() {
     }
 }
 
-/// The control.
+/// Control: an unknown field and a wrong arity are errors.
 #[test]
-fn another_field_or_another_arity_is_seen() {
+fn an_unknown_field_and_a_wrong_arity_are_rejected() {
     let broken = DISTANCE.replace("p.rest_length", "p.length");
     assert!(validated(&solver::evaluate(2, &broken)).is_err());
-    assert!(validated(&solver::evaluate(3, VOLUME)).is_err(), "three vertices where four are read");
+    assert!(validated(&solver::evaluate(3, VOLUME)).is_err(), "the constraint reads four vertices");
 }

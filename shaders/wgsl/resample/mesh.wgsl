@@ -1,0 +1,13 @@
+// The tets of a chunk, and the corners of a tet. The source joined to this declares `places`.
+@group(1) @binding(0) var<uniform> chunk: Chunk;
+@group(1) @binding(1) var<storage, read> tets: array<vec4u>;
+
+// Places of the corners of the tet with these vertices.
+fn corners_of(vertices: vec4u) -> Corners {
+    return Corners(
+        places[vertices.x].xyz,
+        places[vertices.y].xyz,
+        places[vertices.z].xyz,
+        places[vertices.w].xyz,
+    );
+}
