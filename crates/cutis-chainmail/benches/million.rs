@@ -1,39 +1,40 @@
-//! A million elements: propagation, one thread and all, and a sweep of relaxation.
+//! A million elements: propagation with one queue and with slabs, and one sweep of relaxation.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use cutis_chainmail::{Chain, Drag, Material, Order};
 
 const SIDE: usize = 100;
 
-/// What a cube is made of.
+/// The materials of a cube.
 #[derive(Clone, Copy)]
-enum Made {
+enum Materials {
     /// One material.
     Uniform,
-    /// Layers, ten elements thick, of something stiff between soft tissue.
+    /// Layers of ten elements, alternately soft and stiff.
     Layers,
-    /// Soft or stiff at random, element by element.
+    /// A soft or a stiff element at random.
     Noise,
 }
 
-fn cube(made: Made) -> Chain {
+fn cube(materials: Materials) -> Chain {
     let soft = Material::isotropic(0.9, 1.1, 0.1, 0.0);
     let stiff = Material::isotropic(0.99, 1.01, 0.01, 0.0);
-    let material = |element: usize| match made {
-        Made::Uniform => 0,
-        Made::Layers => (element / SIDE % SIDE / 10 % 2) as u8,
-        Made::Noise => (element as u32).wrapping_mul(2_654_435_761).count_ones() as u8 % 2,
+    let material = |element: usize| match materials {
+        Materials::Uniform => 0,
+        Materials::Layers => (element / SIDE % SIDE / 10 % 2) as u8,
+        Materials::Noise => (element as u32).wrapping_mul(2_654_435_761).count_ones() as u8 % 2,
     };
     Chain::new([SIDE; 3], [1.0; 3], &[soft, stiff], (0..SIDE.pow(3)).map(material).collect()).unwrap()
 }
 
-/// Moves all of it: a corner by more than the body gives way.
+/// Drags a corner so far that all elements move.
 fn pull(chain: &Chain) -> Drag {
     let element = chain.element([0; 3]);
     Drag { element, to: [-60.0, -50.0, -40.0] }
 }
 
-/// Drags every seventh element along each axis a little, so that many coordinates are not where the neighbors ask them to be.
+/// Drags every seventh element along each axis a little, so that many elements are away from the
+/// mean of their neighbors.
 fn knead(chain: &Chain) -> Chain {
     let mut kneaded = chain.clone();
     for element in 0..chain.places() as u32 {
@@ -54,10 +55,12 @@ fn knead(chain: &Chain) -> Chain {
 fn benches(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("million");
     group.sample_size(10).throughput(Throughput::Elements(SIDE.pow(3) as u64));
-    for (name, made) in [("uniform", Made::Uniform), ("layers", Made::Layers), ("noise", Made::Noise)] {
-        let chain = cube(made);
-        for (kind, order) in [("fifo", Order::Fifo), ("slabs", Order::Slabs)] {
-            group.bench_function(format!("{kind}/{name}"), |bencher| {
+    for (name, materials) in
+        [("uniform", Materials::Uniform), ("layers", Materials::Layers), ("noise", Materials::Noise)]
+    {
+        let chain = cube(materials);
+        for (queue, order) in [("fifo", Order::Fifo), ("slabs", Order::Slabs)] {
+            group.bench_function(format!("{queue}/{name}"), |bencher| {
                 bencher.iter_batched_ref(
                     || chain.clone(),
                     |chain| {
@@ -78,7 +81,7 @@ fn benches(criterion: &mut Criterion) {
                 BatchSize::LargeInput,
             );
         });
-        // What is looked up once, before the first sweep, is no part of it.
+        // The search for classes happens once, before the first sweep. It is not measured.
         dragged.relax(0, &[]);
         group.bench_function(format!("sweep/{name}"), |bencher| {
             bencher.iter_batched_ref(

@@ -1,48 +1,49 @@
-//! The chain: elements, what they are made of, and where they are.
+//! The chain: a grid of elements, their materials, their links and their positions.
 
 use crate::ChainError;
-use crate::blade::Blade;
-use crate::census::{Census, MIXED, STILL};
 use crate::limits::{Bounds, Limits};
 use crate::links::{Links, Neighbor};
 use crate::material::{self, Material};
+use crate::neighborhood::{IMMOBILE, NeighborhoodClasses, UNCLASSIFIED};
+use crate::simd::SimdLevel;
 use crate::units::{FARTHEST_MOVED, UNITS_PER_STEP, to_steps};
-use crate::wide::Width;
 
-/// The material of a place of the grid where there is nothing.
+/// Material number of a grid point without an element.
 pub const NO_MATERIAL: u8 = u8::MAX;
 
-/// A grid of elements, and links between neighbors: 17 bytes for each place of the grid, 18 once it is relaxed.
+/// A grid of elements with links between neighbors.
 ///
-/// Element `(i, j, k)` is number `i + nx (j + ny k)`. It is at rest at `(i, j, k)` steps.
+/// Element `(i, j, k)` has the number `i + nx (j + ny k)` and rests at `(i, j, k)` steps. A chain
+/// takes 17 bytes per grid point, and 18 after the first relaxation.
 #[derive(Clone, Debug)]
 pub struct Chain {
-    pub(crate) body: Body,
+    pub(crate) structure: Structure,
     pub(crate) spacing_mm: [f64; 3],
-    /// By coordinate, in units.
+    /// Positions by coordinate, in units.
     pub(crate) positions: [Vec<i32>; 3],
-    /// By coordinate: what a drag notes, and 0 between drags.
+    /// Flags of a drag by coordinate. They are 0 between drags.
     pub(crate) flags: [Vec<u8>; 3],
-    /// Fixed elements that a drag would have had to move: the next one begins with them too.
+    /// Fixed elements that the last drag would have had to move. The next drag starts with them
+    /// too.
     pub(crate) strained: Vec<u32>,
-    /// How elements can be relaxed; empty before it was first asked.
-    pub(crate) census: Census,
-    /// By row along the first axis: something in it may have changed since it was last relaxed.
+    /// Classes of elements that relax together; empty until the first relaxation.
+    pub(crate) classes: NeighborhoodClasses,
+    /// For each row along the first axis: true if it may have changed since the last relaxation.
     pub(crate) changed: Vec<bool>,
-    /// What relaxation computes with; the outcome is the same.
-    pub(crate) width: Width,
+    /// Instruction set of the relaxation. It does not change the result.
+    pub(crate) simd: SimdLevel,
 }
 
-/// What of a chain a drag does not change.
+/// The part of a chain that a drag does not change.
 #[derive(Clone, Debug)]
-pub(crate) struct Body {
+pub(crate) struct Structure {
     pub(crate) links: Links,
     pub(crate) materials: Vec<u8>,
     pub(crate) limits: Limits,
 }
 
-impl Body {
-    /// The bounds of a link.
+impl Structure {
+    /// Bounds of one coordinate of a link.
     #[inline]
     pub(crate) fn bounds(&self, element: u32, neighbor: Neighbor, coordinate: usize) -> Bounds {
         let [a, b] = [element, neighbor.element].map(|element| self.materials[element as usize]);
@@ -51,11 +52,15 @@ impl Body {
 }
 
 impl Chain {
-    /// A chain at rest. `element_materials`: for each place of the grid a number in `materials`, or [`NO_MATERIAL`].
+    /// Creates a chain at rest.
+    ///
+    /// `shape` is the number of grid points along each axis, and `spacing_mm` their distance.
+    /// `element_materials` has one entry for each grid point: an index into `materials`, or
+    /// [`NO_MATERIAL`].
     ///
     /// # Errors
-    /// [`ChainError::Shape`], [`ChainError::Spacing`], [`ChainError::Length`], [`ChainError::NoSuchMaterial`], and those of
-    /// materials.
+    /// [`ChainError::Shape`], [`ChainError::Spacing`], [`ChainError::Length`],
+    /// [`ChainError::NoSuchMaterial`], [`ChainError::MaterialCount`] and [`ChainError::Material`].
     pub fn new(
         shape: [usize; 3],
         spacing_mm: [f64; 3],
@@ -86,94 +91,104 @@ impl Chain {
         Ok(Self {
             positions: [0, 1, 2].map(at_rest),
             flags: [0, 1, 2].map(|_| vec![0; links.len()]),
-            body: Body { links, limits: Limits::new(materials, spacing_mm), materials: element_materials },
+            structure: Structure {
+                links,
+                limits: Limits::new(materials, spacing_mm),
+                materials: element_materials,
+            },
             strained: Vec::new(),
-            census: Census::default(),
+            classes: NeighborhoodClasses::default(),
             changed: vec![false; shape[1] * shape[2]],
-            width: Width::widest(),
+            simd: SimdLevel::best(),
             spacing_mm,
         })
     }
 
-    /// Elements along each axis.
+    /// Number of grid points along each axis.
     pub fn shape(&self) -> [usize; 3] {
-        self.body.links.shape()
+        self.structure.links.shape()
     }
 
-    /// Places of the grid, empty or not.
+    /// Number of grid points, with or without an element.
     pub fn places(&self) -> usize {
-        self.body.links.len()
+        self.structure.links.len()
     }
 
-    /// Number of the element at a place of the grid.
+    /// Number of the element at a grid point.
     pub fn element(&self, [i, j, k]: [usize; 3]) -> u32 {
         let [nx, ny, _] = self.shape();
         (i + nx * (j + ny * k)) as u32
     }
 
-    /// Whether there is an element.
-    pub fn is_there(&self, element: u32) -> bool {
-        self.body.materials.get(element as usize).is_some_and(|&material| material != NO_MATERIAL)
+    /// True if there is an element with this number.
+    pub fn has_element(&self, element: u32) -> bool {
+        self.structure.materials.get(element as usize).is_some_and(|&material| material != NO_MATERIAL)
     }
 
-    /// Where an element is, in steps; exact.
+    /// Position of an element in steps, without rounding.
     pub fn position(&self, element: u32) -> [f64; 3] {
         self.units(element).map(to_steps)
     }
 
-    /// How far an element is from where it rests, in steps; exact.
+    /// Displacement of an element from its rest position in steps, without rounding.
     pub fn displacement(&self, element: u32) -> [f64; 3] {
-        let place = self.body.links.place(element);
+        let place = self.structure.links.place(element);
         let position = self.position(element);
         [0, 1, 2].map(|axis| position[axis] - place[axis] as f64)
     }
 
-    /// Where an element is, in units of a step over [`UNITS_PER_STEP`].
+    /// Position of an element in units; a step has [`UNITS_PER_STEP`] of them.
     pub fn units(&self, element: u32) -> [i32; 3] {
         [0, 1, 2].map(|axis| self.positions[axis][element as usize])
     }
 
-    /// Fixes elements where they are, for good.
+    /// Fixes elements permanently at their present positions.
     ///
     /// # Errors
-    /// [`ChainError::NoSuchElement`]; then none is fixed.
+    /// [`ChainError::NoSuchElement`]; then no element is fixed.
     pub fn fix(&mut self, elements: &[u32]) -> Result<(), ChainError> {
         elements.iter().try_for_each(|&element| self.check_element(element))?;
         for &element in elements {
-            self.body.links.set_fixed(element);
-            if let Some(state) = self.census.of.get_mut(element as usize) {
-                *state = STILL;
+            self.structure.links.set_fixed(element);
+            if let Some(state) = self.classes.class_of.get_mut(element as usize) {
+                *state = IMMOBILE;
             }
         }
         Ok(())
     }
 
-    /// Whether an element is fixed.
+    /// True if an element is fixed.
     pub fn is_fixed(&self, element: u32) -> bool {
-        self.is_there(element) && self.body.links.is_fixed(element)
+        self.has_element(element) && self.structure.links.is_fixed(element)
     }
 
-    /// Elements linked with an element.
+    /// The elements that are linked with an element.
     pub fn neighbors(&self, element: u32) -> impl Iterator<Item = u32> {
-        self.is_there(element).then(|| self.body.links.of(element)).into_iter().flatten().map(|n| n.element)
+        self.has_element(element)
+            .then(|| self.structure.links.of(element))
+            .into_iter()
+            .flatten()
+            .map(|n| n.element)
     }
 
-    /// The link of an element to the one after it along an axis: that element, and for each coordinate the least and the most that it may
-    /// be ahead, in units.
+    /// The link from an element to the next one along an axis.
+    ///
+    /// Returns the next element and, for each coordinate, the smallest and the largest allowed
+    /// difference `next − element` in units.
     pub fn link(&self, element: u32, axis: usize) -> Option<(u32, [[i32; 2]; 3])> {
-        let next = self.is_there(element).then(|| self.body.links.next(element, axis)).flatten()?;
+        let next = self.has_element(element).then(|| self.structure.links.next(element, axis)).flatten()?;
         let neighbor = Neighbor { element: next, axis, next: true };
-        let bounds = [0, 1, 2].map(|coordinate| self.body.bounds(element, neighbor, coordinate));
+        let bounds = [0, 1, 2].map(|coordinate| self.structure.bounds(element, neighbor, coordinate));
         Some((next, bounds.map(|Bounds { lo, hi }| [lo, hi])))
     }
 
-    /// Removes the links for which `apart` says so of the elements before and after; how many there were. Asks about every link
-    /// in order of the elements.
+    /// Removes every link for which `apart(chain, element, next)` is true, and returns how many it
+    /// removed. `apart` is called for all links, in the order of the elements.
     pub fn cut(&mut self, apart: impl Fn(&Self, u32, u32) -> bool) -> usize {
         let mut cut = 0;
         for element in 0..self.places() as u32 {
             for axis in 0..3 {
-                let next = self.body.links.next(element, axis);
+                let next = self.structure.links.next(element, axis);
                 if next.is_some_and(|next| apart(self, element, next)) {
                     cut += usize::from(self.cut_link(element, axis));
                 }
@@ -182,28 +197,11 @@ impl Chain {
         cut
     }
 
-    /// Removes the links that a blade crosses, where they are now; how many there were.
-    pub fn cut_with(&mut self, blade: &Blade) -> usize {
-        self.cut(|chain, a, b| blade.crosses(chain.position(a), chain.position(b)))
-    }
-
-    /// Removes the links between elements for which `mask` differs; how many there were.
-    ///
-    /// # Errors
-    /// [`ChainError::Length`].
-    pub fn cut_mask(&mut self, mask: &[bool]) -> Result<usize, ChainError> {
-        let (found, expected) = (mask.len(), self.places());
-        if found != expected {
-            return Err(ChainError::Length { what: "mask of a cut", found, expected });
-        }
-        Ok(self.cut(|_, a, b| mask[a as usize] != mask[b as usize]))
-    }
-
-    /// Removes the links between pairs of elements; how many there were.
+    /// Removes the links between pairs of elements and returns how many it removed.
     pub fn cut_links(&mut self, pairs: &[[u32; 2]]) -> usize {
         let mut cut = 0;
         for [a, b] in pairs.iter().map(|[a, b]| [*a.min(b), *a.max(b)]) {
-            let links = &self.body.links;
+            let links = &self.structure.links;
             if (b as usize) < links.len()
                 && let Some(axis) = (0..3).find(|&axis| links.next(a, axis) == Some(b))
             {
@@ -213,40 +211,43 @@ impl Chain {
         cut
     }
 
-    /// Removes the link of an element to the one after it; whether there was one.
+    /// Removes the link to the next element along an axis. Returns true if there was one.
     fn cut_link(&mut self, element: u32, axis: usize) -> bool {
-        let Some(next) = self.body.links.next(element, axis) else { return false };
+        let Some(next) = self.structure.links.next(element, axis) else { return false };
         for end in [element, next] {
-            if let Some(state) = self.census.of.get_mut(end as usize).filter(|state| **state != STILL) {
-                *state = MIXED;
+            if let Some(state) =
+                self.classes.class_of.get_mut(end as usize).filter(|state| **state != IMMOBILE)
+            {
+                *state = UNCLASSIFIED;
             }
         }
         self.mark_changed(element);
-        self.body.links.cut(element, axis)
+        self.structure.links.cut(element, axis)
     }
 
     /// Number of links.
     pub fn links(&self) -> usize {
         let next =
-            |element: u32| (0..3).filter(|&axis| self.body.links.next(element, axis).is_some()).count();
+            |element: u32| (0..3).filter(|&axis| self.structure.links.next(element, axis).is_some()).count();
         (0..self.places() as u32).map(next).sum()
     }
 
-    /// Bytes that are stored once the chain has been relaxed, by part: coordinates, links with what is fixed, materials, and
-    /// what drags and relaxation note.
+    /// Memory of the chain in bytes, by part, after the first relaxation. `links` includes which
+    /// elements are fixed; `marks` are the working data of drags and relaxation.
     pub fn bytes(&self) -> [(&'static str, usize); 4] {
         let count = self.places();
         let coordinates = 3 * count * size_of::<i32>();
         [("coordinates", coordinates), ("links", count), ("materials", count), ("marks", 4 * count)]
     }
 
-    /// Fixed elements that the last drag would have had to move; what a saved state needs beside the positions.
+    /// Fixed elements that the last drag would have had to move. A saved state needs them in
+    /// addition to the positions.
     pub fn strained(&self) -> &[u32] {
         &self.strained
     }
 
-    /// Goes on from a saved state: where elements are, in units, and what [`Chain::strained`] said. Other elements stay where they
-    /// are.
+    /// Continues from a saved state: positions in units, and the value of [`Chain::strained`].
+    /// Elements that are not listed keep their positions.
     ///
     /// # Errors
     /// [`ChainError::NoSuchElement`], [`ChainError::TooFar`]; then nothing moves.
@@ -266,13 +267,13 @@ impl Chain {
         Ok(())
     }
 
-    /// Notes that relaxation has to look at an element's row and those beside it.
+    /// Marks the row of an element as changed, so that relaxation visits it and its neighbors.
     pub(crate) fn mark_changed(&mut self, element: u32) {
-        self.changed[element as usize / self.body.links.shape()[0]] = true;
+        self.changed[element as usize / self.structure.links.shape()[0]] = true;
     }
 
     pub(crate) fn check_element(&self, element: u32) -> Result<(), ChainError> {
-        if self.is_there(element) {
+        if self.has_element(element) {
             return Ok(());
         }
         Err(ChainError::NoSuchElement { element, count: self.places() })

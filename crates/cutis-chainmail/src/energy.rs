@@ -1,4 +1,4 @@
-//! What a state costs, and what is wrong with it.
+//! Energy of a chain, and the links that are beyond their bounds.
 
 use rayon::prelude::*;
 
@@ -6,36 +6,37 @@ use crate::chain::Chain;
 use crate::links::Neighbor;
 use crate::units::{UNITS_PER_STEP, to_steps};
 
-/// A link beyond its bounds.
+/// A link that is beyond its bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkViolation {
-    /// The element before.
+    /// The element at the lower end.
     pub element: u32,
-    /// The element after.
+    /// The element at the upper end.
     pub next: u32,
-    /// The coordinate that is farthest beyond its bounds.
+    /// The coordinate with the largest violation.
     pub axis: usize,
-    /// By how much, in steps.
+    /// Size of that violation in steps.
     pub excess: f64,
 }
 
-/// The links beyond their bounds.
+/// Summary of all links that are beyond their bounds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Violations {
-    /// How many there are.
+    /// Number of such links.
     pub links: usize,
-    /// The one that is farthest beyond, the first of several.
+    /// The link with the largest violation; the first one if several are equal.
     pub worst: Option<LinkViolation>,
 }
 
 impl Chain {
-    /// System energy, mm²: half the sum over all links of the squared distance between where the ends are to each other and where
-    /// they rest to each other. Summed in integers, so that it is the same for any number of threads.
+    /// Energy of the chain in mm²: half the sum, over all links, of the squared deviation of the
+    /// vector between the ends from its rest value. The sum is computed in integers, so that it is
+    /// the same for any number of threads.
     pub fn energy_mm2(&self) -> f64 {
         let squares = self.over_rows(|sum: &mut [i128; 3], element| {
             let at = self.units(element);
             for axis in 0..3 {
-                let Some(next) = self.body.links.next(element, axis) else { continue };
+                let Some(next) = self.structure.links.next(element, axis) else { continue };
                 let other = self.units(next);
                 for coordinate in 0..3 {
                     let rest = if axis == coordinate { UNITS_PER_STEP } else { 0 };
@@ -49,11 +50,11 @@ impl Chain {
         (0..3).map(|c| 0.5 * total[c] as f64 * one_mm[c] * one_mm[c]).sum()
     }
 
-    /// The links beyond their bounds.
+    /// Finds the links that are beyond their bounds.
     pub fn violations(&self) -> Violations {
         let found = self.over_rows(|sum: &mut (usize, Option<(i32, u32, u32, usize)>), element| {
             for axis in 0..3 {
-                let Some(next) = self.body.links.next(element, axis) else { continue };
+                let Some(next) = self.structure.links.next(element, axis) else { continue };
                 let link = Neighbor { element: next, axis, next: true };
                 let excess = [0, 1, 2].map(|coordinate| self.excess(element, link, coordinate));
                 let worst =
@@ -78,7 +79,8 @@ impl Chain {
         Violations { links, worst }
     }
 
-    /// What `add` gathers of the elements of each row along the first axis.
+    /// Gathers a value for each row along the first axis by calling `add` for each element of the
+    /// row.
     fn over_rows<T: Default + Send>(&self, add: impl Fn(&mut T, u32) + Sync) -> Vec<T> {
         let row = self.shape()[0];
         (0..self.places() / row)

@@ -1,124 +1,129 @@
-//! What can be wrong with a chain or with what is asked of it.
+//! Errors of the ChainMail model.
 
-/// Why a chain could not be made, or not do what it was told.
+/// Why a chain could not be created, or could not do what was asked.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChainError {
-    /// A grid without elements, or one too large.
+    /// The grid has no elements or too many.
     #[error(
-        "a grid of {shape:?} elements: each axis must have 1 to {most} of them, and all together at most 4294967294"
+        "a grid of {shape:?} elements: each axis must have 1 to {most} of them, and all axes together at most \
+         4294967294"
     )]
     Shape {
-        /// Elements along each axis.
+        /// Grid points along each axis.
         shape: [usize; 3],
-        /// Most along an axis.
+        /// Largest number along an axis.
         most: usize,
     },
-    /// A step of the grid that is no length.
-    #[error("steps of {spacing_mm:?} mm: each must be a finite number above 0")]
+    /// The grid spacing is not a positive length.
+    #[error("a spacing of {spacing_mm:?} mm: each number must be finite and above 0")]
     Spacing {
-        /// Step along each axis, mm.
+        /// Spacing along each axis, mm.
         spacing_mm: [f64; 3],
     },
-    /// An array that does not have one entry for each element.
+    /// An array does not have one entry for each grid point.
     #[error("{what}: {found} entries for {expected} elements")]
     Length {
-        /// What the array holds.
+        /// Contents of the array.
         what: &'static str,
         /// Its length.
         found: usize,
-        /// Elements of the grid.
+        /// Number of grid points.
         expected: usize,
     },
-    /// No material, or more than can be numbered.
+    /// There is no material, or there are too many.
     #[error("{count} materials: there must be 1 to {most}")]
     MaterialCount {
         /// Number of materials.
         count: usize,
-        /// The most.
+        /// Largest number of materials.
         most: usize,
     },
-    /// A material with a number that makes no sense.
+    /// A number of a material is out of range.
     #[error("material {material}, {key}: {value} must be {range}")]
     Material {
-        /// Its place in the list.
+        /// Index of the material in its list.
         material: usize,
         /// Name of the field.
         key: &'static str,
-        /// What it is.
+        /// Value of the field.
         value: f64,
-        /// What would be right.
+        /// Allowed values.
         range: &'static str,
     },
-    /// A material table out of order.
+    /// The entries of a material table are out of order.
     #[error(
-        "entry {entry} of the materials begins at {from_hu} HU; each must begin at a finite number above that of the one before"
+        "entry {entry} of the material table begins at {from_hu} HU: each entry must begin at a finite HU above the \
+         previous one"
     )]
     TableOrder {
-        /// Its place in the table.
+        /// Index of the entry.
         entry: usize,
-        /// HU from which it holds.
+        /// HU at which the entry begins.
         from_hu: f32,
     },
-    /// No preset of that name.
-    #[error("there is no preset `{name}` of materials; expected {expected}")]
+    /// There is no preset with this name.
+    #[error("there is no material preset `{name}`; expected {expected}")]
     NoSuchPreset {
         /// The name.
         name: String,
-        /// Those that there are.
+        /// The names of all presets.
         expected: String,
     },
-    /// An element names a material that does not exist.
+    /// A grid point has a material number that does not exist.
     #[error(
-        "element {element} is of material {material}, but there are {count} materials (0 to {count} - 1)"
+        "element {element} has material {material}, but there are only {count} materials, numbered from 0"
     )]
     NoSuchMaterial {
-        /// The element.
+        /// The grid point.
         element: usize,
-        /// The material that it names.
+        /// Its material number.
         material: u8,
         /// Number of materials.
         count: usize,
     },
-    /// An element that is outside the grid, or at which there is nothing.
+    /// The element number is outside the grid, or there is no element at this grid point.
     #[error(
-        "element {element} does not exist: the grid has {count} places, and this one is outside or empty"
+        "element {element} does not exist: it is outside the grid of {count} points, or its point is empty"
     )]
     NoSuchElement {
         /// The element.
         element: u32,
-        /// Places of the grid.
+        /// Number of grid points.
         count: usize,
     },
-    /// An element that is to go to two places, or to move although it is fixed.
+    /// An element has two targets, or a fixed element has a target elsewhere.
     #[error("element {element} cannot be grabbed: {why}")]
     NotFree {
         /// The element.
         element: u32,
-        /// What is in the way.
+        /// Why it cannot be grabbed.
         why: &'static str,
     },
-    /// A place that cannot be named in 32 bits.
+    /// A target is too far away for 32-bit coordinates.
     #[error(
-        "element {element} cannot go to {to:?} steps: coordinates must be finite and within 4096 steps of the first element"
+        "element {element} cannot go to {to:?} steps: coordinates must be finite and within 4096 steps of the first \
+         element"
     )]
     TooFar {
         /// The element.
         element: u32,
-        /// Where it was told to go, in steps.
+        /// Its target in steps.
         to: [f64; 3],
     },
-    /// A chain of another shape, or of another number of materials, than the device was prepared for.
+    /// The chain has another shape or another number of materials than the one for which the device
+    /// was prepared.
     #[cfg(feature = "gpu")]
     #[error(
-        "the GPU was prepared for a chain of {of_shape:?} elements and {of_materials} materials, and this one has {shape:?} and {materials}"
+        "the GPU was prepared for a chain of {of_shape:?} elements with {of_materials} materials, but this one has \
+         {shape:?} elements with {materials} materials"
     )]
     OtherChain {
-        /// Elements along each axis.
+        /// Grid points along each axis.
         shape: [usize; 3],
         /// Number of materials.
         materials: usize,
-        /// Elements along each axis of the chain that the device was prepared for.
+        /// Grid points along each axis of the chain for which the device was prepared.
         of_shape: [usize; 3],
         /// Number of its materials.
         of_materials: usize,

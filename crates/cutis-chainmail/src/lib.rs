@@ -1,47 +1,53 @@
-//! ChainMail: a grid of elements, such as the voxels of a CT volume, held together by links that give way up to a limit.
+//! ChainMail: a grid of elements, such as the voxels of a CT volume, whose links give way up to a
+//! limit.
 //!
 //! # The model
 //!
-//! Elements sit at the points of a grid, and neighbors along an axis are linked. A link along axis `a` bounds, for every
-//! coordinate `c`, the difference of its ends (S. F. Gibson, *3D ChainMail*, I3D 1997):
+//! Elements sit at the points of a grid, and neighbors along an axis are linked. A link along axis
+//! `a` bounds the difference of its ends in every coordinate `c` (S. F. Gibson, *3D ChainMail*, I3D
+//! 1997):
 //!
 //! ```text
 //! lo[a][c] ≤ x_c(after) − x_c(before) ≤ hi[a][c]
 //! ```
 //!
-//! Along the link (`c = a`) these are the shortest and longest length, across it ± the shear. They come from the materials at
-//! both ends, half from each. Whoever is grabbed goes where it is told; a neighbor moves only if a bound is violated, and
-//! then by the least that satisfies it; that may violate others in turn.
+//! Along the link (`c = a`) the bounds are its shortest and its longest length. Across the link
+//! they are minus and plus the shear. Each end contributes half of a bound through its material. A
+//! grabbed element goes exactly to its target. A neighbor moves only if a bound is violated, and
+//! then as little as possible. Its move may violate the bounds of other links in turn.
 //!
-//! # What that is
+//! # The least move
 //!
-//! The bounds never mix coordinates, so that the three are independent, and each is a *system of difference constraints*. Its
-//! solutions are closed under the elementwise minimum and maximum. Of all states in which the grabbed elements are where
-//! they were told, the fixed ones where they were, and every link within its bounds, there is therefore one in which
-//! **each element has moved the least that it moves in any of them**:
+//! No bound mixes coordinates. The three coordinates are therefore independent, and each one is a
+//! *system of difference constraints*. The solutions of such a system are closed under the
+//! elementwise minimum and maximum. Consider all states in which the grabbed elements are at their
+//! targets, the fixed elements have not moved, and every link is within its bounds. If there is
+//! such a state, then there is one in which **each element has moved as little as in any other**:
 //!
 //! ```text
 //! x′ = min(max(x, L), U)
-//! L_j = max over grabbed g and paths g → j of  X_g + Σ lower bounds,     U_j = min of  X_g + Σ upper bounds
+//! L_j = max over grabbed g and paths g → j of  X_g + Σ lower bounds
+//! U_j = min over grabbed g and paths g → j of  X_g + Σ upper bounds
 //! ```
 //!
-//! [`Chain::drag`] finds it in two passes, one that only raises and one that only lowers coordinates. A pass ends, because no cycle
-//! of bounds gains anything while the body at rest satisfies them; and its end does not depend on the order in which elements are
-//! looked at. So one first-in-first-out queue (the wave of [`Order::Fifo`]) and a queue for each of many slabs, on any number of threads
-//! ([`Order::Slabs`]), give the same bits.
+//! [`Chain::drag`] finds this state in two passes: one only raises coordinates, the other only
+//! lowers them. A pass ends because the state at rest satisfies all bounds, so that no cycle of
+//! bounds gains anything. Its result does not depend on the order in which elements are visited. A
+//! single first-in-first-out queue ([`Order::Fifo`]) and one queue per slab on any number of
+//! threads ([`Order::Slabs`]) therefore give the same bits.
 //!
-//! There is no such state if, say, two fixed rigid parts are pulled apart. A pass then stops at the element that must not move,
-//! and says so ([`Moved::contradictions`]); the grabbed element is where it was told all the same.
+//! There may be no solution, for example if two fixed rigid parts are pulled apart. A pass then
+//! stops at the element that must not move and reports it ([`DragReport::contradictions`]). The
+//! grabbed element is at its target nevertheless.
 //!
 //! # Numbers
 //!
-//! Coordinates are in steps of the grid along its axes, with 16 binary places in 32 bits ([`UNITS_PER_STEP`]): at 1 mm they
-//! are 15 nm apart. All arithmetic is exact, and what is told in steps is rounded once, on the way in.
+//! Coordinates are in steps of the grid along its axes, with 16 binary places in 32 bits
+//! ([`UNITS_PER_STEP`]). With a step of 1 mm they resolve 15 nm. Arithmetic is exact. Only targets
+//! are rounded, once, when they are converted to units.
 //!
-//! With the feature `gpu` a GPU relaxes a chain, to the same bits: `RelaxGpu`.
+//! With the feature `gpu`, `RelaxGpu` relaxes a chain on a GPU to the same bits.
 
-mod blade;
-mod census;
 mod chain;
 mod classic;
 mod energy;
@@ -51,16 +57,16 @@ mod gpu;
 mod limits;
 mod links;
 mod material;
+mod neighborhood;
 mod pass;
 mod plane;
 mod relax;
+mod simd;
 mod units;
 mod wave;
-mod wide;
 
-pub use blade::Blade;
 pub use chain::{Chain, NO_MATERIAL};
-pub use classic::ClassicMoved;
+pub use classic::ClassicDragReport;
 pub use energy::{LinkViolation, Violations};
 pub use error::ChainError;
 #[cfg(feature = "gpu")]
@@ -68,7 +74,7 @@ pub use gpu::RelaxGpu;
 pub use material::{Material, MaterialTable};
 pub use relax::Relaxation;
 pub use units::{FARTHEST_STEPS, UNITS_PER_STEP};
-pub use wave::{Contradiction, Drag, Moved, Order};
+pub use wave::{Contradiction, Drag, DragReport, Order};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,26 +1,26 @@
-//! The bounds of every kind of link, in units.
+//! The bounds of links between all pairs of materials, in units.
 
 use crate::material::Material;
 use crate::units::{UNITS_PER_STEP, from_steps};
 
-/// Bounds on the difference of a coordinate between the ends of a link: that after, less that before.
+/// Bounds on the difference `after − before` of a coordinate along a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Bounds {
     pub(crate) lo: i32,
     pub(crate) hi: i32,
 }
 
-/// Bounds of links by coordinate, the materials at their ends, and axis.
+/// Bounds by coordinate, pair of materials and axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
     bounds: [Vec<[Bounds; 3]>; 3],
-    /// By material, in units; 1 at the least.
+    /// `k` by material in units; at least 1.
     k: Vec<i32>,
     materials: usize,
 }
 
 impl Limits {
-    /// Of links between all pairs of `materials`, which are checked.
+    /// Computes the bounds between all pairs of validated `materials`.
     pub(crate) fn new(materials: &[Material], spacing_mm: [f64; 3]) -> Self {
         let pairs = || materials.iter().flat_map(|a| materials.iter().map(move |b| (a, b)));
         let bounds = [0, 1, 2].map(|coordinate| {
@@ -30,13 +30,14 @@ impl Limits {
         Self { bounds, k: materials.iter().map(|m| units(m.k)).collect(), materials: materials.len() }
     }
 
-    /// Those of a coordinate for links along an axis, by [`Limits::pair`].
+    /// Bounds of a coordinate for links along an axis. See [`Limits::pair`] for the number of a
+    /// pair.
     #[inline]
     pub(crate) fn of(&self, coordinate: usize, pair: usize, axis: usize) -> Bounds {
         self.bounds[coordinate][pair][axis]
     }
 
-    /// All of a coordinate: lowest and highest, by pair and axis.
+    /// All bounds of a coordinate, as `[lo, hi]` by pair and axis.
     #[cfg(feature = "gpu")]
     pub(crate) fn table(&self, coordinate: usize) -> Vec<[i32; 2]> {
         self.bounds[coordinate].iter().flatten().map(|bounds| [bounds.lo, bounds.hi]).collect()
@@ -54,14 +55,15 @@ impl Limits {
         usize::from(a) * self.materials + usize::from(b)
     }
 
-    /// How near an element may be left to where its neighbors ask it to be, in units.
+    /// Smallest move that relaxation makes with a material, in units.
     #[inline]
     pub(crate) fn k(&self, material: u8) -> i32 {
         self.k[usize::from(material)]
     }
 }
 
-/// Half from each end, rounded inwards. A body at rest is within them: they hold the rest length, which is a whole number of units.
+/// Bounds of a link: half from each end, rounded inwards. The state at rest satisfies them, because
+/// a rest length is a whole number of units.
 fn between(a: &Material, b: &Material, axis: usize, coordinate: usize, spacing_mm: [f64; 3]) -> Bounds {
     let one = f64::from(UNITS_PER_STEP);
     if axis == coordinate {
@@ -69,7 +71,7 @@ fn between(a: &Material, b: &Material, axis: usize, coordinate: usize, spacing_m
         let hi = 0.5 * (a.longest[axis] + b.longest[axis]);
         Bounds { lo: (lo * one).ceil() as i32, hi: (hi * one).floor() as i32 }
     } else {
-        // A quotient that overflows would be undefined times 0.
+        // The quotient may overflow, and infinity times 0 is not a number.
         let steps = (spacing_mm[axis] / spacing_mm[coordinate]).min(f64::from(MOST_SHEAR));
         let shear = 0.5 * (a.shear[axis] + b.shear[axis]) * steps;
         let most = (shear * one).floor().min(f64::from(MOST_SHEAR)) as i32;
@@ -77,7 +79,7 @@ fn between(a: &Material, b: &Material, axis: usize, coordinate: usize, spacing_m
     }
 }
 
-/// A shear of so many units is none at all to a grid, and keeps sums within 32 bits.
+/// Largest shear in units. It does not restrict any grid, and keeps sums within 32 bits.
 const MOST_SHEAR: i32 = 1 << 26;
 
 #[cfg(test)]
@@ -95,7 +97,7 @@ mod tests {
         assert_eq!(of(0, 0, 0, 0), [0.5, 2.0]);
         assert_eq!((of(0, 1, 1, 1), of(1, 0, 1, 1)), ([0.75, 1.5], [0.75, 1.5]));
         assert_eq!((of(1, 1, 2, 2), of(1, 1, 2, 0)), ([1.0, 1.0], [0.0, 0.0]));
-        // A link along y is 2 mm long; across it, a quarter of that is half a step along x.
+        // A link along y is 2 mm long; a quarter of that is half a step along x.
         assert_eq!((of(0, 0, 1, 0), of(0, 1, 1, 0)), ([-0.5, 0.5], [-0.25, 0.25]));
         assert_eq!([0, 1].map(|material| limits.k(material)), [1, 1]);
     }
@@ -113,7 +115,7 @@ mod tests {
         }
     }
 
-    /// On a grid with one step the step cancels, to the last bit.
+    /// With equal spacings the spacing cancels without rounding.
     #[test]
     fn shear_does_not_depend_on_the_step_of_an_even_grid() {
         let lean = Material { shear: [1.5; 3], ..Material::isotropic(0.5, 2.0, 0.0, 0.0) };
@@ -123,7 +125,7 @@ mod tests {
         }
     }
 
-    /// A unit more would be beyond what the material allows.
+    /// One unit more would exceed what the material allows.
     #[test]
     fn limits_are_rounded_inwards() {
         let odd = Material { shear: [0.1, 0.1, 0.1], ..Material::isotropic(0.7, 1.1, 0.0, 0.0) };

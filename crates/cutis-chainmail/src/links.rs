@@ -1,28 +1,28 @@
-//! Which elements are linked with which, and which must not move: a byte for each.
+//! Links between elements, and which elements must not move: one byte per element.
 
 use crate::ChainError;
 use crate::units::MOST_ELEMENTS;
 
-/// A bit for the link to the next element along each axis, and one for that to the one before.
+/// Bits of the links to the next and to the previous element along each axis.
 pub(crate) const NEXT: [u8; 3] = [1, 2, 4];
 pub(crate) const BEFORE: [u8; 3] = [8, 16, 32];
 /// The element never moves.
 const FIXED: u8 = 64;
-/// The element is where it was told to be.
+/// The element is held at its target during this drag or relaxation.
 const GRABBED: u8 = 128;
 
-/// A link as one of its ends sees it.
+/// A link, seen from one of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Neighbor {
-    /// The other end.
+    /// The element at the other end.
     pub(crate) element: u32,
-    /// The axis that it lies along.
+    /// The axis of the link.
     pub(crate) axis: usize,
-    /// Whether the other end is the one after.
+    /// True if the other end is the next element, false if it is the previous one.
     pub(crate) next: bool,
 }
 
-/// The links of a grid; element `(i, j, k)` is number `i + nx (j + ny k)`.
+/// The links of a grid. Element `(i, j, k)` has the number `i + nx (j + ny k)`.
 #[derive(Clone, Debug)]
 pub(crate) struct Links {
     shape: [usize; 3],
@@ -31,7 +31,7 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// Links between all neighbors that are both `there`.
+    /// Links all neighbors for which `there` is true at both ends.
     pub(crate) fn new(shape: [usize; 3], there: impl Fn(usize) -> bool) -> Result<Self, ChainError> {
         let count = shape.iter().try_fold(1_usize, |count, &n| count.checked_mul(n));
         let fits = |count: &usize| u32::try_from(*count).is_ok_and(|count| count < u32::MAX);
@@ -58,7 +58,7 @@ impl Links {
         self.shape
     }
 
-    /// A byte for each element, as the kernels of a GPU read it.
+    /// The byte of each element, in the layout that the GPU kernel reads.
     #[cfg(feature = "gpu")]
     pub(crate) fn bits(&self) -> &[u8] {
         &self.bits
@@ -68,14 +68,14 @@ impl Links {
         self.bits.len()
     }
 
-    /// Position in the grid.
+    /// Grid point of an element.
     pub(crate) fn place(&self, element: u32) -> [usize; 3] {
         let [nx, ny, _] = self.shape;
         let element = element as usize;
         [element % nx, element / nx % ny, element / (nx * ny)]
     }
 
-    /// What an element is linked with.
+    /// The links of an element.
     #[inline]
     pub(crate) fn of(&self, element: u32) -> impl Iterator<Item = Neighbor> + use<> {
         let (bits, strides) = (self.bits[element as usize], self.strides);
@@ -100,13 +100,13 @@ impl Links {
         self.bits[element]
     }
 
-    /// The element after, if it is linked along this axis.
+    /// The next element along an axis, if there is a link to it.
     #[inline]
     pub(crate) fn next(&self, element: u32, axis: usize) -> Option<u32> {
         (self.bits[element as usize] & NEXT[axis] != 0).then(|| element + self.strides[axis])
     }
 
-    /// Removes the link to the element after; whether there was one.
+    /// Removes the link to the next element. Returns true if there was one.
     pub(crate) fn cut(&mut self, element: u32, axis: usize) -> bool {
         let next = self.next(element, axis);
         if let Some(next) = next {
@@ -116,7 +116,7 @@ impl Links {
         next.is_some()
     }
 
-    /// Whether a pass must leave the element where it is.
+    /// True if propagation must not move the element.
     #[inline]
     pub(crate) fn is_held(&self, element: u32) -> bool {
         self.bits[element as usize] & (FIXED | GRABBED) != 0

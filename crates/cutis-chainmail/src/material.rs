@@ -1,37 +1,39 @@
-//! How far links give way, and which material an HU stands for.
+//! Limits of links, and the table that maps HU to materials.
 
 use serde::{Deserialize, Serialize};
 
 use crate::ChainError;
 
-/// Limits of the links of an element, along each axis of the grid, and how far it springs back.
+/// How far the links of an element give way along each axis of the grid, and how much it relaxes.
 ///
-/// Lengths are over the link's rest length. A link takes half of its limits from the material at each end, so that a link between
-/// bone and fat is half as stretchable as one within fat, and a link within bone keeps its length exactly.
+/// Lengths are relative to the rest length of the link. Each end of a link contributes half of its
+/// limits. A link between bone and fat therefore stretches half as much as a link within fat, and a
+/// link within bone keeps its length exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// Shortest length of a link along each axis; 0 to 1.
+    /// Shortest length of a link along each axis, from 0 to 1.
     pub shortest: [f64; 3],
-    /// Longest length of a link along each axis; 1 to 16.
+    /// Longest length of a link along each axis, from 1 to 16.
     pub longest: [f64; 3],
-    /// Farthest that the ends of a link along each axis move apart across it, in either direction; 0 to 16.
+    /// Largest shear of a link along each axis: how far its ends may move apart across the link, in
+    /// either direction. From 0 to 16.
     pub shear: [f64; 3],
-    /// Relaxation leaves an element alone that is nearer than this to where its neighbors ask it to be, in each coordinate, in steps
-    /// of the grid; 0 is fully elastic. From 0 to 4096.
+    /// Threshold of relaxation in steps, from 0 to 4096. An element moves only if the mean position
+    /// that its neighbors ask for is at least this far away in a coordinate. 0 is fully elastic.
     pub k: f64,
 }
 
 impl Material {
-    /// What keeps its shape: bone.
+    /// A material that keeps its shape, such as bone.
     pub const RIGID: Self = Self { shortest: [1.0; 3], longest: [1.0; 3], shear: [0.0; 3], k: 0.0 };
 
-    /// The same along every axis.
+    /// A material with the same limits along every axis.
     pub const fn isotropic(shortest: f64, longest: f64, shear: f64, k: f64) -> Self {
         Self { shortest: [shortest; 3], longest: [longest; 3], shear: [shear; 3], k }
     }
 
-    /// Refuses numbers that make no sense; `place` is that of the material in its list.
+    /// Checks the ranges of all numbers. `place` is the index of the material in its list.
     pub(crate) fn check(&self, place: usize) -> Result<(), ChainError> {
         let wrong = |key, value, range| Err(ChainError::Material { material: place, key, value, range });
         for axis in 0..3 {
@@ -50,12 +52,14 @@ impl Material {
     }
 }
 
-/// Which material an HU stands for.
+/// Maps Hounsfield units (HU) to materials.
 ///
 /// ```
 /// use cutis_chainmail::{Material, MaterialTable};
-/// let table = MaterialTable::new(&[(-449.0, Material::isotropic(0.6, 1.5, 0.5, 0.1)), (300.0, Material::RIGID)])?;
-/// assert_eq!([-1000.0, -449.0, 299.9, 300.0].map(|hu| table.at(hu)), [None, Some(0), Some(0), Some(1)]);
+/// let soft = Material::isotropic(0.6, 1.5, 0.5, 0.1);
+/// let table = MaterialTable::new(&[(-449.0, soft), (300.0, Material::RIGID)])?;
+/// let numbers = [-1000.0, -449.0, 299.9, 300.0].map(|hu| table.at(hu));
+/// assert_eq!(numbers, [None, Some(0), Some(0), Some(1)]);
 /// # Ok::<(), cutis_chainmail::ChainError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +69,8 @@ pub struct MaterialTable {
 }
 
 impl MaterialTable {
-    /// Each material from its HU up to the next one's; below the first there is nothing.
+    /// Creates a table in which each material holds from its HU up to the HU of the next entry.
+    /// Below the first entry there is no material.
     ///
     /// # Errors
     /// [`ChainError::MaterialCount`], [`ChainError::TableOrder`], [`ChainError::Material`].
@@ -79,11 +84,14 @@ impl MaterialTable {
         Ok(Self { from_hu, materials })
     }
 
-    /// Names of the presets, the default first.
+    /// Names of the presets; the first one is the default.
     pub const PRESETS: [&str; 2] = ["tissue", "uniform"];
 
-    /// A preset by name: `tissue` has fat, firmer soft tissue, and rigid bone; `uniform` is the firmer soft tissue everywhere. Their
-    /// limits are chosen, not measured: ChainMail has no physical moduli that they could be compared with.
+    /// A preset by name. `tissue` has fat, firmer soft tissue and rigid bone. `uniform` is the
+    /// firmer soft tissue everywhere.
+    ///
+    /// The limits were chosen, not measured: ChainMail has no physical moduli that could be
+    /// compared with measurements.
     ///
     /// # Errors
     /// [`ChainError::NoSuchPreset`].
@@ -97,36 +105,36 @@ impl MaterialTable {
         }
     }
 
-    /// HU from which there is a material.
+    /// HU at which the first material begins.
     pub fn lowest_hu(&self) -> f32 {
         self.from_hu[0]
     }
 
-    /// The materials, as elements number them.
+    /// The materials in the order of their numbers.
     pub fn materials(&self) -> &[Material] {
         &self.materials
     }
 
-    /// Number of the material at an HU; none below the first and for what is no number.
+    /// Number of the material at an HU. `None` below the first material and for NaN.
     pub fn at(&self, hu: f32) -> Option<u8> {
         let below = self.from_hu.iter().take_while(|&&from| from <= hu).count();
         below.checked_sub(1).map(|place| place as u8)
     }
 }
 
-/// Where the presets begin: air.
+/// The presets begin at air.
 const LOWEST_HU: f32 = -1024.0;
-/// Water and muscle from here, fat below (about −100 HU).
+/// Water and muscle are above this value; fat (about −100 HU) is below.
 const SOFT_ABOVE_HU: f32 = -30.0;
-/// Bone from here, as the scenes of this project fix it.
+/// Bone is above this value, as in the scenes of this project.
 const BONE_ABOVE_HU: f32 = 250.0;
 const FAT: Material = Material::isotropic(0.4, 1.8, 0.8, 0.02);
 const SOFT: Material = Material::isotropic(0.6, 1.4, 0.6, 0.02);
 
-/// Most materials: limits are tabulated for every pair.
+/// Largest number of materials; there is a table entry for every pair.
 pub(crate) const MOST_MATERIALS: usize = 64;
 
-/// Refuses lists of materials that are empty, too long, or hold a wrong one.
+/// Checks the number of materials and each of them.
 pub(crate) fn check_all<'a>(
     materials: impl ExactSizeIterator<Item = &'a Material>,
 ) -> Result<(), ChainError> {

@@ -1,50 +1,52 @@
-//! Relaxation of the elements of a plane: one by one, and side by side where many of a row are of one kind.
+//! Relaxation of one plane: elements of a common class together, all others one by one.
 
-use crate::census::{Census, Kind, MIXED, STILL};
-use crate::chain::Body;
+use crate::chain::Structure;
 use crate::limits::Bounds;
 use crate::links::{BEFORE, NEXT};
+use crate::neighborhood::{IMMOBILE, NeighborhoodClass, NeighborhoodClasses, UNCLASSIFIED};
 use crate::units::UNITS_PER_STEP;
 
-/// Elements of a row that are looked at side by side; half of them, of one color of the checkerboard, may move.
+/// Elements of a row that are processed together. Half of them, of one checkerboard color, may
+/// move.
 const BLOCK: usize = 64;
-/// Coordinates in the widest vector that there is.
+/// Coordinates in the widest SIMD vector.
 const VECTOR: usize = 16;
-/// Of a kind that has no more in a block, elements are relaxed one by one: that takes no longer.
+/// A class with no more members than this in a block is relaxed one by one, which is as fast.
 const FEW: usize = 4;
 
-/// A coordinate of the elements of a plane, and of the planes beside it.
+/// One coordinate of the elements of a plane, and of the two neighboring planes.
 pub(crate) struct Plane<'a> {
-    pub(crate) body: &'a Body,
-    /// Of all elements.
-    pub(crate) census: &'a Census,
+    pub(crate) structure: &'a Structure,
+    /// Classes of all elements of the grid.
+    pub(crate) classes: &'a NeighborhoodClasses,
     pub(crate) coordinate: usize,
     pub(crate) k: usize,
     pub(crate) x: &'a mut [i32],
     pub(crate) below: &'a [i32],
     pub(crate) above: &'a [i32],
-    /// By row of the grid: something in it has changed since elements of this color were last relaxed.
+    /// By row of the grid: true if the row changed since elements of this color were last relaxed.
     pub(crate) changed: &'a [bool],
-    /// By row of the plane: something in it moves now.
+    /// By row of this plane: true if something moved now.
     pub(crate) moved: &'a mut [bool],
 }
 
 impl Plane<'_> {
-    /// Moves the elements whose `i + j + k` is even, or odd; how many moved. Where nothing around a row has changed, nothing moves.
+    /// Moves the elements whose `i + j + k` is even (`odd` = 0) or odd, and returns how many moved.
+    /// Rows are skipped if neither they nor their neighbors changed.
     #[inline(always)]
     pub(crate) fn relax(&mut self, odd: usize) -> u64 {
         let rows = self.moved.len();
         let mut moves = 0;
         for j in 0..rows {
-            let row_moves = if self.has_cause(j) { self.relax_row(j, (odd + j + self.k) % 2) } else { 0 };
+            let row_moves = if self.must_visit(j) { self.relax_row(j, (odd + j + self.k) % 2) } else { 0 };
             self.moved[j] = row_moves > 0;
             moves += row_moves;
         }
         moves
     }
 
-    /// Whether a row or one beside it has changed.
-    fn has_cause(&self, j: usize) -> bool {
+    /// True if a row or one of its neighbors has changed.
+    fn must_visit(&self, j: usize) -> bool {
         let (rows, at) = (self.moved.len(), |row: usize| self.changed.get(row).copied().unwrap_or_default());
         let row = self.k * rows + j;
         at(row)
@@ -54,35 +56,40 @@ impl Plane<'_> {
             || (j + 1 < rows && at(row + 1))
     }
 
-    /// Moves the elements of a row whose `i` is even, or odd.
+    /// Moves the elements of a row whose `i` is even or odd.
     #[inline(always)]
     fn relax_row(&mut self, j: usize, odd: usize) -> u64 {
-        let nx = self.body.links.shape()[0];
+        let nx = self.structure.links.shape()[0];
         let (row, first) = (j * nx, self.k * self.x.len() + j * nx);
-        let census = &self.census.of[first..first + nx];
+        let row_classes = &self.classes.class_of[first..first + nx];
         let mut moves = 0;
-        for (part, i) in census.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
+        for (part, i) in row_classes.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
             let (place, odd) = (row + i, (odd + i) % 2);
-            if part.iter().fold(STILL, |all, state| all & state) == STILL {
+            if part.iter().fold(IMMOBILE, |all, class| all & class) == IMMOBILE {
                 continue;
             }
-            let mut states = [STILL; BLOCK];
-            states[..part.len()].copy_from_slice(part);
-            // A bit for each kind.
-            let mut there =
-                states.iter().filter(|&&state| state < MIXED).fold(0_u64, |all, state| all | 1 << state);
-            while there != 0 {
-                let kind = there.trailing_zeros() as u8;
-                there &= there - 1;
-                if states.iter().filter(|&&state| state == kind).count() > FEW {
-                    moves += self.relax_alike(place, part.len(), &states, kind, odd);
+            let mut classes = [IMMOBILE; BLOCK];
+            classes[..part.len()].copy_from_slice(part);
+            // The set of classes in this block, one bit for each.
+            let mut present = classes
+                .iter()
+                .filter(|&&class| class < UNCLASSIFIED)
+                .fold(0_u64, |all, class| all | 1 << class);
+            while present != 0 {
+                let class_number = present.trailing_zeros() as u8;
+                present &= present - 1;
+                if classes.iter().filter(|&&class| class == class_number).count() > FEW {
+                    moves += self.relax_class(place, part.len(), &classes, class_number, odd);
                 } else {
-                    states.iter_mut().filter(|state| **state == kind).for_each(|state| *state = MIXED);
+                    classes
+                        .iter_mut()
+                        .filter(|class| **class == class_number)
+                        .for_each(|class| *class = UNCLASSIFIED);
                 }
             }
-            for (eight, lanes) in states.as_chunks::<8>().0.iter().zip((0..).step_by(8)) {
-                if eight.iter().fold(false, |any, &state| any | (state == MIXED)) {
-                    for lane in (odd..8).step_by(2).filter(|&lane| eight[lane] == MIXED) {
+            for (eight, lanes) in classes.as_chunks::<8>().0.iter().zip((0..).step_by(8)) {
+                if eight.iter().fold(false, |any, &class| any | (class == UNCLASSIFIED)) {
+                    for lane in (odd..8).step_by(2).filter(|&lane| eight[lane] == UNCLASSIFIED) {
                         moves += u64::from(self.relax_one(place + lanes + lane));
                     }
                 }
@@ -91,21 +98,21 @@ impl Plane<'_> {
         moves
     }
 
-    /// Moves those of `count` elements from a place on that are of a kind, by their `states`. They have six links, so that there are
-    /// elements on all sides.
+    /// Moves the elements of a class among `count` elements that begin at `place`. They have
+    /// six links, so that there are neighbors on all sides.
     #[inline(always)]
-    fn relax_alike(
+    fn relax_class(
         &mut self,
         place: usize,
         count: usize,
-        states: &[u8; BLOCK],
-        number: u8,
+        classes: &[u8; BLOCK],
+        class: u8,
         odd: usize,
     ) -> u64 {
-        let nx = self.body.links.shape()[0];
-        // Whole vectors are faster; where they reach beyond the block, nothing moves.
+        let nx = self.structure.links.shape()[0];
+        // Whole vectors are faster. Nothing moves where they reach beyond the block.
         let count = count.next_multiple_of(VECTOR).min(self.x.len() - place - nx);
-        let Kind { bounds, k } = &self.census.kinds[usize::from(number)];
+        let NeighborhoodClass { bounds, k } = &self.classes.classes[usize::from(class)];
         let (bounds, k) = (bounds[self.coordinate], *k);
         let mut around = [0; BLOCK + 2];
         around[..count + 2].copy_from_slice(&self.x[place - 1..place + count + 1]);
@@ -130,7 +137,7 @@ impl Plane<'_> {
             let size = ((2 * sum.unsigned_abs().min(MOST_ASKED) + 5) / 12) as i32;
             let asked = if sum < 0 { -size } else { size };
             let moves_here =
-                (states[lane] == number) & (lane % 2 == odd) & (size >= k) & (lowest <= 0) & (highest >= 0);
+                (classes[lane] == class) & (lane % 2 == odd) & (size >= k) & (lowest <= 0) & (highest >= 0);
             let by = if moves_here { asked.min(highest).max(lowest) } else { 0 };
             moves += u32::from(by != 0);
             to[lane] = x.wrapping_add(by);
@@ -139,18 +146,21 @@ impl Plane<'_> {
         u64::from(moves)
     }
 
-    /// Whether the element moved, which is free.
+    /// Relaxes one free element. Returns true if it moved.
     fn relax_one(&mut self, place: usize) -> bool {
-        let (body, nx) = (self.body, self.body.links.shape()[0]);
+        let (structure, nx) = (self.structure, self.structure.links.shape()[0]);
         let element = self.k * self.x.len() + place;
-        let (material, bits) = (body.materials[element], body.links.bits_of(element));
+        let (material, bits) = (structure.materials[element], structure.links.bits_of(element));
         let plane = self.x.len();
         let x = self.x[place];
         let (mut count, mut sum, mut lowest, mut highest) = (0_u32, 0_i32, i32::MIN, i32::MAX);
         let mut ask = |axis: usize, next: bool, element: usize, there: i32| {
             let apart = there - x;
-            let Bounds { lo, hi } =
-                body.limits.of(self.coordinate, body.limits.pair(material, body.materials[element]), axis);
+            let Bounds { lo, hi } = structure.limits.of(
+                self.coordinate,
+                structure.limits.pair(material, structure.materials[element]),
+                axis,
+            );
             let rest = if axis == self.coordinate { UNITS_PER_STEP } else { 0 };
             let (asked, from, to) = if next {
                 (apart - rest, apart - hi, apart - lo)
@@ -175,24 +185,25 @@ impl Plane<'_> {
         if bits & BEFORE[2] != 0 {
             ask(2, false, element - plane, self.below[place]);
         }
-        // An element of a link that is beyond its bounds stays: a way that keeps the others may not be there.
+        // An element with a link beyond its bounds stays, because its allowed range is empty.
         if count == 0 || lowest > 0 || highest < 0 {
             return false;
         }
         let asked = mean(sum, count);
-        let by = if asked.abs() < body.limits.k(material) { 0 } else { asked.clamp(lowest, highest) };
+        let by = if asked.abs() < structure.limits.k(material) { 0 } else { asked.clamp(lowest, highest) };
         self.x[place] += by;
         by != 0
     }
 }
 
-/// More than six neighbors within their bounds can ask for together, and few enough to be doubled in 32 bits.
+/// Upper limit of the sum. It is more than six neighbors within their bounds can ask for, and twice
+/// its value fits into 32 bits.
 const MOST_ASKED: u32 = 1 << 30;
 
-/// The nearest integer to a mean, of two that are equally near the one nearer to 0.
+/// The integer nearest to a mean; of two equally near ones, the one nearer to 0.
 fn mean(sum: i32, count: u32) -> i32 {
     let twice = 2 * sum.unsigned_abs().min(MOST_ASKED);
-    // Divisions by a number that is known beforehand are multiplications.
+    // The compiler turns divisions by constants into multiplications.
     let size = match count {
         6 => (twice + 5) / 12,
         5 => (twice + 4) / 10,

@@ -1,26 +1,27 @@
 //! Fixed-point coordinates: steps of the grid with 16 binary places.
 
-/// Units of a coordinate in one step of the grid.
+/// Number of units in one step of the grid.
 pub const UNITS_PER_STEP: i32 = 1 << 16;
 
-/// Most elements along an axis. With [`FARTHEST`] it keeps every coordinate within ±2²⁹ units, and differences within 32 bits.
+/// Largest number of elements along an axis. Together with [`FARTHEST`] it keeps every coordinate
+/// within ±2²⁹ units, and differences within 32 bits.
 pub(crate) const MOST_ELEMENTS: usize = 4096;
-/// Farthest that an element can be told to go, in units.
+/// Largest coordinate of a target in units.
 pub(crate) const FARTHEST: i32 = 1 << 28;
 
-/// Farthest that an element can be told to go, in steps from the first element along each axis.
+/// Largest coordinate of a target in steps, measured from the first element along each axis.
 pub const FARTHEST_STEPS: f64 = (FARTHEST / UNITS_PER_STEP) as f64;
 
-/// Farthest that an element can come by following others, in units.
+/// Largest coordinate of any element in units.
 pub(crate) const FARTHEST_MOVED: u32 = 1 << 29;
 
-/// The nearest coordinate in units; none if it is not finite or too far away.
+/// The nearest coordinate in units. `None` if the value is not finite or too large.
 pub(crate) fn from_steps(steps: f64) -> Option<i32> {
     let units = (steps * f64::from(UNITS_PER_STEP)).round();
     (units.abs() <= f64::from(FARTHEST)).then_some(units as i32)
 }
 
-/// A coordinate in steps; exact.
+/// A coordinate in steps, without rounding.
 pub(crate) fn to_steps(units: i32) -> f64 {
     f64::from(units) / f64::from(UNITS_PER_STEP)
 }

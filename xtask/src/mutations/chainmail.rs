@@ -23,8 +23,8 @@ pub const CHAINMAIL: &[Mutation] = &[
         ChainMail,
         "ChainMail: a pass moves what is held",
         "crates/cutis-chainmail/src/pass.rs",
-        "if HOLD && self.body",
-        "if HOLD && UP && self.body",
+        "if HOLD && self.structure",
+        "if HOLD && UP && self.structure",
     ),
     mutation(
         ChainMail,
@@ -86,8 +86,8 @@ pub const CHAINMAIL: &[Mutation] = &[
         ChainMail,
         "ChainMail: relaxation moves what is held",
         "crates/cutis-chainmail/src/relax.rs",
-        "census.of[element as usize] = STILL",
-        "census.of[element as usize] |= 0",
+        "classes.class_of[element as usize] = IMMOBILE",
+        "classes.class_of[element as usize] |= 0",
     ),
     mutation(
         ChainMail,
@@ -114,8 +114,8 @@ pub const CHAINMAIL: &[Mutation] = &[
         ChainMail,
         "ChainMail: side by side, other kinds of elements relax as if they were of the first",
         "crates/cutis-chainmail/src/plane.rs",
-        "(states[lane] == number)",
-        "(states[lane] < MIXED)",
+        "(classes[lane] == class)",
+        "(classes[lane] < UNCLASSIFIED)",
     ),
     mutation(
         ChainMail,
@@ -130,13 +130,6 @@ pub const CHAINMAIL: &[Mutation] = &[
         "crates/cutis-chainmail/src/energy.rs",
         "i64::from(at[coordinate]) - i64::from(rest)",
         "i64::from(at[coordinate]) + i64::from(rest)",
-    ),
-    mutation(
-        ChainMail,
-        "ChainMail: an element in the plane of a blade is on both sides",
-        "crates/cutis-chainmail/src/blade.rs",
-        "(over_a > 0.0) == (over_b > 0.0)",
-        "(over_a > 0.0) == (over_b >= 0.0)",
     ),
     mutation(
         ChainMail,

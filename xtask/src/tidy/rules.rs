@@ -10,7 +10,7 @@ pub const ALL: &[fn(&Source) -> Vec<Finding>] =
 /// The only files that may hold `unsafe`.
 const UNSAFE_ALLOWED: &[&str] = &[
     "crates/cutis-solver/src/colored.rs", // proves that no two threads touch one vertex
-    "crates/cutis-chainmail/src/wide.rs", // asks the processor which vector unit it has
+    "crates/cutis-chainmail/src/simd.rs", // asks the processor which instructions it has
     "crates/cutis-solver-cpu/tests/allocations.rs", // an allocator that counts
 ];
 

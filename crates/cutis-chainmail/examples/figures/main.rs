@@ -1,7 +1,7 @@
-//! Writes the figures of the book's page about ChainMail into `docs/book/figures`.
+//! Writes the figures of the book's ChainMail page into `docs/book/figures`.
 #![forbid(unsafe_code)]
 
-mod made;
+mod draw;
 
 use std::error::Error;
 use std::path::Path;
@@ -9,7 +9,7 @@ use std::path::Path;
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/figures");
     std::fs::create_dir_all(&folder)?;
-    for (name, svg) in made::all()? {
+    for (name, svg) in draw::all()? {
         std::fs::write(folder.join(name), svg)?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! A chain's memory on the device, and its relaxation there.
+//! Memory of a chain on the device, and the relaxation there.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel};
 use cutis_shaders::chainmail as shaders;
@@ -9,14 +9,16 @@ use super::slab::{self, Slab};
 use super::uniform::HalfUniform;
 use crate::{Chain, ChainError, Relaxation};
 
-/// Most sweeps that are submitted at once.
+/// Largest number of sweeps in a submission.
 const MOST_SWEEPS: usize = 64;
-/// Elements of the sweeps that are submitted at once: a desktop would take a device for hung that is busy for seconds.
+/// Largest number of element visits in a submission. A desktop resets a device that is busy for
+/// seconds.
 const ELEMENTS_AT_ONCE: usize = 1 << 28;
 
-/// Relaxation on a GPU, for chains of one shape and number of materials.
+/// Relaxation on a GPU, for chains of one shape and one number of materials.
 ///
-/// 14 bytes on the device for each place of the grid, in buffers of whole planes that fit its limits; see [`RelaxGpu::bytes`].
+/// It takes 14 bytes on the device for each grid point, in buffers of whole planes that fit the
+/// limits of the device. See [`RelaxGpu::bytes`].
 ///
 /// ```
 /// use cutis_chainmail::{Chain, Drag, Material, Order, RelaxGpu};
@@ -41,42 +43,46 @@ pub struct RelaxGpu {
     shape: [usize; 3],
     materials: usize,
     slabs: Vec<Slab>,
-    /// Group 0, by slab and coordinate.
+    /// Bind group 0, by slab and coordinate.
     slab_groups: Vec<[BindGroup; 3]>,
-    /// Lowest and highest by pair and axis, for each coordinate.
+    /// Bounds for each coordinate, as `[lo, hi]` by pair of materials and axis.
     bounds: [Mirror<[i32; 2]>; 3],
     k: Mirror<i32>,
-    /// Group 1, by coordinate and half.
+    /// Bind group 1, by coordinate and half.
     half_groups: Vec<[BindGroup; 2]>,
-    /// [`SWEEP_WORDS`] for what was before the first sweep of a submit, then for each of its sweeps.
+    /// Move counters, [`SWEEP_WORDS`] each: first those of the sweep before a submission, then
+    /// those of its sweeps.
     moved: Buffer<u32>,
-    /// Group 2, by sweep: the words of the one before, and its own.
+    /// Bind group 2, by sweep: the counters of the previous sweep and its own.
     sweep_groups: Vec<BindGroup>,
 }
 
 impl RelaxGpu {
-    /// Bytes on the device for each place of the grid; limits and counters come to them.
+    /// Bytes on the device for each grid point. Limits and counters are additional.
     pub const BYTES_PER_PLACE: usize = 14;
 
-    /// Memory and kernel for chains such as this one; nothing of it goes up yet.
+    /// Allocates memory and compiles the kernel for chains with the shape of `chain`. Its contents
+    /// are not uploaded yet.
     ///
     /// # Errors
-    /// [`ChainError::Gpu`]: the device has no room, is lost, or cannot bind even one plane of the grid.
+    /// [`ChainError::Gpu`] if the device has too little memory, is lost, or cannot bind one plane
+    /// of the grid.
     pub fn new(gpu: &Gpu, chain: &Chain) -> Result<Self, ChainError> {
         Self::with_source(gpu, chain, &|source| source)
     }
 
-    /// The same with the kernel's source passed through `change`: for the controls of comparisons, which have to see a change.
+    /// As [`RelaxGpu::new`], with the kernel source passed through `change`. Parity tests use it to
+    /// show that they detect a wrong kernel.
     ///
     /// # Errors
-    /// As [`RelaxGpu::new`].
+    /// The errors of [`RelaxGpu::new`].
     pub fn with_source(
         gpu: &Gpu,
         chain: &Chain,
         change: &dyn Fn(String) -> String,
     ) -> Result<Self, ChainError> {
         let kernel = gpu.kernel("chainmail: relax", &change(shaders::relax()), shaders::RELAX)?;
-        let (shape, materials) = (chain.shape(), chain.body.limits.all_k().len());
+        let (shape, materials) = (chain.shape(), chain.structure.limits.all_k().len());
         let slabs = Slab::all(gpu, shape)?;
         let slab_groups = slab::bind(gpu, &kernel, shape, &slabs)?;
         let table = || Mirror::new(gpu, "chainmail: bounds", 3 * materials * materials);
@@ -110,13 +116,15 @@ impl RelaxGpu {
         })
     }
 
-    /// [`Chain::relax`] on the device: the same positions and the same counts. Waits for it.
+    /// Relaxes a chain on the device, with the same positions and counts as [`Chain::relax`]. Waits
+    /// for the result.
     ///
-    /// Any chain will do that has the shape and the number of materials of the one that this was made for; what of links, fixed
-    /// elements, materials and limits differs from the last call goes up.
+    /// The chain must have the shape and the number of materials of the one passed to
+    /// [`RelaxGpu::new`]. Positions are uploaded with every call; links, fixed elements, materials
+    /// and limits only where they differ from the last call.
     ///
     /// # Errors
-    /// [`ChainError::OtherChain`], [`ChainError::Gpu`]; then the chain is as it was.
+    /// [`ChainError::OtherChain`], [`ChainError::Gpu`]; then the chain is unchanged.
     pub fn relax(&mut self, chain: &mut Chain, most: u32, held: &[u32]) -> Result<Relaxation, ChainError> {
         self.check(chain)?;
         let mut done = Relaxation::default();
@@ -138,26 +146,27 @@ impl RelaxGpu {
         if done.moves > 0 {
             chain.positions = [self.positions(0)?, self.positions(1)?, self.positions(2)?];
         }
-        // What a relaxation on the host has to look at after this one.
+        // The rows that the next relaxation on the host has to visit.
         chain.changed.fill(!done.settled);
-        let held: Vec<u32> = held.iter().copied().filter(|&element| chain.is_there(element)).collect();
+        let held: Vec<u32> = held.iter().copied().filter(|&element| chain.has_element(element)).collect();
         chain.mark_held(&held);
         Ok(done)
     }
 
-    /// In how many parts the grid lies on the device.
+    /// Number of slabs in which the grid is stored on the device.
     pub fn slabs(&self) -> usize {
         self.slabs.len()
     }
 
-    /// Bytes on the device, but for some hundreds for each slab and each sweep of a submit.
+    /// Memory on the device in bytes, without some hundred bytes for each slab and each sweep of a
+    /// submission.
     pub fn bytes(&self) -> u64 {
         let tables = self.bounds.iter().map(Mirror::bytes).sum::<u64>() + self.k.bytes();
         self.slabs.iter().map(Slab::bytes).sum::<u64>() + tables + self.moved.bytes()
     }
 
     fn check(&self, chain: &Chain) -> Result<(), ChainError> {
-        let (shape, materials) = (chain.shape(), chain.body.limits.all_k().len());
+        let (shape, materials) = (chain.shape(), chain.structure.limits.all_k().len());
         let (of_shape, of_materials) = (self.shape, self.materials);
         if (shape, materials) == (of_shape, of_materials) {
             return Ok(());
@@ -165,7 +174,7 @@ impl RelaxGpu {
         Err(ChainError::OtherChain { shape, materials, of_shape, of_materials })
     }
 
-    /// Positions, and what of the rest changed.
+    /// Uploads positions, and all other data that changed.
     fn upload(&mut self, chain: &mut Chain, held: &[u32]) -> Result<(), GpuError> {
         for slab in &self.slabs {
             for (x, positions) in slab.x.iter().zip(&chain.positions) {
@@ -173,19 +182,20 @@ impl RelaxGpu {
             }
         }
         for (coordinate, bounds) in self.bounds.iter_mut().enumerate() {
-            bounds.set(&self.gpu, 0, &chain.body.limits.table(coordinate))?;
+            bounds.set(&self.gpu, 0, &chain.structure.limits.table(coordinate))?;
         }
-        self.k.set(&self.gpu, 0, chain.body.limits.all_k())?;
-        let held: Vec<u32> = held.iter().copied().filter(|&element| chain.is_there(element)).collect();
-        held.iter().for_each(|&element| chain.body.links.set_grabbed(element, true));
+        self.k.set(&self.gpu, 0, chain.structure.limits.all_k())?;
+        let held: Vec<u32> = held.iter().copied().filter(|&element| chain.has_element(element)).collect();
+        held.iter().for_each(|&element| chain.structure.links.set_grabbed(element, true));
         let uploaded = self.upload_elements(chain);
-        held.iter().for_each(|&element| chain.body.links.set_grabbed(element, false));
+        held.iter().for_each(|&element| chain.structure.links.set_grabbed(element, false));
         uploaded
     }
 
     fn upload_elements(&mut self, chain: &Chain) -> Result<(), GpuError> {
         let [nx, ny, nz] = self.shape;
-        let planes = chain.body.links.bits().chunks(nx * ny).zip(chain.body.materials.chunks(nx * ny));
+        let planes =
+            chain.structure.links.bits().chunks(nx * ny).zip(chain.structure.materials.chunks(nx * ny));
         for (plane, (links, materials)) in planes.enumerate() {
             let words = slab::words(links, materials);
             for slab in self.slabs.iter_mut().filter(|slab| slab.seen(nz).contains(&plane)) {
@@ -195,9 +205,9 @@ impl RelaxGpu {
         Ok(())
     }
 
-    /// So many sweeps in one submit; how many coordinates each changed.
+    /// Runs sweeps in one submission and returns how many coordinates each sweep changed.
     fn sweep(&self, sweeps: usize) -> Result<Vec<u64>, GpuError> {
-        // The sweep before the first counts as one that moved something.
+        // The counters before the first sweep say that something moved, so that it runs.
         let mut before = vec![0; (sweeps + 1) * SWEEP_WORDS];
         before[0] = 1;
         self.gpu.write(&self.moved, 0, &before)?;
@@ -218,7 +228,7 @@ impl RelaxGpu {
         Ok(moved.chunks(SWEEP_WORDS).map(total).collect())
     }
 
-    /// A coordinate of every element.
+    /// One coordinate of every element.
     fn positions(&self, coordinate: usize) -> Result<Vec<i32>, GpuError> {
         let mut all = Vec::with_capacity(self.shape.iter().product());
         for slab in &self.slabs {

@@ -1,4 +1,4 @@
-//! Planes of a chain that lie in buffers of their own.
+//! Planes of a chain that share one set of buffers.
 
 use std::ops::Range;
 
@@ -7,22 +7,23 @@ use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel};
 use super::mirror::Mirror;
 use super::uniform::SlabUniform;
 
-/// Most elements of a slab, whatever the device offers: places in it are counted in 32 bits.
+/// Largest number of elements in a slab, for any device: the kernel counts them in 32 bits.
 const MOST_ELEMENTS: usize = 1 << 28;
 
-/// Some planes of a grid.
+/// Consecutive planes of a grid.
 pub struct Slab {
     pub planes: Range<usize>,
-    /// Elements of them.
+    /// The elements of these planes.
     pub elements: Range<usize>,
-    /// Links, whether held, and material, two elements to a word; a plane more at either end.
+    /// Links, held flags and materials, two elements per word. There is one more plane at either
+    /// end.
     bytes: Mirror<u32>,
-    /// Positions, by coordinate.
+    /// Positions by coordinate.
     pub x: [Buffer<i32>; 3],
 }
 
 impl Slab {
-    /// The planes of a grid, in slabs that the device can bind: at least one plane each.
+    /// Divides a grid into slabs that the device can bind, with at least one plane each.
     pub fn all(gpu: &Gpu, shape: [usize; 3]) -> Result<Vec<Self>, GpuError> {
         let [nx, ny, nz] = shape;
         let plane = nx * ny;
@@ -40,23 +41,23 @@ impl Slab {
         (0..nz).step_by(most).map(slab).collect()
     }
 
-    /// The planes whose bytes it has: its own, and one more at either end where there is one.
+    /// The planes whose bytes the slab stores: its own, and the neighboring plane at either end.
     pub fn seen(&self, nz: usize) -> Range<usize> {
         self.planes.start.saturating_sub(1)..nz.min(self.planes.end + 1)
     }
 
-    /// Has the words of a plane that is seen.
+    /// Writes the words of a plane that is [`seen`](Slab::seen).
     pub fn set_plane(&mut self, gpu: &Gpu, plane: usize, words: &[u32]) -> Result<(), GpuError> {
         self.bytes.set(gpu, (plane + 1 - self.planes.start) * words.len(), words)
     }
 
-    /// Bytes on the device.
+    /// Size on the device in bytes.
     pub fn bytes(&self) -> u64 {
         self.bytes.bytes() + self.x.iter().map(Buffer::bytes).sum::<u64>()
     }
 }
 
-/// Words of a plane among the elements' bytes.
+/// Number of words that hold the bytes of a plane.
 fn pitch([nx, ny, _]: [usize; 3]) -> usize {
     (nx * ny).div_ceil(2)
 }
@@ -71,14 +72,14 @@ pub fn words(links: &[u8], materials: &[u8]) -> Vec<u32> {
     pairs.map(pair).chain(last).collect()
 }
 
-/// Group 0 of the kernel: a coordinate of each slab.
+/// Bind group 0 of the kernel, by slab and coordinate.
 pub fn bind(
     gpu: &Gpu,
     kernel: &Kernel,
     shape: [usize; 3],
     slabs: &[Slab],
 ) -> Result<Vec<[BindGroup; 3]>, GpuError> {
-    // What the first slab has below it, and the last one above: nothing that a link leads to.
+    // Dummy buffers for the plane below the first slab and above the last one. No link leads there.
     let nothing = [(); 2].map(|()| gpu.zeroed::<i32>("chainmail: nothing", 1));
     let [below_first, above_last] = nothing;
     let (below_first, above_last) = (below_first?, above_last?);

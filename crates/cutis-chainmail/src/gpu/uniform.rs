@@ -1,4 +1,4 @@
-//! What the kernel is told, as it reads it.
+//! The uniform buffers of the relaxation kernel, with the layout that WGSL expects.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -6,23 +6,23 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct SlabUniform {
-    /// Elements of a row.
+    /// Elements in a row.
     pub columns: u32,
-    /// Rows of a plane.
+    /// Rows in a plane.
     pub rows: u32,
-    /// Planes of the slab.
+    /// Planes in the slab.
     pub planes: u32,
-    /// Number of the first of them.
+    /// Grid index of the slab's first plane.
     pub first: u32,
-    /// Planes of the slab before; 0 if there is none.
+    /// Planes in the previous slab; 0 if there is none.
     pub planes_below: u32,
-    /// Words of a plane among the elements' bytes.
+    /// Words that hold the element bytes of one plane.
     pub pitch: u32,
-    /// Fills the last block of 16 bytes.
+    /// Padding to a multiple of 16 bytes.
     pub unused: [u32; 2],
 }
 
-/// `struct Half` of the kernel.
+/// `struct Half` of the kernel: one half of a sweep, for one coordinate.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct HalfUniform {
@@ -32,6 +32,6 @@ pub struct HalfUniform {
     pub odd: u32,
     /// Number of materials.
     pub materials: u32,
-    /// Fills the block of 16 bytes.
+    /// Padding to a multiple of 16 bytes.
     pub unused: u32,
 }

@@ -1,6 +1,6 @@
-//! What holds of every drag, cut and relaxation, for random bodies.
+//! Properties of every drag, cut and relaxation, tested on random bodies.
 
-use cutis_chainmail::{Chain, Drag, Material, Moved, NO_MATERIAL, Order, UNITS_PER_STEP};
+use cutis_chainmail::{Chain, Drag, DragReport, Material, NO_MATERIAL, Order, UNITS_PER_STEP};
 use proptest::prelude::*;
 
 use crate::oracle;
@@ -29,15 +29,15 @@ fn violated(chain: &Chain) -> Vec<(u32, u32)> {
     list
 }
 
-fn accused(moved: &Moved) -> Vec<(u32, u32)> {
+fn reported(report: &DragReport) -> Vec<(u32, u32)> {
     let mut list: Vec<(u32, u32)> =
-        moved.contradictions.iter().map(|c| (c.held.min(c.other), c.held.max(c.other))).collect();
+        report.contradictions.iter().map(|c| (c.held.min(c.other), c.held.max(c.other))).collect();
     list.sort();
     list.dedup();
     list
 }
 
-/// What is linked with `from`, directly or not.
+/// The elements that are connected with `from` by links.
 fn part_of(chain: &Chain, from: u32) -> Vec<bool> {
     let mut part = vec![false; chain.places()];
     let mut open = vec![from];
@@ -59,15 +59,15 @@ fn check(case: &Case) -> Result<(), TestCaseError> {
         let before = all_units(&chain);
         let least = oracle::least_move(&chain, &drags);
         let mut rounds = chain.clone();
-        let moved = chain.drag(&drags, Order::Fifo).unwrap();
+        let report = chain.drag(&drags, Order::Fifo).unwrap();
         let after = all_units(&chain);
 
-        // Any order, the same bits.
+        // Every order gives the same bits.
         let found = rounds.drag(&drags, Order::Slabs).unwrap();
         prop_assert_eq!(&after, &all_units(&rounds));
-        prop_assert_eq!((moved.elements, &moved.contradictions), (found.elements, &found.contradictions));
+        prop_assert_eq!((report.elements, &report.contradictions), (found.elements, &found.contradictions));
 
-        // Told is told; fixed is fixed; what is apart stays apart.
+        // Grabbed elements are at their targets. Fixed and unconnected elements have not moved.
         for drag in &drags {
             prop_assert_eq!(after[drag.element as usize], target(drag));
         }
@@ -79,16 +79,17 @@ fn check(case: &Case) -> Result<(), TestCaseError> {
             }
         }
         let differ = (0..before.len()).filter(|&e| before[e] != after[e]).count();
-        prop_assert!(moved.elements == differ || (!feasible && moved.elements > differ));
+        prop_assert!(report.elements == differ || (!feasible && report.elements > differ));
 
-        // No link is violated that is not accused, and none is accused without reason.
+        // The reported links are exactly the violated ones.
         let links = violated(&chain);
-        prop_assert_eq!(&accused(&moved), &links);
+        prop_assert_eq!(&reported(&report), &links);
         prop_assert_eq!(chain.violations().links, links.len());
 
-        // A state that has all that was told is found if there is one, also after a drag that had none; and it is the least move.
+        // A drag finds a solution if there is one, also after a drag without a solution. The
+        // solution is the least move.
         let holds = least.iter().all(Option::is_some);
-        prop_assert_eq!(moved.contradictions.is_empty(), holds);
+        prop_assert_eq!(report.contradictions.is_empty(), holds);
         for (coordinate, positions) in least.iter().enumerate().filter(|_| feasible) {
             let Some(positions) = positions else { continue };
             let found: Vec<i64> = after.iter().map(|units| i64::from(units[coordinate])).collect();
@@ -96,13 +97,14 @@ fn check(case: &Case) -> Result<(), TestCaseError> {
         }
         feasible = feasible && holds;
 
-        // Relaxation does what another program does that looks at every element, also where the rows of the drag are all that it has to
-        // look at; it never raises the energy, and leaves links alone that hold.
+        // Relaxation does the same as the reference, which visits every element, even if it only
+        // visits the rows of the drag. It never raises the energy, and it keeps links within their
+        // bounds.
         let held: Vec<u32> = drags.iter().map(|drag| drag.element).collect();
         let mut energy = chain.energy_mm2();
         let k = |element: u32| case.materials[case.element_materials[element as usize] as usize].k;
         for n in 0..4 {
-            // What was held is let go.
+            // In the last round the held elements are released.
             let held = if n < 3 { held.as_slice() } else { &[] };
             let (expected, moves) = oracle::sweep(&chain, k, held);
             let relaxed = chain.relax(1, held);
@@ -123,14 +125,14 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn every_drag_is_the_least_move_that_there_is(case in case()) {
+    fn every_drag_is_the_least_move(case in case()) {
         check(&case)?;
     }
 }
 
-/// Rows that are longer than what is relaxed side by side, of materials in clumps and with holes.
+/// Rows that are longer than a block of the relaxation, with clustered materials and holes.
 #[test]
-fn long_rows_relax_as_each_element_by_itself() {
+fn long_rows_relax_like_the_reference() {
     let shape = [150, 6, 7];
     let materials =
         [Material::isotropic(0.5, 1.5, 0.4, 0.0), Material::isotropic(0.8, 1.2, 0.1, 0.02), Material::RIGID];
@@ -151,7 +153,7 @@ fn long_rows_relax_as_each_element_by_itself() {
     let mut chain = Chain::new(shape, [1.0; 3], &materials, of.clone()).unwrap();
     for n in 0..30 {
         let element = random(1000 + n) % (150 * 42);
-        if chain.is_there(element) {
+        if chain.has_element(element) {
             let by = |axis: u32| f64::from(random(3 * n + axis) % 200) / 100.0 - 1.0;
             let at = chain.position(element);
             let to = [at[0] + by(0), at[1] + by(1), at[2] + by(2)];

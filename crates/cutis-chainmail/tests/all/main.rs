@@ -1,7 +1,9 @@
-//! What holds of every chain, and what the program's model does in the examples that it was described with.
+//! Integration tests of ChainMail.
 
 mod examples;
 mod figures;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod invariants;
 mod oracle;
 mod random;

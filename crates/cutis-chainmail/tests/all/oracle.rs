@@ -1,9 +1,11 @@
-//! What a drag must come to, found another way: bounds from the elements that must not move, by sweeping over all links until nothing
-//! changes, in 64 bits; and each element moved into its bounds.
+//! Reference implementations of a drag and of a sweep, written differently and in 64 bits.
+//!
+//! The drag computes the bounds of each element by visiting all links until nothing changes, and
+//! then moves each element into its bounds.
 
 use cutis_chainmail::{Chain, Drag, UNITS_PER_STEP};
 
-/// Positions that a drag must come to, by coordinate; none where no state has what was told.
+/// Positions after a drag, by coordinate; `None` where there is no solution.
 pub fn least_move(chain: &Chain, drags: &[Drag]) -> [Option<Vec<i64>>; 3] {
     let count = chain.places();
     let links: Vec<(usize, usize, [[i32; 2]; 3])> = (0..count as u32)
@@ -15,15 +17,15 @@ pub fn least_move(chain: &Chain, drags: &[Drag]) -> [Option<Vec<i64>>; 3] {
         .collect();
     [0, 1, 2].map(|c| {
         let before: Vec<i64> = (0..count).map(|e| i64::from(chain.units(e as u32)[c])).collect();
-        let mut told: Vec<Option<i64>> =
+        let mut targets: Vec<Option<i64>> =
             (0..count).map(|e| chain.is_fixed(e as u32).then_some(before[e])).collect();
         for drag in drags {
-            told[drag.element as usize] = Some((drag.to[c] * f64::from(UNITS_PER_STEP)).round() as i64);
+            targets[drag.element as usize] = Some((drag.to[c] * f64::from(UNITS_PER_STEP)).round() as i64);
         }
         // Far beyond all coordinates, and far within 64 bits.
         let far = 1_i64 << 40;
-        let mut low: Vec<i64> = told.iter().map(|told| told.unwrap_or(-far)).collect();
-        let mut high: Vec<i64> = told.iter().map(|told| told.unwrap_or(far)).collect();
+        let mut low: Vec<i64> = targets.iter().map(|target| target.unwrap_or(-far)).collect();
+        let mut high: Vec<i64> = targets.iter().map(|target| target.unwrap_or(far)).collect();
         loop {
             let old = (low.clone(), high.clone());
             for &(a, b, bounds) in &links {
@@ -44,8 +46,8 @@ pub fn least_move(chain: &Chain, drags: &[Drag]) -> [Option<Vec<i64>>; 3] {
     })
 }
 
-/// Where elements must be after a sweep of relaxation, and how many coordinates change: every element is looked at, one after the
-/// other, in 64 bits. `k` is that of each element, in steps.
+/// Positions after one sweep of relaxation, and the number of coordinates that change. Every
+/// element is visited, one after the other. `k` is that of each element in steps.
 pub fn sweep(chain: &Chain, k: impl Fn(u32) -> f64, held: &[u32]) -> (Vec<[i32; 3]>, u64) {
     let count = chain.places() as u32;
     let mut x: Vec<[i32; 3]> = (0..count).map(|element| chain.units(element)).collect();
@@ -54,12 +56,12 @@ pub fn sweep(chain: &Chain, k: impl Fn(u32) -> f64, held: &[u32]) -> (Vec<[i32; 
     let one = i64::from(UNITS_PER_STEP);
     for odd in 0..2 {
         for element in (0..count).filter(|e| (e % nx + e / nx % ny + e / (nx * ny)) % 2 == odd) {
-            if !chain.is_there(element) || chain.is_fixed(element) || held.contains(&element) {
+            if !chain.has_element(element) || chain.is_fixed(element) || held.contains(&element) {
                 continue;
             }
             for c in 0..3 {
                 let own = i64::from(x[element as usize][c]);
-                // Where each neighbor asks it to be, and from where to where it lets it be.
+                // For each neighbor: the position it asks for, and the range that it allows.
                 let mut asked = Vec::new();
                 for axis in 0..3 {
                     let rest = if axis == c { one } else { 0 };

@@ -1,16 +1,16 @@
-//! Random bodies: shapes, materials, holes, cuts, fixed elements, and what is dragged where.
+//! Random bodies with materials, holes, cuts and fixed elements, and random drags.
 
 use cutis_chainmail::{Chain, Drag, Material, NO_MATERIAL};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// A body, and drags that follow each other.
+/// A body and a sequence of drags.
 #[derive(Clone, Debug)]
 pub struct Case {
     pub shape: [usize; 3],
     pub materials: Vec<Material>,
     pub element_materials: Vec<u8>,
-    /// Links to cut: element and axis, taken modulo what there is.
+    /// Links to cut, by element and axis. Links that do not exist are ignored.
     pub cuts: Vec<(u32, usize)>,
     pub fixed: Vec<u32>,
     pub drags: Vec<Vec<(u32, [f64; 3])>>,
@@ -34,9 +34,9 @@ fn material() -> impl Strategy<Value = Material> {
 pub fn case() -> impl Strategy<Value = Case> {
     ([1_usize..=5, 1..=4, 1..=3], vec(material(), 1..=3)).prop_flat_map(|(shape, materials)| {
         let count = shape.iter().product::<usize>();
-        let kinds = materials.len() as u8;
+        let count_of_materials = materials.len() as u8;
         let element = 0..count as u32;
-        let of = prop_oneof![9 => 0..kinds, 1 => Just(NO_MATERIAL)];
+        let of = prop_oneof![9 => 0..count_of_materials, 1 => Just(NO_MATERIAL)];
         let to = [-6.0..9.0, -6.0..9.0, -6.0..9.0];
         (
             vec(of, count),
@@ -56,7 +56,7 @@ pub fn case() -> impl Strategy<Value = Case> {
 }
 
 impl Case {
-    /// The body.
+    /// Builds the body.
     pub fn chain(&self) -> Chain {
         let materials = self.element_materials.clone();
         let mut chain = Chain::new(self.shape, [1.0, 0.5, 2.0], &self.materials, materials).unwrap();
@@ -65,17 +65,18 @@ impl Case {
                 element == a && chain.link(a, axis).is_some_and(|(next, _)| next == b)
             })
         });
-        let fixed: Vec<u32> = self.fixed.iter().copied().filter(|&element| chain.is_there(element)).collect();
+        let fixed: Vec<u32> =
+            self.fixed.iter().copied().filter(|&element| chain.has_element(element)).collect();
         chain.fix(&fixed).unwrap();
         chain
     }
 
-    /// The drags that are possible: of elements that are there, not fixed, each once.
+    /// The drags without elements that are missing, fixed or repeated.
     pub fn drags(&self, chain: &Chain) -> Vec<Vec<Drag>> {
         let possible = |drags: &Vec<(u32, [f64; 3])>| {
             let mut list: Vec<Drag> = Vec::new();
             for &(element, to) in drags {
-                let free = chain.is_there(element) && !chain.is_fixed(element);
+                let free = chain.has_element(element) && !chain.is_fixed(element);
                 if free && list.iter().all(|drag| drag.element != element) {
                     list.push(Drag { element, to });
                 }

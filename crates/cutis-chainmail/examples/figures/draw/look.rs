@@ -1,45 +1,45 @@
-//! What elements and links look like. Colors can be told apart without full color vision (Okabe and Ito, 2008), and shapes, sizes
-//! and widths say the same.
+//! Looks of elements and links. The colors differ without full color vision too (Okabe and Ito,
+//! 2008), and shapes, sizes and widths carry the same information.
 
 use super::svg::{Point, Svg};
 
-/// What an element looks like.
+/// The look of an element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Look {
-    /// It has moved.
+    /// The element has moved.
     Soft,
-    /// It is where it was.
-    Still,
+    /// The element has not moved.
+    Unmoved,
     Rigid,
     Fixed,
     Grabbed,
-    /// Darker the farther it went: a share of the way from pale to dark.
-    Went(f64),
+    /// A shade of blue for a share (0 to 1) of the largest displacement; darker is farther.
+    Displaced(f64),
 }
 
-/// What a link looks like.
+/// The look of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Line {
     Within,
-    /// At one of its limits, or more of them.
+    /// A link with at least one coordinate at its limit.
     AtLimit,
     Beyond,
-    /// No link: from where the grabbed element was to where it is.
-    Pull,
+    /// Not a link: the path of the grabbed element.
+    Path,
 }
 
 impl Look {
-    /// Draws an element; `size` is the radius of most.
+    /// Draws an element. Most elements have the radius `size`.
     pub fn draw(self, svg: &mut Svg, at: Point, size: f64) {
         match self {
             Self::Soft => svg.disc(at, size, "fill=\"#0072b2\""),
-            Self::Still => svg.disc(at, size, "fill=\"#a3cbe3\""),
+            Self::Unmoved => svg.disc(at, size, "fill=\"#a3cbe3\""),
             Self::Rigid => svg.square(at, size, "fill=\"#e69f00\" stroke=\"#7a5400\" stroke-width=\"0.8\""),
             Self::Fixed => svg.disc(at, size, "fill=\"white\" stroke=\"#222\" stroke-width=\"1.3\""),
             Self::Grabbed => {
                 svg.disc(at, 1.3 * size + 0.8, "fill=\"#d00000\" stroke=\"white\" stroke-width=\"1.2\"");
             }
-            Self::Went(share) => svg.disc(at, size, &format!("fill=\"{}\"", shade(share))),
+            Self::Displaced(share) => svg.disc(at, size, &format!("fill=\"{}\"", shade(share))),
         }
     }
 }
@@ -50,12 +50,12 @@ impl Line {
             Self::Within => "stroke=\"#aaa\" stroke-width=\"1\"",
             Self::AtLimit => "stroke=\"#444\" stroke-width=\"1.4\"",
             Self::Beyond => "stroke=\"#d00000\" stroke-width=\"3\"",
-            Self::Pull => "stroke=\"#d00000\" stroke-width=\"1.3\" stroke-dasharray=\"4 3\"",
+            Self::Path => "stroke=\"#d00000\" stroke-width=\"1.3\" stroke-dasharray=\"4 3\"",
         }
     }
 }
 
-/// From pale blue over a middle one to a dark one.
+/// A color between pale and dark blue.
 fn shade(share: f64) -> String {
     const STOPS: [[f64; 3]; 3] = [[190.0, 216.0, 236.0], [66.0, 146.0, 198.0], [8.0, 36.0, 86.0]];
     let along = 2.0 * share.clamp(0.0, 1.0);

@@ -1,7 +1,6 @@
-//! The figures, each as the crate has it now. Coordinates and energies are exact, and numbers are written with fixed decimals, so that
-//! the same crate makes the same bytes.
+//! Draws the figures with the present code of the crate. Coordinates and energies are exact and
+//! numbers have fixed decimals, so that the same code gives the same bytes.
 
-mod body;
 mod comb;
 mod failures;
 mod look;
@@ -9,11 +8,12 @@ mod plate;
 mod relaxation;
 mod row;
 mod sheet;
+mod specimen;
 mod svg;
 
 use cutis_chainmail::ChainError;
 
-/// Names of files and what is in them.
+/// File names and contents of all figures.
 pub fn all() -> Result<Vec<(&'static str, String)>, ChainError> {
     Ok(vec![
         ("chainmail-1d.svg", row::figure()?),

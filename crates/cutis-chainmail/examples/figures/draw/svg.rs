@@ -1,11 +1,11 @@
-//! A picture as SVG, on white: it reads the same where the page around it is dark.
+//! An SVG picture on white, so that it is readable on a dark page too.
 
 use std::fmt::Write;
 
-/// A point of a picture, in pixels from its upper left corner.
+/// A point of the picture, in pixels from its upper left corner.
 pub type Point = [f64; 2];
 
-/// A picture being drawn; what comes later lies above.
+/// A picture in progress. Later shapes cover earlier ones.
 pub struct Svg {
     size: Point,
     body: String,
@@ -16,7 +16,7 @@ impl Svg {
         Self { size, body: String::new() }
     }
 
-    /// Lines that look alike.
+    /// Draws lines of one style.
     pub fn lines(&mut self, lines: &[[Point; 2]], style: &str) {
         if lines.is_empty() {
             return;
@@ -32,7 +32,7 @@ impl Svg {
         self.add(format_args!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" {style}/>\n"));
     }
 
-    /// A square by its center and half its side.
+    /// Draws a square with a center and half a side length.
     pub fn square(&mut self, [x, y]: Point, half: f64, style: &str) {
         let (left, top, side) = (x - half, y - half, 2.0 * half);
         self.add(format_args!(
@@ -40,7 +40,7 @@ impl Svg {
         ));
     }
 
-    /// Text by its baseline; `style` may anchor it.
+    /// Writes text at a baseline. `style` may contain its anchor.
     pub fn text(&mut self, [x, y]: Point, style: &str, text: &str) {
         if text.is_empty() {
             return;
@@ -49,7 +49,7 @@ impl Svg {
         self.add(format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" {style}>{text}</text>\n"));
     }
 
-    /// The document.
+    /// The finished document.
     pub fn finish(self) -> String {
         let [width, height] = self.size;
         format!(

@@ -1,8 +1,9 @@
-//! Bodies that have everything: several materials, holes, cuts, fixed elements, and drags behind them that leave links beyond their bounds.
+//! Bodies with several materials, holes, cuts, fixed elements and drags that leave violated links.
 
 use cutis_chainmail::{Chain, Drag, Material, NO_MATERIAL, Order};
+use cutis_test_kit::Random;
 
-/// Shapes: one element, rows, sheets, and more elements than a workgroup has threads, along each axis.
+/// Shapes: one element, rows, sheets, and lengths beyond a workgroup along each axis.
 pub const SHAPES: [[usize; 3]; 11] = [
     [1, 1, 1],
     [150, 1, 1],
@@ -17,21 +18,7 @@ pub const SHAPES: [[usize; 3]; 11] = [
     [5, 6, 37],
 ];
 
-/// Noise that is the same everywhere.
-pub struct Noise(pub u64);
-
-impl Noise {
-    pub fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
-        (self.0 >> 33) as usize % end
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.below(10_001) as f64 / 1e4
-    }
-}
-
-/// Soft, stiff across, rigid, plastic.
+/// A soft, an anisotropic, a rigid and a plastic material.
 pub fn materials() -> [Material; 4] {
     [
         Material { shear: [0.3, 0.2, 0.25], ..Material::isotropic(0.7, 1.6, 0.0, 0.0) },
@@ -41,20 +28,20 @@ pub fn materials() -> [Material; 4] {
     ]
 }
 
-/// A body at rest: regions of the materials, some of them single elements; a few holes, cuts and fixed elements.
+/// A body at rest with regions of each material, single elements, holes, cuts and fixed elements.
 pub fn at_rest(shape: [usize; 3], seed: u64) -> Chain {
-    let mut noise = Noise(seed);
+    let mut random = Random::new(seed);
     let [nx, ny, nz] = shape;
-    let regions = 3 + noise.below(3);
-    let of = |element: usize| {
+    let regions = 3 + random.below(3);
+    let material = |element: usize| {
         let [i, j, k] = [element % nx, element / nx % ny, element / (nx * ny)];
-        match noise.below(40) {
+        match random.below(40) {
             0 => NO_MATERIAL,
-            1 => noise.below(4) as u8,
+            1 => random.below(4) as u8,
             _ => [0, 1, 3, 0, 2][(i + 2 * j + k) / 9 % regions],
         }
     };
-    let elements = (0..nx * ny * nz).map(of).collect();
+    let elements = (0..nx * ny * nz).map(material).collect();
     let mut chain = Chain::new(shape, [1.0, 0.5, 2.0], &materials(), elements).unwrap();
     cut_some(&mut chain, seed ^ 1);
     fix_some(&mut chain, seed ^ 2);
@@ -63,30 +50,30 @@ pub fn at_rest(shape: [usize; 3], seed: u64) -> Chain {
 
 /// Cuts one link in twelve.
 pub fn cut_some(chain: &mut Chain, seed: u64) {
-    let mut noise = Noise(seed);
-    let apart: Vec<bool> = (0..3 * chain.places()).map(|_| noise.below(12) == 0).collect();
+    let mut random = Random::new(seed);
+    let apart: Vec<bool> = (0..3 * chain.places()).map(|_| random.below(12) == 0).collect();
     let count = chain.places();
     chain.cut(|_, a, b| apart[a as usize + if b == a + 1 { 0 } else { count }]);
 }
 
-/// Fixes one element in fifty, where they are.
+/// Fixes one element in fifty.
 pub fn fix_some(chain: &mut Chain, seed: u64) {
-    let mut noise = Noise(seed);
+    let mut random = Random::new(seed);
     let count = chain.places();
-    let some = (0..count as u32).filter(|_| noise.below(50) == 0);
-    let fixed: Vec<u32> = some.filter(|&element| chain.is_there(element)).collect();
+    let some = (0..count as u32).filter(|_| random.below(50) == 0);
+    let fixed: Vec<u32> = some.filter(|&element| chain.has_element(element)).collect();
     chain.fix(&fixed).unwrap();
 }
 
-/// Drags a few elements far, which may contradict what is fixed; which ones.
+/// Drags up to three elements far, which may contradict fixed elements. Returns the elements.
 pub fn drag_some(chain: &mut Chain, seed: u64) -> Vec<u32> {
-    let mut noise = Noise(seed);
+    let mut random = Random::new(seed);
     let mut drags: Vec<Drag> = Vec::new();
     for _ in 0..3 {
-        let element = noise.below(chain.places()) as u32;
-        let free = chain.is_there(element) && !chain.is_fixed(element);
+        let element = random.below(chain.places()) as u32;
+        let free = chain.has_element(element) && !chain.is_fixed(element);
         if free && drags.iter().all(|drag| drag.element != element) {
-            let to = chain.position(element).map(|at| at + noise.between(-7.0, 9.0));
+            let to = chain.position(element).map(|at| at + random.between(-7.0, 9.0));
             drags.push(Drag { element, to });
         }
     }

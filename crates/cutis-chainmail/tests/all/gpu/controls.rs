@@ -1,36 +1,39 @@
-//! What must be seen: another body, and faults in the kernel.
+//! Controls: the comparison detects another body and every fault of the kernel.
 
-use cutis_chainmail::{Chain, Material, RelaxGpu};
+use cutis_chainmail::{Chain, Drag, Material, Order, RelaxGpu};
 use cutis_gpu::GpuOptions;
 
-use crate::bodies::{SHAPES, at_rest, drag_some};
-use crate::{gpu, open, outcome};
+use cutis_test_kit::gpu::{on_each_adapter, on_each_adapter_with};
+
+use super::bodies::{SHAPES, at_rest, drag_some};
+use super::result;
 
 const SWEEPS: u32 = 12;
 
 #[test]
-fn another_k_and_a_link_less_are_seen() {
-    let Some(gpu) = gpu() else { return };
-    let body = |k: f64, apart: (u32, u32)| {
-        let soft = Material::isotropic(0.6, 1.8, 0.4, k);
-        let mut body = Chain::new([12, 10, 4], [1.0; 3], &[soft], vec![0; 480]).unwrap();
-        drag_some(&mut body, 8);
-        body.cut(|_, a, b| (a, b) == apart);
-        body
-    };
-    let mut expected = body(0.01, (0, 0));
-    let done = expected.relax(SWEEPS, &[]);
-    let wanted = outcome(&expected, done);
-    let found = |mut chain: Chain| {
-        let done = RelaxGpu::new(&gpu, &chain).unwrap().relax(&mut chain, SWEEPS, &[]).unwrap();
-        outcome(&chain, done)
-    };
-    assert_eq!(found(body(0.01, (0, 0))), wanted);
-    assert_ne!(found(body(0.011, (0, 0))), wanted);
-    assert_ne!(found(body(0.01, (0, 1))), wanted);
+fn another_k_and_a_missing_link_are_detected() {
+    on_each_adapter(|gpu| {
+        let body = |k: f64, apart: (u32, u32)| {
+            let soft = Material::isotropic(0.6, 1.8, 0.4, k);
+            let mut body = Chain::new([12, 10, 4], [1.0; 3], &[soft], vec![0; 480]).unwrap();
+            drag_some(&mut body, 8);
+            body.cut(|_, a, b| (a, b) == apart);
+            body
+        };
+        let mut expected = body(0.01, (0, 0));
+        let done = expected.relax(SWEEPS, &[]);
+        let wanted = result(&expected, done);
+        let found = |mut chain: Chain| {
+            let done = RelaxGpu::new(gpu, &chain).unwrap().relax(&mut chain, SWEEPS, &[]).unwrap();
+            result(&chain, done)
+        };
+        assert_eq!(found(body(0.01, (0, 0))), wanted);
+        assert_ne!(found(body(0.011, (0, 0))), wanted);
+        assert_ne!(found(body(0.01, (0, 1))), wanted);
+    });
 }
 
-/// A change of one operation each, in a part of the source that occurs once.
+/// Replacements of one operation each. The first text occurs once in the source.
 const MUTATIONS: &[(&str, &str)] = &[
     ("plane * slab.pitch + place / 2u", "plane * slab.pitch + (place + 1u) / 2u"),
     ("16u * (place & 1u)", "16u * (1u - (place & 1u))"),
@@ -70,36 +73,49 @@ const MUTATIONS: &[(&str, &str)] = &[
     ("select(0u, 1u, by != 0)", "1u"),
 ];
 
+/// A body in which relaxation changes no x coordinate.
+fn moving_along_y() -> (Chain, Vec<u32>) {
+    let soft = Material::isotropic(0.6, 1.8, 0.4, 0.0);
+    let mut body = Chain::new([6, 6, 3], [1.0; 3], &[soft], vec![0; 108]).unwrap();
+    let element = body.element([3, 3, 1]);
+    body.drag(&[Drag { element, to: [3.0, 6.5, 1.0] }], Order::Fifo).unwrap();
+    (body, vec![element])
+}
+
 #[test]
-fn every_mutation_of_the_kernel_is_seen() {
-    let Some(gpu) = open(GpuOptions { chunk_cap: Some(150), ..GpuOptions::default() }) else { return };
-    let bodies: Vec<_> = SHAPES
-        .into_iter()
-        .map(|shape| {
-            let mut before = at_rest(shape, 40);
-            let held = drag_some(&mut before, 41);
-            let mut after = before.clone();
-            let done = after.relax(SWEEPS, &held);
-            (before, held, outcome(&after, done))
-        })
-        .collect();
-    let differs = |change: &dyn Fn(String) -> String| {
-        bodies.iter().any(|(before, held, wanted)| {
-            let mut chain = before.clone();
-            let mut device = RelaxGpu::with_source(&gpu, &chain, change).unwrap();
-            let done = device.relax(&mut chain, SWEEPS, held).unwrap();
-            outcome(&chain, done) != *wanted
-        })
-    };
-    assert!(!differs(&|source| source));
-    let unseen: Vec<_> = MUTATIONS
-        .iter()
-        .filter(|(from, to)| {
-            !differs(&|source| {
-                assert_eq!(source.matches(from).count(), 1, "{from}");
-                source.replace(from, to)
+fn every_mutation_of_the_kernel_is_detected() {
+    on_each_adapter_with(&GpuOptions { chunk_cap: Some(150), ..GpuOptions::default() }, |gpu| {
+        let random = SHAPES.into_iter().map(|shape| {
+            let mut body = at_rest(shape, 40);
+            let held = drag_some(&mut body, 41);
+            (body, held)
+        });
+        let bodies: Vec<_> = random
+            .chain([moving_along_y()])
+            .map(|(before, held)| {
+                let mut after = before.clone();
+                let done = after.relax(SWEEPS, &held);
+                (before, held, result(&after, done))
             })
-        })
-        .collect();
-    assert!(unseen.is_empty(), "{unseen:#?}");
+            .collect();
+        let differs = |change: &dyn Fn(String) -> String| {
+            bodies.iter().any(|(before, held, wanted)| {
+                let mut chain = before.clone();
+                let mut device = RelaxGpu::with_source(gpu, &chain, change).unwrap();
+                let done = device.relax(&mut chain, SWEEPS, held).unwrap();
+                result(&chain, done) != *wanted
+            })
+        };
+        assert!(!differs(&|source| source));
+        let undetected: Vec<_> = MUTATIONS
+            .iter()
+            .filter(|(from, to)| {
+                !differs(&|source| {
+                    assert_eq!(source.matches(from).count(), 1, "{from}");
+                    source.replace(from, to)
+                })
+            })
+            .collect();
+        assert!(undetected.is_empty(), "{undetected:#?}");
+    });
 }

@@ -1,41 +1,35 @@
-//! Relaxation by a GPU against [`Chain::relax`](cutis_chainmail::Chain::relax): the same positions and counts on any adapter.
-//!
-//! Without an adapter the tests say so and do nothing, unless `CI` is set: then that is a failure.
+//! Relaxation on a GPU gives the same positions and counts as
+//! [`Chain::relax`](cutis_chainmail::Chain::relax), on every adapter.
 
 mod bodies;
 mod controls;
 mod device;
 mod parity;
-#[path = "../all/random.rs"]
-mod random;
 
 use cutis_chainmail::{Chain, Relaxation};
-use cutis_gpu::{Gpu, GpuError, GpuOptions};
+use cutis_gpu::{Gpu, GpuOptions, Select};
+use cutis_test_kit::gpu::on_each_adapter;
 
-/// The first adapter, opened with these options.
-fn open(options: GpuOptions) -> Option<Gpu> {
-    let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
-    match Gpu::open(&options) {
-        Ok(gpu) => Some(gpu),
-        Err(GpuError::NoAdapter) if !required => {
-            eprintln!("skipped: {}", GpuError::NoAdapter);
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
+/// Runs a test on each adapter, opened three times: as it is, and twice with a memory limit that
+/// splits every grid into slabs.
+fn on_each_adapter_split(mut test: impl FnMut(&[Gpu; 3])) {
+    on_each_adapter(|gpu| {
+        let select = Select::Index(gpu.adapter().index);
+        let open = |chunk_cap| {
+            let chunk_cap = Some(chunk_cap);
+            let options = GpuOptions {
+                select: select.clone(),
+                chunk_cap,
+                baseline_limits: true,
+                ..GpuOptions::default()
+            };
+            Gpu::open(&options).unwrap()
+        };
+        test(&[gpu.clone(), open(1), open(150)]);
+    });
 }
 
-fn gpu() -> Option<Gpu> {
-    open(GpuOptions::default())
-}
-
-/// The device as it is, and with memory and limits that split every grid.
-fn devices() -> Option<[Gpu; 3]> {
-    let split = |cap| GpuOptions { chunk_cap: Some(cap), baseline_limits: true, ..GpuOptions::default() };
-    Some([gpu()?, open(split(1))?, open(split(150))?])
-}
-
-/// What is compared: what relaxation said, and where all elements are, in units.
-fn outcome(chain: &Chain, done: Relaxation) -> (Relaxation, Vec<[i32; 3]>) {
-    (done, (0..chain.places() as u32).map(|element| chain.units(element)).collect())
+/// The result of a relaxation with the positions of all elements in units.
+fn result(chain: &Chain, relaxation: Relaxation) -> (Relaxation, Vec<[i32; 3]>) {
+    (relaxation, (0..chain.places() as u32).map(|element| chain.units(element)).collect())
 }
