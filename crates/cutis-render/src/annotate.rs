@@ -9,7 +9,8 @@ use crate::{Axes, Image, Rgb};
 
 const INK: Rgb = [255, 255, 255];
 
-/// World position of the picture's center and the size of a pixel in mm, so that all `corners` are seen, or the focus.
+/// World position of the picture's center and size of a pixel in mm. The picture shows the focus,
+/// or all `corners` without one.
 pub fn frame(
     axes: &Axes,
     corners: &[Point3<f64>; 8],
@@ -25,7 +26,7 @@ pub fn frame(
     (Point3::from(middle), (width / pixels[0]).max(height / pixels[1]))
 }
 
-/// Length of the corners' projection on a unit direction.
+/// Length of the projection of the corners on a unit direction.
 pub fn extent(corners: &[Point3<f64>; 8], direction: &Vector3<f64>) -> f64 {
     let along = corners.iter().map(|corner| corner.coords.dot(direction));
     let (low, high) =
@@ -33,7 +34,7 @@ pub fn extent(corners: &[Point3<f64>; 8], direction: &Vector3<f64>) -> f64 {
     high - low
 }
 
-/// Pixels per pixel of the font that suit a picture.
+/// Size of a font pixel in picture pixels, chosen by the size of the picture.
 pub fn text_scale(image: &Image) -> usize {
     ((image.width + image.height) / 480).clamp(1, 8)
 }
@@ -45,12 +46,12 @@ pub fn annotate(image: &mut Image, axes: &Axes, pixel_mm: f64) {
     let height = font::HEIGHT * scale;
     let (width, bottom) = (image.width, image.height.saturating_sub(margin + height));
     let middle = (image.height / 2).saturating_sub(height / 2);
-    let centerd = |text: &str| (width / 2).saturating_sub(text_width(text, scale) / 2);
+    let centered = |text: &str| (width / 2).saturating_sub(text_width(text, scale) / 2);
     let [left, right, top, low] = axes.letters();
     image.text(margin, middle, &left, scale, INK);
     image.text(width.saturating_sub(margin + text_width(&right, scale)), middle, &right, scale, INK);
-    image.text(centerd(&top), margin, &top, scale, INK);
-    image.text(centerd(&low), bottom, &low, scale, INK);
+    image.text(centered(&top), margin, &top, scale, INK);
+    image.text(centered(&low), bottom, &low, scale, INK);
     scale_bar(image, pixel_mm, scale, margin);
 }
 

@@ -1,32 +1,32 @@
-//! The largest HU in every block of cells, to skip empty space.
+//! The largest HU of every block of cells, for skipping empty space.
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::field::Field;
 
-/// Cells per block and axis.
+/// Cells per block along each axis.
 const SIDE: usize = 8;
 
-/// Which blocks of 8 × 8 × 8 cells may hold a value at or above a threshold.
+/// For each block of 8 × 8 × 8 cells: whether it may hold a value at or above a threshold.
 pub struct Blocks {
     shape: [usize; 3],
     full: Vec<bool>,
 }
 
-/// Blocks per axis of a grid of voxels.
+/// Number of blocks along each axis of a grid of voxels.
 pub fn block_shape(voxels: [usize; 3]) -> [usize; 3] {
     voxels.map(|n| n.saturating_sub(1).div_ceil(SIDE).max(1))
 }
 
 impl Blocks {
-    /// Looks at all voxels once, in parallel.
+    /// Finds the blocks by visiting all voxels in parallel.
     pub fn new(field: &Field<'_>, threshold_hu: f32) -> Self {
         let voxels = field.shape();
         let shape = block_shape(voxels);
         let mut full = vec![false; shape.iter().product()];
         full.par_chunks_mut(shape[0] * shape[1]).enumerate().for_each(|(block_k, full)| {
-            // A block needs the voxels at its far faces too, so those belong to two blocks.
+            // The voxels at the far faces of a block belong to the next block too.
             let span = |block: usize, axis: usize| block * SIDE..(block * SIDE + SIDE + 1).min(voxels[axis]);
             for k in span(block_k, 2) {
                 for block_j in 0..shape[1] {
@@ -43,8 +43,8 @@ impl Blocks {
         Self { shape, full }
     }
 
-    /// How far, in units of `step`, a ray at `position` (within the grid) may go before it enters a block that is not empty
-    /// or another block; `None` if the block at `position` is not empty.
+    /// Distance, in units of `step`, from `position` (within the grid) to the end of an empty
+    /// block. `None` if the block at `position` is not empty.
     #[inline]
     pub fn skip(&self, position: Point3<f64>, step: &Vector3<f64>) -> Option<f64> {
         let mut flat = 0;

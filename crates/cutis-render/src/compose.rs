@@ -1,4 +1,4 @@
-//! Pictures side by side, with captions.
+//! Several pictures in one, with captions.
 
 use crate::annotate::text_scale;
 use crate::draw::text_width;
@@ -8,10 +8,10 @@ const PAPER: Rgb = [245, 245, 245];
 const INK: Rgb = [255, 255, 255];
 const BAND: Rgb = [40, 44, 52];
 
-/// One picture from several, left to right, top-aligned, each under its caption.
+/// Combines pictures from left to right, aligned at the top, each below its caption.
 ///
 /// # Errors
-/// [`RenderError::ImageSize`] for no pictures, or too large a whole.
+/// [`RenderError::ImageSize`] if there is no picture, or if the result is too large.
 pub fn side_by_side(pictures: &[(&Image, &str)]) -> Result<Image, RenderError> {
     let scale = pictures.iter().map(|(image, _)| text_scale(image)).max().unwrap_or(1);
     let (gap, band) = (4 * scale, (font::HEIGHT + 6) * scale);

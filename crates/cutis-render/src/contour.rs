@@ -1,15 +1,16 @@
-//! The cut of a triangle surface with a plane.
+//! The intersection of a triangle surface with a plane.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::{RenderError, Rgb};
 
-/// A triangle surface to draw on a slice. Positions are local meters: `world_mm = origin_mm + 1000 · local`.
+/// A triangle surface to draw on a slice. Positions are in local meters: `world_mm = origin_mm +
+/// 1000 · local`.
 #[derive(Clone, Copy, Debug)]
 pub struct Contour<'a> {
     /// World position of the surface's local origin, mm, RAS+.
     pub origin_mm: Point3<f64>,
-    /// Vertices, local meters.
+    /// Positions of the vertices in local meters.
     pub positions: &'a [Point3<f32>],
     /// Corners of the triangles.
     pub triangles: &'a [[u32; 3]],
@@ -29,13 +30,14 @@ impl Contour<'_> {
         }
     }
 
-    /// Segments, world mm, in which the surface meets the plane through `point` with unit normal `normal`.
+    /// Segments in world mm where the surface meets the plane through `point` with the unit normal
+    /// `normal`.
     pub(crate) fn cut(&self, point: Point3<f64>, normal: &Vector3<f64>) -> Vec<[Point3<f64>; 2]> {
         let segment = |corners: &[u32; 3]| {
             let world =
                 corners.map(|v| self.origin_mm + self.positions[v as usize].coords.map(f64::from) * 1000.0);
             let height = world.map(|p| (p - point).dot(normal));
-            // A vertex on the plane counts as above, so that each crossed edge is found once.
+            // A vertex on the plane counts as above it, so that each crossed edge is found once.
             let mut ends = (0..3).filter_map(|a| {
                 let b = (a + 1) % 3;
                 let crossed = (height[a] < 0.0) != (height[b] < 0.0);

@@ -1,4 +1,4 @@
-//! Depth below the outer skin, as a volume that can be resampled with the body.
+//! Depth below the outer skin, as a volume that can be resampled together with the CT.
 
 use cutis_volume::{Affine, Grid, Volume};
 
@@ -7,18 +7,21 @@ use rayon::prelude::*;
 use crate::RenderError;
 use crate::field::Field;
 
-/// Depths are stored in this unit, mm.
+/// Unit of the stored depths, mm.
 const UNIT_MM: f32 = 0.01;
 
-/// Distance in mm from each point to the nearest outside air, up to `limit_mm`, on a grid of about `spacing_mm` (never finer
-/// than the volume's own). Air counts as outside if it is connected to the sides of the volume: not through its first and
-/// last slice along the body, which would flood lungs and bowel. Distances take the index axes as orthogonal.
+/// Distance in mm from each point to the nearest outside air, up to `limit_mm`, on a grid of about
+/// `spacing_mm` that is never finer than the volume's own grid.
 ///
-/// Resampled through the same warp as the CT, it tells which tissue a surface was at rest: see
+/// Air is outside if it is connected to the sides of the volume. Connections through the first and
+/// the last slice along the body do not count, because they would include lungs and bowel.
+/// Distances assume that the index axes are orthogonal.
+///
+/// After resampling through the same warp as the CT, it shows how deep a surface was at rest. See
 /// [`View::depth`](crate::View::depth).
 ///
 /// # Errors
-/// [`RenderError::Setting`] for lengths that are not above zero.
+/// [`RenderError::Setting`] if a length is not above zero.
 pub fn skin_depth(
     volume: &Volume,
     threshold_hu: f32,
@@ -50,7 +53,7 @@ pub fn skin_depth(
     Ok(Volume::new(grid, depth, UNIT_MM, 0.0)?)
 }
 
-/// Every `stride`-th voxel of a grid.
+/// The grid of every `stride`-th voxel.
 fn coarse_grid(fine: &Grid, spacing_mm: f64) -> Result<(Grid, [usize; 3]), RenderError> {
     let spacing = fine.affine.spacing_mm();
     let stride: [usize; 3] = std::array::from_fn(|axis| {
@@ -66,7 +69,7 @@ fn coarse_grid(fine: &Grid, spacing_mm: f64) -> Result<(Grid, [usize; 3]), Rende
     Ok((Grid { shape, affine: Affine::from_rows(rows)? }, stride))
 }
 
-/// Air connected to the lateral faces, by faces.
+/// Air that is connected to the lateral faces of the volume through faces of voxels.
 fn flood(grid: &Grid, air: &[bool]) -> Vec<bool> {
     let along_body = |axis: usize| grid.affine.step_mm(axis).z.abs() / grid.affine.step_mm(axis).norm();
     let body_axis = (0..3).max_by(|&a, &b| along_body(a).total_cmp(&along_body(b))).unwrap_or(2);
@@ -96,7 +99,8 @@ fn flood(grid: &Grid, air: &[bool]) -> Vec<bool> {
     outside
 }
 
-/// One pass of the separable squared distance transform: the smallest `squared + distance²` along an axis.
+/// One pass of the separable squared distance transform: the smallest `squared + distance²` along
+/// an axis.
 fn sweep(squared: &[f32], shape: [usize; 3], axis: usize, spacing: f32, limit: f32) -> Vec<f32> {
     let stride: usize = shape[..axis].iter().product();
     let reach = ((limit / spacing) as usize).min(shape[axis] - 1);

@@ -9,7 +9,8 @@ pub fn text_width(text: &str, scale: usize) -> usize {
 }
 
 impl Image {
-    /// Draws a text with its top left corner at `(x, y)`, `scale` pixels to one of the font, with a dark rim around it.
+    /// Draws a text with a dark rim. Its top left corner is at `(x, y)`, and a font pixel has
+    /// `scale` picture pixels.
     pub(crate) fn text(&mut self, x: usize, y: usize, text: &str, scale: usize, color: Rgb) {
         let rim = scale.div_ceil(2);
         for (grow, color, opacity) in [(rim, [0, 0, 0], 0.6), (0, color, 1.0)] {
@@ -30,7 +31,7 @@ impl Image {
         }
     }
 
-    /// Fills a box of pixels.
+    /// Blends a color into a rectangle of pixels.
     pub(crate) fn fill(
         &mut self,
         columns: std::ops::Range<usize>,
@@ -45,7 +46,8 @@ impl Image {
         }
     }
 
-    /// Draws a smooth line between two points in pixels; the center of the first pixel is at (0, 0).
+    /// Draws a smooth line between two points in pixels. The center of the first pixel is at (0,
+    /// 0).
     pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], thickness: f64, color: Rgb) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let squared = along[0] * along[0] + along[1] * along[1];

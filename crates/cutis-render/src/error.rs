@@ -1,34 +1,34 @@
-//! The crate's error type.
+//! Errors of pictures.
 
 use std::io;
 use std::path::PathBuf;
 
 use cutis_volume::VolumeError;
 
-/// Everything that can go wrong with a picture.
+/// Why a picture could not be drawn or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// An image must have pixels, and not more than can be held.
+    /// A picture has no pixels, or too many.
     #[error(
         "an image of {width} × {height} pixels: both must be at least 1 and their product at most {limit}"
     )]
     ImageSize {
-        /// Pixels along a row.
+        /// Pixels in a row.
         width: usize,
-        /// Rows.
+        /// Number of rows.
         height: usize,
         /// Largest number of pixels.
         limit: usize,
     },
-    /// A setting of a view is not a usable number.
+    /// A setting of a view is out of range.
     #[error("{key} is {value}: it must be {expected}")]
     Setting {
         /// Name of the field.
         key: &'static str,
-        /// The value, as given.
+        /// Value of the field.
         value: f64,
-        /// What would be right.
+        /// Allowed values.
         expected: &'static str,
     },
     /// A triangle of a contour names a vertex that does not exist.
@@ -50,13 +50,13 @@ pub enum RenderError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
-    /// A file could not be created or replaced, or a derived volume is not valid.
+    /// A file could not be created or replaced, or a derived volume is invalid.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// The GPU could not do it.
+    /// The GPU refused or failed.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] cutis_gpu::GpuError),

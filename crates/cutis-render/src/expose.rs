@@ -1,20 +1,20 @@
-//! From light to a picture: one ray for each pixel, and more where the picture has an edge.
+//! Sampling of a picture: one ray for each pixel, and more at edges.
 
 use rayon::prelude::*;
 
 use crate::shade::{Light, encode};
 use crate::{Image, RenderError};
 
-/// Places of the picture that are looked at together.
+/// Number of positions in a batch.
 pub const BATCH: usize = 1 << 16;
-/// Difference between neighboring pixels that calls for more rays.
+/// Difference between neighboring pixels that makes an edge.
 const EDGE: u8 = 12;
 
-/// Fills a picture with the light that comes to its places, which are given in pixels from its top left corner and at most
-/// [`BATCH`] at a time. A pixel on an edge gets the mean over `samples × samples` places.
+/// Fills a picture by calling `light_at` with batches of at most [`BATCH`] positions in pixels from
+/// the top left corner. A pixel at an edge gets the mean of `samples × samples` positions.
 ///
 /// # Errors
-/// Those of `light_at`, which must give as many lights as there are places.
+/// The errors of `light_at`, which must return one light per position.
 pub fn expose(
     image: &mut Image,
     samples: usize,
@@ -32,7 +32,7 @@ pub fn expose(
     if samples == 1 {
         return Ok(());
     }
-    // More rays where the picture has an edge: elsewhere they would find the same.
+    // More rays at edges only: elsewhere they would find the same light.
     let edges: Vec<usize> =
         (0..image.rgb.len() / 3).into_par_iter().filter(|&pixel| on_edge(image, pixel)).collect();
     let count = samples * samples;

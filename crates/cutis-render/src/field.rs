@@ -22,7 +22,7 @@ impl<'a> Field<'a> {
         self.shape
     }
 
-    /// HU of one voxel, padding as air.
+    /// HU of one voxel. Padding counts as air.
     #[inline]
     pub fn voxel(&self, index: usize) -> f32 {
         (self.slope * f32::from(self.voxels[index]) + self.intercept).max(AIR_HU)
@@ -51,13 +51,14 @@ impl<'a> Field<'a> {
         mix(along_y(base), along_y(base + sz), fz)
     }
 
-    /// HU at a world position, mm.
+    /// HU at a world position in mm.
     pub fn at_mm(&self, mm: Point3<f64>) -> f32 {
         self.at(self.volume.grid().affine.to_index(mm))
     }
 
-    /// ∂HU/∂index, smoothed: central differences over one voxel to either side, averaged over the position and its six
-    /// neighbors. Without the average the steps between voxels show as rings on the skin.
+    /// Smoothed gradient of HU by index: central differences over one voxel to either side,
+    /// averaged over the position and its six neighbors. Without the average, the steps between
+    /// voxels appear as rings on the skin.
     pub fn index_gradient(&self, position: Point3<f64>) -> Vector3<f64> {
         let unit = |axis: usize| Vector3::from_fn(|row, _| if row == axis { 1.0 } else { 0.0 });
         let at = |offset: Vector3<f64>| f64::from(self.at(position + offset));
@@ -65,7 +66,7 @@ impl<'a> Field<'a> {
         for axis in 0..3 {
             let along = unit(axis);
             sum[axis] += at(along) - at(-along) + at(along * 2.0) - at(along * -2.0);
-            // Each diagonal neighbor serves the differences along both its axes.
+            // Each diagonal neighbor contributes to the differences along both of its axes.
             let other = (axis + 1) % 3;
             let across = unit(other);
             let [pp, pm, mp, mm] =
@@ -76,7 +77,7 @@ impl<'a> Field<'a> {
         sum / 14.0
     }
 
-    /// Index per mm: the linear part of world → index.
+    /// Linear part of the map from world mm to index.
     pub fn index_per_mm(&self) -> Matrix3<f64> {
         let affine = &self.volume.grid().affine;
         let zero = affine.to_index(Point3::origin());
@@ -90,12 +91,12 @@ impl<'a> Field<'a> {
         Matrix3::from_columns(&[column(0), column(1), column(2)])
     }
 
-    /// Smallest distance between two voxels along an index axis, mm.
+    /// Smallest voxel spacing along an index axis, mm.
     pub fn finest_mm(&self) -> f64 {
         self.volume.grid().affine.spacing_mm().into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// Corners of the box of voxels, outer faces included, world mm.
+    /// Corners of the box of voxels in world mm, including the outer halves of the outer voxels.
     pub fn corners_mm(&self) -> [Point3<f64>; 8] {
         std::array::from_fn(|corner| {
             let index =
@@ -104,12 +105,12 @@ impl<'a> Field<'a> {
         })
     }
 
-    /// World mm → continuous index.
+    /// Continuous index of a world position in mm.
     pub fn to_index(&self, mm: Point3<f64>) -> Point3<f64> {
         self.volume.grid().affine.to_index(mm)
     }
 
-    /// Continuous index → world mm.
+    /// World position in mm of a continuous index.
     pub fn to_mm(&self, index: Point3<f64>) -> Point3<f64> {
         self.volume.grid().affine.to_mm(index)
     }

@@ -4,7 +4,7 @@
 pub const WIDTH: usize = 5;
 /// Height of a glyph in font pixels.
 pub const HEIGHT: usize = 7;
-/// Distance from one letter to the next.
+/// Distance from one letter to the next in font pixels.
 pub const ADVANCE: usize = WIDTH + 1;
 
 /// Rows from top to bottom; bit 4 is the leftmost pixel. From space (32) to tilde (126).
@@ -107,7 +107,7 @@ const GLYPHS: [[u8; HEIGHT]; 95] = [
     [0x00, 0x00, 0x08, 0x15, 0x02, 0x00, 0x00], // ~
 ];
 
-/// The glyph of a character; the question mark's for one that the font lacks.
+/// The glyph of a character. Characters that the font lacks get a question mark.
 pub fn glyph(character: char) -> &'static [u8; HEIGHT] {
     let code = character as usize;
     let known = if (32..127).contains(&code) { code } else { '?' as usize };

@@ -1,4 +1,4 @@
-//! Ray marching by a GPU: the same picture as [`raymarch`](crate::raymarch), in single precision.
+//! Ray marching on a GPU: the picture of [`raymarch`](crate::raymarch) in single precision.
 
 mod kernels;
 mod scene;
@@ -20,29 +20,36 @@ use kernels::Kernels;
 use scene::{Scene, start};
 use uniform::ViewUniform;
 
-/// The picture of a volume's surface, marched by a GPU. For several pictures of one volume see [`GpuRaymarcher`].
+/// Draws the surface of a volume on a GPU. For several pictures of one volume use
+/// [`GpuRaymarcher`].
 ///
 /// # Errors
-/// Those of [`raymarch`](crate::raymarch), and [`RenderError::Gpu`].
+/// The errors of [`raymarch`](crate::raymarch), and [`RenderError::Gpu`].
 pub fn raymarch_gpu(gpu: &Gpu, volume: &Volume, view: &View<'_>) -> Result<Image, RenderError> {
     view.validate()?;
     GpuRaymarcher::new(gpu, volume)?.render(view)
 }
 
-/// A volume on a GPU, to be looked at from several sides.
+/// Draws several views of one volume on a GPU.
 ///
-/// The volume goes up once, as a 3-D texture of its int16 voxels; so does a depth volume, for as long as the views name the
-/// same one. The host finds where each ray begins and ends, in double precision and as for [`raymarch`](crate::raymarch); the
-/// device marches, refines and shades in single precision, at most 65 536 rays per submission, so that none keeps a desktop's
-/// GPU busy for long; the host chooses where more rays are needed, rounds to 8 bits and writes letters and scale.
+/// The volume is uploaded once, as a 3-D texture of its int16 voxels. A depth volume is uploaded
+/// once too, as long as consecutive views use the same one. The host computes the beginning and the
+/// end of each ray in double precision, as for [`raymarch`](crate::raymarch). The device marches,
+/// refines and shades in single precision. A submission has at most 65 536 rays, so that none keeps
+/// the GPU of a desktop busy for long. The host decides where more rays are needed, rounds to 8
+/// bits and writes letters and scale.
 ///
 /// # How its pictures differ
-/// A position is rounded to about 10⁻⁷ of the grid's length. That moves a surface by less than the 1/128 voxel to which it is
-/// refined, and its color by 1 of 255 here and there; more only at ties: a ray that grazes a silhouette, a probe of the
-/// ambient occlusion at just the threshold, neighbors at just the difference that calls for more rays. Ties are not as rare
-/// as chance has it: voxels are integers, and where pixels and voxels are in a round proportion a value between them can be
-/// the threshold itself. On Mesa's software Vulkan the mean absolute difference was at most 0.0023 of 255 over the pictures
-/// of the tests, where at most 2 pixels of 12 000 differed by more than 8. The tests hold 0.005, and one pixel in 2000.
+/// Positions are rounded to about 10⁻⁷ of the grid's length. This moves a surface by less than the
+/// 1/128 voxel of its refinement, and some colors by 1 of 255. Larger differences occur at ties: a
+/// ray that grazes a silhouette, a probe of the ambient occlusion exactly at the threshold, or
+/// neighbors exactly at the difference that makes an edge. Such ties are more frequent than chance
+/// would suggest. Voxels are integers, and where pixels and voxels have a simple ratio, an
+/// interpolated value can equal the threshold.
+///
+/// On Mesa's software Vulkan the mean absolute difference was at most 0.0023 of 255 over the
+/// pictures of the tests. At most 2 of 12 000 pixels differed by more than 8. The tests allow 0.005
+/// and one pixel in 2000.
 ///
 /// ```
 /// use cutis_gpu::{Gpu, GpuError, GpuOptions};
@@ -69,18 +76,19 @@ pub struct GpuRaymarcher<'a> {
 }
 
 impl<'a> GpuRaymarcher<'a> {
-    /// Uploads a volume and finds the largest value in each of its blocks.
+    /// Uploads a volume and computes the largest value of each block.
     ///
     /// # Errors
-    /// [`RenderError::Gpu`]: the volume is longer than a 3-D texture may be, there is too little memory, the device is lost.
+    /// [`RenderError::Gpu`] if the volume exceeds the size of a 3-D texture, if there is too little
+    /// memory, or if the device is lost.
     pub fn new(gpu: &Gpu, volume: &'a Volume) -> Result<Self, RenderError> {
         Ok(Self { gpu: gpu.clone(), volume, scene: Scene::new(gpu, volume)?, kernels: Kernels::default() })
     }
 
-    /// One picture.
+    /// Draws one picture.
     ///
     /// # Errors
-    /// As [`raymarch_gpu`].
+    /// The errors of [`raymarch_gpu`].
     pub fn render(&mut self, view: &View<'a>) -> Result<Image, RenderError> {
         view.validate()?;
         let mut image = Image::new(view.width, view.height, BACKGROUND)?;

@@ -13,22 +13,23 @@ pub type Rgb = [u8; 3];
 /// An RGB picture, 8 bits per channel, row by row from the top left.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Pixels along a row.
+    /// Pixels in a row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// `3 · width · height` bytes.
+    /// The channels of all pixels, `3 · width · height` bytes.
     pub rgb: Vec<u8>,
 }
 
 impl Image {
-    /// The largest number of pixels: 2²⁷, three times as many bytes.
+    /// Largest number of pixels: 2²⁷. A picture has three bytes per pixel.
     pub const MAX_PIXELS: usize = 1 << 27;
 
-    /// A picture of one color.
+    /// Creates a picture of one color.
     ///
     /// # Errors
-    /// [`RenderError::ImageSize`] for no pixels or more than [`Image::MAX_PIXELS`]; nothing is allocated then.
+    /// [`RenderError::ImageSize`] if there are no pixels or more than [`Image::MAX_PIXELS`]; then
+    /// nothing is allocated.
     pub fn new(width: usize, height: usize, color: Rgb) -> Result<Self, RenderError> {
         let limit = Self::MAX_PIXELS;
         match width.checked_mul(height) {
@@ -39,13 +40,14 @@ impl Image {
         }
     }
 
-    /// The color of a pixel, column `x` of row `y`; `None` outside the picture.
+    /// Color of a pixel in column `x` of row `y`. `None` outside the picture.
     pub fn pixel(&self, x: usize, y: usize) -> Option<Rgb> {
         let at = self.offset(x, y)?;
         Some([self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]])
     }
 
-    /// Mixes a color into a pixel: 0 leaves it, 1 replaces it. Outside the picture nothing happens.
+    /// Mixes a color into a pixel: opacity 0 keeps the pixel, 1 replaces it. Has no effect outside
+    /// the picture.
     pub fn blend(&mut self, x: usize, y: usize, color: Rgb, opacity: f32) {
         if let Some(at) = self.offset(x, y) {
             for (channel, new) in self.rgb[at..at + 3].iter_mut().zip(color) {
@@ -59,10 +61,11 @@ impl Image {
         (x < self.width && y < self.height).then(|| 3 * (y * self.width + x))
     }
 
-    /// Writes an 8-bit RGB PNG, beside the target and renamed, so that no half-written picture is ever there.
+    /// Writes an 8-bit RGB PNG file. It is written to a temporary file next to the target and then
+    /// renamed, so that the target is always complete.
     ///
     /// # Errors
-    /// [`RenderError::Write`] or [`RenderError::Volume`] with the path: no such folder, no space, not writable.
+    /// [`RenderError::Write`] or [`RenderError::Volume`] with the path.
     pub fn write_png(&self, path: impl AsRef<Path>) -> Result<(), RenderError> {
         let path = path.as_ref();
         let mut file = PartialFile::create(path)?;
@@ -71,10 +74,10 @@ impl Image {
         Ok(file.commit()?)
     }
 
-    /// The bytes of [`Image::write_png`]'s file, to embed them elsewhere.
+    /// Encodes the picture as the PNG file that [`Image::write_png`] writes.
     ///
     /// # Errors
-    /// [`RenderError::ImageSize`] if the fields, which are public, do not fit together.
+    /// [`RenderError::ImageSize`] if the public fields do not fit together.
     pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
         let (width, height) = (self.width, self.height);
         self.encode().map_err(|_| RenderError::ImageSize { width, height, limit: Self::MAX_PIXELS })

@@ -1,15 +1,19 @@
 //! Headless pictures of CT volumes: the skin from any side, slices with contours, charts.
 //!
-//! Everything runs on the CPU without a display, and gives the same bits for any number of threads; with the feature `gpu`,
-//! `raymarch_gpu` gives the same surface pictures by a GPU, but for rounding. Positions and directions
-//! are RAS+ millimeters: `[1, 0, 0]` points to the patient's right, `[0, 1, 0]` to anterior, `[0, 0, 1]` to superior.
+//! Everything runs on the CPU without a display and gives the same bits for any number of threads.
+//! With the feature `gpu`, `raymarch_gpu` draws the same surface pictures on a GPU, except for
+//! roundings.
+//!
+//! Positions and directions are RAS+ millimeters: `[1, 0, 0]` points to the patient's right, `[0,
+//! 1, 0]` to anterior, `[0, 0, 1]` to superior.
 //!
 //! ```
 //! use cutis_render::{Plane, Side, SliceView, View, raymarch, slice};
 //! use cutis_volume::{Affine, Grid, Volume};
 //!
 //! let grid = Grid { shape: [32; 3], affine: Affine::from_spacing([2.0; 3], [-31.0; 3])? };
-//! let ball = (0..grid.len()).map(|v| if grid.mm(grid.point(v)).coords.norm() < 25.0 { 40 } else { -1000 });
+//! let radius_mm = |v| grid.mm(grid.point(v)).coords.norm();
+//! let ball = (0..grid.len()).map(|v| if radius_mm(v) < 25.0 { 40 } else { -1000 });
 //! let volume = Volume::new(grid, ball.collect(), 1.0, 0.0)?;
 //! let skin = raymarch(&volume, &View { width: 64, height: 64, ..View::new(Side::Anterior) })?;
 //! let cut = slice(&volume, &SliceView::new(Plane::Axial, 0.0))?;
@@ -49,7 +53,7 @@ pub use image::{Image, Rgb};
 pub use raymarch::raymarch;
 pub use side::{Axes, Side};
 pub use slice::{Plane, SliceView, slice};
-pub use view::{ClipPlane, Focus, View};
+pub use view::{Focus, View};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -12,21 +12,21 @@ use crate::rays::{Ray, Rays};
 use crate::shade::{BACKGROUND, Shader, decode};
 use crate::{Axes, Image, RenderError, View};
 
-/// Halvings of the step in which the surface lies.
+/// Number of bisections of the step that contains the surface.
 const HALVINGS: usize = 6;
 
-/// Where a ray met the surface.
+/// The point where a ray meets the surface.
 pub struct Hit {
     /// Continuous index.
     pub index: Point3<f64>,
-    /// True if the ray began inside: at a face of the volume or of a clip plane.
+    /// True if the ray begins inside, at a face of the volume.
     pub on_cut: bool,
 }
 
-/// The picture of a volume's surface.
+/// Draws the surface of a volume.
 ///
 /// # Errors
-/// [`RenderError::ImageSize`], [`RenderError::Setting`] with the key.
+/// [`RenderError::ImageSize`], [`RenderError::Setting`].
 pub fn raymarch(volume: &Volume, view: &View<'_>) -> Result<Image, RenderError> {
     view.validate()?;
     let mut image = Image::new(view.width, view.height, BACKGROUND)?;
@@ -47,7 +47,7 @@ pub fn raymarch(volume: &Volume, view: &View<'_>) -> Result<Image, RenderError> 
     Ok(image)
 }
 
-/// Looks for a surface along rays.
+/// Finds the surface along rays.
 struct Marcher<'a> {
     field: &'a Field<'a>,
     rays: &'a Rays<'a>,
@@ -56,13 +56,13 @@ struct Marcher<'a> {
 }
 
 impl Marcher<'_> {
-    /// First point of a ray that is at or above the threshold.
+    /// The first point of a ray at or above the threshold.
     fn cast(&self, ray: &Ray) -> Option<Hit> {
         let at = |n: f64| self.rays.at(ray, n);
         let mut n = 0.0;
         while n <= ray.length {
             if let Some(free) = self.blocks.skip(at(n), &self.rays.step) {
-                // The next sample behind the block's wall; the samples stay a step apart.
+                // The next sample behind the block. Samples stay one step apart.
                 n = (n + free).floor().max(n) + 1.0;
                 continue;
             }
@@ -74,7 +74,7 @@ impl Marcher<'_> {
         None
     }
 
-    /// The crossing within the step before `n`.
+    /// The crossing of the threshold within the step before `n`.
     fn refine(&self, at: &impl Fn(f64) -> Point3<f64>, n: f64) -> f64 {
         if n == 0.0 {
             return 0.0;

@@ -1,5 +1,4 @@
-//! The rays of a picture: parallel, a step apart from sample to sample, from where they enter what is shown to where they
-//! leave it.
+//! The parallel rays of a picture, from where they enter the volume to where they leave it.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,10 +6,10 @@ use crate::annotate::frame;
 use crate::field::Field;
 use crate::{Axes, View};
 
-/// Length of a step in voxels, along the index axis in which it moves most.
+/// Length of a step in voxels, along the index axis of the fastest change.
 const STEP: f64 = 0.5;
 
-/// Rays of one direction through one field.
+/// Parallel rays through a field.
 pub struct Rays<'a> {
     field: &'a Field<'a>,
     axes: Axes,
@@ -19,15 +18,15 @@ pub struct Rays<'a> {
     half: [f64; 2],
     /// Size of a pixel, mm.
     pub pixel_mm: f64,
-    /// Index per step.
+    /// Change of the index per step.
     pub step: Vector3<f64>,
-    /// Planes in index space: kept where `normal · index ≥ offset`.
+    /// Faces of the volume in index space. A point is inside if `normal · index ≥ offset`.
     planes: Vec<(Vector3<f64>, f64)>,
-    /// No ray has more steps.
+    /// Upper limit of the steps of a ray.
     most: f64,
 }
 
-/// A ray's part that is shown: not empty.
+/// The part of a ray that is within the volume.
 pub struct Ray {
     /// Continuous index in the plane of the picture's center.
     origin: Point3<f64>,
@@ -50,23 +49,13 @@ impl<'a> Rays<'a> {
             planes.push((normal, 0.0));
             planes.push((-normal, -(field.shape()[axis] as f64 - 1.0)));
         }
-        for clip in view.clip {
-            // A plane of world space is one of index space: n · to_mm(x) = n·to_mm(0) + (Aᵀn) · x.
-            let keep = Vector3::from(clip.keep);
-            let zero = field.to_mm(Point3::origin());
-            let normal = Vector3::from_fn(|axis, _| {
-                let mut one = Point3::origin();
-                one[axis] = 1.0;
-                keep.dot(&(field.to_mm(one) - zero))
-            });
-            planes.push((normal, keep.dot(&(Point3::from(clip.point_mm) - zero))));
-        }
         let longest = field.shape().into_iter().max().unwrap_or(1);
         let half = size.map(|length| length as f64 / 2.0);
         Self { field, axes: *axes, center_mm, half, pixel_mm, step, planes, most: longest as f64 / STEP }
     }
 
-    /// The ray through a place of the picture, in pixels from its top left corner, if it meets anything that is shown.
+    /// The ray through a position of the picture, in pixels from its top left corner. `None` if it
+    /// misses the volume.
     pub fn through(&self, [x, y]: [f64; 2]) -> Option<Ray> {
         let u = (x - self.half[0]) * self.pixel_mm;
         let v = (self.half[1] - y) * self.pixel_mm;
@@ -86,7 +75,7 @@ impl<'a> Rays<'a> {
         if !(start <= end && (end - start).is_finite()) {
             return None;
         }
-        // Far from the origin the rounding of the two ends may be more than the grid.
+        // Far from the origin, the rounding errors of the two ends may exceed the size of the grid.
         Some(Ray { origin, start, length: (end - start).min(self.most) })
     }
 

@@ -1,4 +1,5 @@
-//! Color of a surface point: skin, or tissue by HU where it was deep, with light and ambient occlusion.
+//! Color of a surface point: skin or, where it was deep at rest, tissue by HU; with light and
+//! ambient occlusion.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -6,10 +7,10 @@ use crate::field::Field;
 use crate::raymarch::Hit;
 use crate::{Axes, Rgb, View};
 
-/// Behind the body.
+/// Color behind the body.
 pub const BACKGROUND: Rgb = [24, 26, 32];
 pub const SKIN: Rgb = [232, 186, 160];
-/// Tissue of a wound by HU: fat, connective tissue, muscle, bone.
+/// Colors of the tissue in a wound by HU: fat, connective tissue, muscle, bone.
 pub const TISSUE: [(f32, Rgb); 6] = [
     (-180.0, [250, 206, 124]),
     (-70.0, [242, 178, 100]),
@@ -18,15 +19,15 @@ pub const TISSUE: [(f32, Rgb); 6] = [
     (160.0, [190, 90, 74]),
     (400.0, [238, 228, 206]),
 ];
-/// Directions in which ambient light is looked for, spread over a sphere.
+/// Number of directions of the ambient occlusion, spread over a sphere.
 pub const DIRECTIONS: usize = 16;
-/// Parts of the occlusion's reach at which tissue is looked for.
+/// Fractions of the occlusion's reach that are probed for tissue.
 const REACHES: [f64; 3] = [0.2, 0.5, 1.0];
 
 /// Linear light, 0 to 1.
 pub type Light = Vector3<f32>;
 
-/// Colors the surface of one field under one view.
+/// Computes surface colors of one field for one view.
 pub struct Shader<'a> {
     field: &'a Field<'a>,
     depth: Option<(Field<'a>, f64)>,
@@ -47,7 +48,7 @@ impl<'a> Shader<'a> {
             let spacing = depth.finest_mm();
             (depth, spacing)
         });
-        // Fibonacci points: equal areas, no two on one meridian.
+        // Points of a Fibonacci spiral: they represent equal areas, and no two are on one meridian.
         let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
         let directions = std::array::from_fn(|n| {
             let z = 1.0 - (2 * n + 1) as f64 / DIRECTIONS as f64;
@@ -77,7 +78,7 @@ impl<'a> Shader<'a> {
         let normal = self.normal(hit.index);
         let base = self.albedo(hit.index, &normal);
         let open = self.openness(hit.index, &normal);
-        // Light that has been through flesh is red: the less of it comes, the more so.
+        // Light that has passed through tissue is red. Darker places are therefore redder.
         let root = open.sqrt();
         let surface = base.component_mul(&Light::new(open, open * root, open * root * root.sqrt()));
         let diffuse = normal.dot(&self.light).max(0.0) as f32;
@@ -93,7 +94,7 @@ impl<'a> Shader<'a> {
         gradient.try_normalize(0.0).unwrap_or(self.toward)
     }
 
-    /// Skin, or tissue by its HU where the surface was deep at rest.
+    /// Color of the skin, or of the tissue where the surface was deep at rest.
     fn albedo(&self, index: Point3<f64>, normal: &Vector3<f64>) -> Light {
         let skin = decode(SKIN);
         let Some((depth, spacing)) = &self.depth else { return skin };
@@ -108,7 +109,7 @@ impl<'a> Shader<'a> {
         skin.lerp(&tissue(hu), exposed)
     }
 
-    /// Share of the ambient light that reaches the point: 1 on a convex body, less in a cleft.
+    /// Fraction of the ambient light that reaches the point: 1 on a convex body, less in a cleft.
     fn openness(&self, index: Point3<f64>, normal: &Vector3<f64>) -> f32 {
         if self.occlusion_mm == 0.0 {
             return 1.0;
@@ -142,18 +143,18 @@ fn tissue(hu: f32) -> Light {
     }
 }
 
-/// 0 up to 0, 1 from 1, smooth between.
+/// 0 for `x` ≤ 0, 1 for `x` ≥ 1, smooth in between.
 fn smooth_step(x: f32) -> f32 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }
 
-/// Stored color → linear light, with a gamma of 2.
+/// Linear light of a stored color, with a gamma of 2.
 pub fn decode(color: Rgb) -> Light {
     Light::from(color.map(|c| (f32::from(c) / 255.0).powi(2)))
 }
 
-/// Linear light → stored color.
+/// Stored color of linear light.
 pub fn encode(light: Light) -> Rgb {
     light.map(|c| (c.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8).into()
 }

@@ -1,10 +1,10 @@
-//! The side a body is seen from, and the orientation letters of a picture.
+//! The side from which a body is seen, and the orientation letters of a picture.
 
 use nalgebra::Vector3;
 
 use crate::RenderError;
 
-/// Where the viewer stands.
+/// Position of the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Side {
     /// In front of the patient; the patient's right is on the left of the picture.
@@ -17,7 +17,7 @@ pub enum Side {
     Right,
     /// Above the head; anterior is up.
     Superior,
-    /// Below the feet, as axial slices are shown; anterior is up.
+    /// Below the feet, as for axial slices; anterior is up.
     Inferior,
     /// Along any direction from the patient to the viewer, RAS+.
     From([f64; 3]),
@@ -38,19 +38,20 @@ impl Side {
     }
 }
 
-/// The axes of a picture: orthonormal, RAS+.
+/// The orthonormal axes of a picture, RAS+.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
-    /// To the right of the picture.
+    /// Towards the right of the picture.
     pub right: Vector3<f64>,
-    /// To its top.
+    /// Towards the top of the picture.
     pub up: Vector3<f64>,
-    /// To the viewer.
+    /// Towards the viewer.
     pub toward: Vector3<f64>,
 }
 
 impl Axes {
-    /// Superior is up; where the viewer looks nearly along it (within 10°), anterior is.
+    /// The axes of a side. Superior is up, or anterior if the view is within 10° of the body's
+    /// axis.
     ///
     /// # Errors
     /// [`RenderError::Setting`] for a direction without length.
@@ -68,13 +69,15 @@ impl Axes {
         Ok(Self { right, up: toward.cross(&right), toward })
     }
 
-    /// The letters at the left, right, top and bottom edge of a picture; two for an oblique direction.
+    /// The letters at the left, right, top and bottom edge of a picture. An oblique direction has
+    /// two.
     pub fn letters(&self) -> [String; 4] {
         [-self.right, self.right, self.up, -self.up].map(|direction| letters(&direction))
     }
 }
 
-/// The body directions that make up a direction, the strongest first; those under a quarter of its length are left out.
+/// Letters of the body directions that make up a direction, the strongest first. Components of less
+/// than a quarter are omitted.
 fn letters(direction: &Vector3<f64>) -> String {
     let names = [["L", "R"], ["P", "A"], ["I", "S"]];
     let mut axes = [0, 1, 2];

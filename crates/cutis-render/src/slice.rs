@@ -1,4 +1,4 @@
-//! Axial, coronal and sagittal slices in the patient's own planes.
+//! Axial, coronal and sagittal slices in the planes of the patient.
 
 use cutis_volume::Volume;
 use nalgebra::Point3;
@@ -13,39 +13,40 @@ use crate::{Axes, Image, RenderError, Side};
 /// A plane of the patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Plane {
-    /// Across the body; position is mm towards superior.
+    /// Across the body. Its position increases towards superior.
     Axial,
-    /// Parallel to the chest; position is mm towards anterior.
+    /// Parallel to the chest. Its position increases towards anterior.
     Coronal,
-    /// From front to back; position is mm towards the right.
+    /// From front to back. Its position increases towards the patient's right.
     Sagittal,
 }
 
-/// A slice and how to show it.
+/// Position and appearance of a slice.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceView<'a> {
-    /// Which plane.
+    /// Orientation of the slice.
     pub plane: Plane,
-    /// Where it cuts, world mm along the plane's normal.
+    /// Position of the slice along its normal, world mm.
     pub at_mm: f64,
-    /// Patient's right on the left of the picture (default); mirrored if false.
+    /// True (default): the patient's right is on the left of the picture. False: mirrored.
     pub radiological: bool,
     /// Width of the gray scale, HU. Default 400.
     pub window_hu: f32,
-    /// Its center, HU. Default 40.
+    /// Center of the gray scale, HU. Default 40.
     pub level_hu: f32,
-    /// Pixels along the longer side; `None`: a pixel is as large as the finest voxel spacing.
+    /// Pixels along the longer side. With `None` a pixel has the finest voxel spacing.
     pub long_side: Option<usize>,
-    /// Part to look at; the whole slice if `None`.
+    /// The part to show; with `None` the whole slice.
     pub focus: Option<Focus>,
-    /// Surfaces whose cut is drawn as lines.
+    /// Surfaces whose intersection is drawn as lines.
     pub contours: &'a [Contour<'a>],
-    /// Orientation letters and a scale bar.
+    /// True to draw orientation letters and a scale bar.
     pub annotate: bool,
 }
 
 impl SliceView<'_> {
-    /// The whole slice, one pixel per voxel, window 400, level 40, radiological.
+    /// Default settings: the whole slice with the finest voxel spacing per pixel, window 400, level
+    /// 40, radiological.
     pub fn new(plane: Plane, at_mm: f64) -> Self {
         Self {
             plane,
@@ -88,19 +89,21 @@ impl SliceView<'_> {
         self.contours.iter().enumerate().try_for_each(|(number, contour)| contour.validate(number))
     }
 
-    /// Gray of a HU value: black at `level − window/2` and below, white at `level + window/2` and above, linear between
-    /// (DICOM PS3.3 C.11.2.1.3.2, LINEAR_EXACT).
+    /// Gray level of an HU value: black up to `level − window/2`, white from `level + window/2`,
+    /// and linear in between (DICOM PS3.3 C.11.2.1.3.2, LINEAR_EXACT).
     pub fn gray(&self, hu: f32) -> u8 {
         let part = (hu - (self.level_hu - self.window_hu / 2.0)) / self.window_hu;
         (part.clamp(0.0, 1.0) * 255.0).round() as u8
     }
 }
 
-/// The picture of a slice, resampled to the patient's plane, so that an oblique volume is shown upright and voxels that are
-/// not cubes keep their aspect. Outside the volume it is black.
+/// Draws a slice.
+///
+/// The volume is resampled to the plane of the patient, so that oblique volumes appear upright and
+/// anisotropic voxels keep their aspect ratio. The picture is black outside the volume.
 ///
 /// # Errors
-/// [`RenderError::ImageSize`], [`RenderError::Setting`] with the key, [`RenderError::VertexOutOfRange`].
+/// [`RenderError::ImageSize`], [`RenderError::Setting`], [`RenderError::VertexOutOfRange`].
 pub fn slice(volume: &Volume, view: &SliceView<'_>) -> Result<Image, RenderError> {
     view.validate()?;
     let field = Field::new(volume);

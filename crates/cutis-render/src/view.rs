@@ -1,10 +1,10 @@
-//! What a surface picture shows, and from where.
+//! Settings of a surface picture.
 
 use cutis_volume::Volume;
 
 use crate::{RenderError, Side};
 
-/// A part of the world to look at.
+/// A part of the world to show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Focus {
     /// Center of the picture, world mm.
@@ -13,46 +13,36 @@ pub struct Focus {
     pub size_mm: f64,
 }
 
-/// A plane that hides what lies on one side of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClipPlane {
-    /// A point of the plane, world mm.
-    pub point_mm: [f64; 3],
-    /// Direction to the side that is kept.
-    pub keep: [f64; 3],
-}
-
 /// An orthographic picture of the iso-surface of a volume.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Where the viewer stands.
+    /// Position of the viewer.
     pub side: Side,
-    /// Pixels along a row.
+    /// Pixels in a row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// The surface is where HU rises through this value. Default −300: about half-way between air and skin, and above the
-    /// noise of air and of foam.
+    /// HU of the surface. The default −300 is about half-way between air and skin, and above the
+    /// noise of air and foam.
     pub threshold_hu: f32,
-    /// Part to look at; the whole volume if `None`.
+    /// The part to show; with `None` the whole volume.
     pub focus: Option<Focus>,
-    /// Planes to cut away what hides the view. The cut face shows HU as gray, window 400, level 40.
-    pub clip: &'a [ClipPlane],
-    /// Depth below the skin that the tissue had at rest, in mm, as [`skin_depth`](crate::skin_depth) gives it and as it was
-    /// resampled with the body. Surface that was deep is colored as tissue of a wound. Without it all surface is skin.
+    /// Depth below the skin at rest in mm: the volume of [`skin_depth`](crate::skin_depth),
+    /// resampled together with the body. Surfaces that were deep get the color of their tissue.
+    /// With `None` all surfaces get the color of skin.
     pub depth: Option<&'a Volume>,
-    /// Thickness of what counts as skin where `depth` is given, mm. Default 2.
+    /// Thickness of the skin in mm, used with `depth`. Default 2.
     pub skin_mm: f64,
-    /// Reach of the ambient occlusion that darkens clefts, mm. Default 12; 0 switches it off.
+    /// Reach in mm of the ambient occlusion that darkens clefts. Default 12; 0 switches it off.
     pub occlusion_mm: f64,
-    /// Rays per pixel along each axis where the picture has an edge, 1 to 4. Default 2.
+    /// Rays per pixel along each axis at edges, 1 to 4. Default 2.
     pub samples: usize,
-    /// Orientation letters and a scale bar.
+    /// True to draw orientation letters and a scale bar.
     pub annotate: bool,
 }
 
 impl View<'_> {
-    /// The whole volume from one side, 800 × 800.
+    /// Default settings: the whole volume from one side with 800 × 800 pixels.
     pub fn new(side: Side) -> Self {
         Self {
             side,
@@ -60,7 +50,6 @@ impl View<'_> {
             height: 800,
             threshold_hu: -300.0,
             focus: None,
-            clip: &[],
             depth: None,
             skin_mm: 2.0,
             occlusion_mm: 12.0,
@@ -86,12 +75,6 @@ impl View<'_> {
         check((1..=4).contains(&self.samples), "samples", self.samples as f64, "1 to 4")?;
         if let Some(focus) = &self.focus {
             focus.validate()?;
-        }
-        for plane in self.clip {
-            let numbers = plane.point_mm.iter().chain(&plane.keep);
-            let sum: f64 = numbers.map(|c| c.abs()).sum();
-            let good = sum.is_finite() && plane.keep != [0.0; 3];
-            check(good, "clip", sum, "finite, with a direction other than zero")?;
         }
         Ok(())
     }

@@ -1,10 +1,10 @@
-//! The kernels that march, each compiled when the first view needs it, and the depth volume that one of them reads.
+//! The ray marching kernels, compiled when a view first needs them, and the depth volume.
 
 use cutis_gpu::{Gpu, GpuError, Kernel, Texture3d};
 use cutis_shaders::render::{Albedo, RAYMARCH, raymarch};
 use cutis_volume::Volume;
 
-/// What the views so far needed.
+/// Kernels and depth volume of the views so far.
 #[derive(Default)]
 pub struct Kernels<'a> {
     skin: Option<Kernel>,
@@ -20,7 +20,8 @@ impl<'a> Kernels<'a> {
         depth: Option<&'a Volume>,
     ) -> Result<(&Kernel, Option<&Texture3d>), GpuError> {
         let Some(depth) = depth else { return Ok((compiled(&mut self.skin, gpu, Albedo::Skin)?, None)) };
-        // It is borrowed for as long as `self` lives: at the same address it is the same volume, unchanged.
+        // The volume is borrowed as long as `self` exists, so that the same address is the same
+        // volume.
         let texture = match self.depth.take() {
             Some((known, texture)) if std::ptr::eq(known, depth) => texture,
             other => {

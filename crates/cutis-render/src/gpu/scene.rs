@@ -1,4 +1,4 @@
-//! A volume on the device with its blocks, and rays through it.
+//! A volume on the device, and rays through it.
 
 use bytemuck::Zeroable;
 use cutis_gpu::{Binding, Buffer, Gpu, GpuError, Kernel, Texture3d};
@@ -10,14 +10,14 @@ use crate::blocks::block_shape;
 use crate::expose::BATCH;
 use crate::rays::Rays;
 
-/// What stays on the device from view to view.
+/// Buffers that are reused from view to view.
 pub struct Scene {
     voxels: Texture3d,
     scale: Buffer<[f32; 2]>,
     /// Largest HU per block.
     pub largest: Buffer<f32>,
     view: Buffer<ViewUniform>,
-    /// Rays of one submission, and what they found.
+    /// Rays of one submission and their results.
     rays: Buffer<[f32; 4]>,
     found: Buffer<[f32; 4]>,
 }
@@ -38,18 +38,18 @@ impl Scene {
         let bindings = [(0, scene.voxels.whole()), (1, scene.scale.whole()), (2, scene.largest.whole())];
         let group = gpu.bind(&kernel, 0, &bindings)?;
         let mut pass = gpu.pass("largest per block");
-        // A thread takes several blocks where there are more than threads.
+        // A thread processes several blocks if there are more blocks than threads.
         pass.dispatch(&kernel, &[&group], scene.largest.len().min(gpu.chunk_len(size_of::<f32>())));
         pass.submit()?;
         Ok(scene)
     }
 
-    /// Sets what the rays of the next calls of [`Scene::trace`] look for.
+    /// Sets the view for the next calls of [`Scene::trace`].
     pub fn look(&self, gpu: &Gpu, view: &ViewUniform) -> Result<(), GpuError> {
         gpu.write(&self.view, 0, std::slice::from_ref(view))
     }
 
-    /// What rays find: linear light, and the steps to the surface, −1 without one.
+    /// Linear light of each ray, and the number of steps to the surface; −1 if there is none.
     pub fn trace(
         &self,
         gpu: &Gpu,
@@ -79,7 +79,7 @@ impl Scene {
     }
 }
 
-/// Where a ray begins, as a continuous index, and its length in steps: −1 if it meets nothing.
+/// Beginning of a ray as a continuous index, and its length in steps; −1 if it misses the volume.
 pub fn start(rays: &Rays<'_>, place: [f64; 2]) -> [f32; 4] {
     rays.through(place).map_or([0.0, 0.0, 0.0, -1.0], |ray| {
         let [x, y, z] = rays.at(&ray, 0.0).coords.map(single).into();

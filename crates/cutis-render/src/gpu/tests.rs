@@ -1,17 +1,19 @@
-//! What the device finds against plain Rust in single precision: the march, sample by sample and without blocks, bit for
-//! bit where the device does not fuse a product with a sum; the blocks; and that the light counts.
+//! The kernels compared with plain Rust in single precision: the march without blocks, sample by
+//! sample and bit for bit on exact adapters, and the largest values of blocks. Also a control of
+//! the light.
 
-use cutis_gpu::{AdapterKind, GpuError, GpuOptions};
+use cutis_gpu::{GpuOptions, Select};
+use cutis_test_kit::gpu::{is_exact, on_each_adapter};
 use cutis_volume::{Affine, Grid, phantom::Phantom};
 use nalgebra::Vector3;
 
 use super::uniform::single;
 use super::*;
+use crate::Side;
 use crate::blocks::block_shape;
 use crate::shade::encode;
-use crate::{ClipPlane, Side};
 
-/// As `march.wgsl` and `field.wgsl`.
+/// The same operations as `march.wgsl` and `field.wgsl`.
 struct Twin<'a> {
     field: &'a Field<'a>,
     step: Vector3<f32>,
@@ -36,7 +38,7 @@ impl Twin<'_> {
         near + part.z * (far - near)
     }
 
-    /// Steps to the surface; −1 if there is none.
+    /// Number of steps to the surface; −1 if there is none.
     fn march(&self, [x, y, z, length]: [f32; 4]) -> f32 {
         let is_inside = |n: f32| self.hu_at(Vector3::new(x, y, z) + self.step * n) >= self.threshold_hu;
         let mut n = 0.0;
@@ -55,21 +57,7 @@ impl Twin<'_> {
     }
 }
 
-/// A device, or none with the reason; where one is required there must be one.
-fn open(chunk_cap: Option<usize>) -> Option<Gpu> {
-    match Gpu::open(&GpuOptions { chunk_cap, ..GpuOptions::default() }) {
-        Ok(gpu) => Some(gpu),
-        Err(GpuError::NoAdapter)
-            if ["CI", "CUTIS_REQUIRE_GPU"].iter().all(|name| std::env::var_os(name).is_none()) =>
-        {
-            eprintln!("skipped: {}", GpuError::NoAdapter);
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
-}
-
-/// Steps to the surface along the rays of a view: by the device, by the twin.
+/// Steps to the surface along the rays of a view, by the device and by the twin.
 fn both(raymarcher: &mut GpuRaymarcher<'_>, view: &View<'_>, halvings: usize) -> (Vec<f32>, Vec<f32>) {
     let axes = Axes::new(view.side).unwrap();
     let field = Field::new(raymarcher.volume);
@@ -98,7 +86,7 @@ fn trace(
     scene.trace(gpu, kernel, depth, starts).unwrap()
 }
 
-/// Volumes whose sides are, and are not, whole blocks.
+/// Volumes with and without incomplete blocks at their sides.
 fn volumes() -> Vec<Volume> {
     let grid = Grid {
         shape: [33, 20, 41],
@@ -110,7 +98,8 @@ fn volumes() -> Vec<Volume> {
         ])
         .unwrap(),
     };
-    // Crumbs in noise and padding, for rays to graze, up to a wall between blocks; empty blocks behind it.
+    // Single bright voxels in noise and padding, which rays may graze, up to a wall between blocks.
+    // The blocks behind the wall are empty.
     let crumb = |v: usize| match (v.wrapping_mul(0x9e37_79b9) >> 9) % 1009 {
         0..16 if grid.point(v)[0] < 24 => 1000,
         noise @ 0..500 => noise as i16 - 1000,
@@ -126,7 +115,6 @@ const VIEW: View<'_> = View {
     height: 60,
     threshold_hu: -300.0,
     focus: None,
-    clip: &[],
     depth: None,
     skin_mm: 2.0,
     occlusion_mm: 12.0,
@@ -135,88 +123,94 @@ const VIEW: View<'_> = View {
 };
 
 #[test]
-fn rays_meet_the_surface_where_the_twin_says() {
-    let Some(gpu) = open(None) else { return };
-    let exact = gpu.adapter().kind == AdapterKind::Software;
-    // Bits on software; elsewhere two refinements, but for one ray in a hundred that grazes something.
-    let apart = |found: &[f32], twin: &[f32]| {
-        let differs = |(a, b): &(&f32, &f32)| {
-            if exact { a.to_bits() != b.to_bits() } else { (**a - **b).abs() > 1.0 / 32.0 }
+fn rays_meet_the_surface_where_the_twin_does() {
+    on_each_adapter(|gpu| {
+        let exact = is_exact(gpu);
+        // Software adapters give the same bits. On others two refinements may differ, and one ray
+        // in a hundred may graze something.
+        let apart = |found: &[f32], twin: &[f32]| {
+            let differs = |(a, b): &(&f32, &f32)| {
+                if exact { a.to_bits() != b.to_bits() } else { (**a - **b).abs() > 1.0 / 32.0 }
+            };
+            let count = found.iter().zip(twin).filter(differs).count();
+            if exact { count > 0 } else { 100 * count > found.len() }
         };
-        let count = found.iter().zip(twin).filter(differs).count();
-        if exact { count > 0 } else { 100 * count > found.len() }
-    };
-    let clip = [ClipPlane { point_mm: [0.0, 2.0, 0.0], keep: [0.2, -1.0, 0.1] }];
-    for (number, volume) in volumes().iter().enumerate() {
-        let mut raymarcher = GpuRaymarcher::new(&gpu, volume).unwrap();
-        let mut both = |view: &View<'_>, halvings| both(&mut raymarcher, view, halvings);
-        for side in [VIEW.side, Side::Anterior, Side::Superior, Side::From([-1.0, -0.2, 0.01])] {
-            for clip in [&[][..], &clip] {
-                let view = View { side, clip, ..VIEW };
-                let (found, twin) = both(&view, 6);
+        for (number, volume) in volumes().iter().enumerate() {
+            let mut raymarcher = GpuRaymarcher::new(gpu, volume).unwrap();
+            let mut both = |view: &View<'_>, halvings| both(&mut raymarcher, view, halvings);
+            for side in [VIEW.side, Side::Anterior, Side::Superior, Side::From([-1.0, -0.2, 0.01])] {
+                let (found, twin) = both(&View { side, ..VIEW }, 6);
                 let hits = twin.iter().filter(|n| **n > 0.0).count();
                 assert!(hits > 100, "only {hits} rays meet volume {number} from {side:?}");
-                assert!(!apart(&found, &twin), "volume {number} from {side:?}, {} planes", clip.len());
+                assert!(!apart(&found, &twin), "volume {number} from {side:?}");
             }
+            // Controls: a threshold that is 20 HU off, and a coarser refinement.
+            let (found, twin) = both(&VIEW, 6);
+            let (moved, _) = both(&View { threshold_hu: -280.0, ..VIEW }, 6);
+            let (_, coarse) = both(&VIEW, 3);
+            assert!(apart(&moved, &twin) && apart(&found, &coarse), "volume {number}: the controls agree");
         }
-        // The controls: a threshold 20 HU off, and a coarser refinement.
-        let (found, twin) = both(&VIEW, 6);
-        let (moved, _) = both(&View { threshold_hu: -280.0, ..VIEW }, 6);
-        let (_, coarse) = both(&VIEW, 3);
-        assert!(apart(&moved, &twin) && apart(&found, &coarse), "volume {number}: the controls agree");
-    }
+    });
 }
 
 #[test]
 fn blocks_hold_their_largest_value() {
-    // The second device has fewer threads than there are blocks.
-    let (Some(gpu), Some(capped)) = (open(None), open(Some(10))) else { return };
-    for volume in volumes() {
-        let field = Field::new(&volume);
-        let (voxels, blocks) = (field.shape(), block_shape(field.shape()));
-        let mut expected = vec![f32::NEG_INFINITY; blocks.iter().product()];
-        for v in 0..volume.grid().len() {
-            let at = volume.grid().point(v);
-            // The blocks whose 9 × 9 × 9 voxels hold this one.
-            let of = |axis: usize| {
-                (0..blocks[axis]).filter(move |block| (8 * block..=8 * block + 8).contains(&at[axis]))
-            };
-            for k in of(2) {
-                for j in of(1) {
-                    for i in of(0) {
-                        let largest = &mut expected[i + blocks[0] * (j + blocks[1] * k)];
-                        *largest = largest.max(field.voxel(v));
+    on_each_adapter(|gpu| {
+        // The second device has fewer threads than there are blocks.
+        let select = Select::Index(gpu.adapter().index);
+        let capped = Gpu::open(&GpuOptions { select, chunk_cap: Some(10), ..GpuOptions::default() }).unwrap();
+        for volume in volumes() {
+            let field = Field::new(&volume);
+            let (voxels, blocks) = (field.shape(), block_shape(field.shape()));
+            let mut expected = vec![f32::NEG_INFINITY; blocks.iter().product()];
+            for v in 0..volume.grid().len() {
+                let at = volume.grid().point(v);
+                // The blocks whose 9 × 9 × 9 voxels include this one.
+                let of = |axis: usize| {
+                    (0..blocks[axis]).filter(move |block| (8 * block..=8 * block + 8).contains(&at[axis]))
+                };
+                for k in of(2) {
+                    for j in of(1) {
+                        for i in of(0) {
+                            let largest = &mut expected[i + blocks[0] * (j + blocks[1] * k)];
+                            *largest = largest.max(field.voxel(v));
+                        }
                     }
                 }
             }
+            for gpu in [gpu, &capped] {
+                let raymarcher = GpuRaymarcher::new(gpu, &volume).unwrap();
+                let found = gpu.read(&raymarcher.scene.largest, 0..expected.len()).unwrap();
+                assert_eq!(found, expected, "{voxels:?}");
+            }
+            assert!(
+                expected.iter().any(|hu| *hu < VIEW.threshold_hu),
+                "no block of {voxels:?} can be skipped"
+            );
         }
-        for gpu in [&gpu, &capped] {
-            let raymarcher = GpuRaymarcher::new(gpu, &volume).unwrap();
-            let found = gpu.read(&raymarcher.scene.largest, 0..expected.len()).unwrap();
-            assert_eq!(found, expected, "{voxels:?}");
-        }
-        assert!(expected.iter().any(|hu| *hu < VIEW.threshold_hu), "no block of {voxels:?} can be skipped");
-    }
+    });
 }
 
-/// The control of the comparison of pictures that no view can set: light from 1° beside.
+/// A control of the comparison of pictures that no view can set: light from another direction, by
+/// 1°.
 #[test]
-fn light_from_elsewhere_is_seen() {
-    let Some(gpu) = open(None) else { return };
-    let volume = &volumes()[0];
-    let (axes, field) = (Axes::new(VIEW.side).unwrap(), Field::new(volume));
-    let rays = Rays::new(&field, &VIEW, &axes);
-    let mut shader = Shader::new(&field, &VIEW, &axes);
-    let starts: Vec<_> = (0..60).map(|y| start(&rays, [36.0, f64::from(y)])).collect();
-    let mut raymarcher = GpuRaymarcher::new(&gpu, volume).unwrap();
-    let mut colors = |turn: f64| {
-        shader.light = (shader.light + axes.right * turn).normalize();
-        let found = trace(&mut raymarcher, &VIEW, &rays, &shader, &starts);
-        found.iter().flat_map(|&[r, g, b, _]| encode(Light::new(r, g, b))).collect::<Vec<u8>>()
-    };
-    let (first, same, turned) = (colors(0.0), colors(0.0), colors(1f64.to_radians()));
-    assert_eq!(first, same);
-    let mean =
-        first.iter().zip(&turned).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / first.len() as f64;
-    assert!(mean > 0.1, "{mean}");
+fn light_from_another_direction_is_detected() {
+    on_each_adapter(|gpu| {
+        let volume = &volumes()[0];
+        let (axes, field) = (Axes::new(VIEW.side).unwrap(), Field::new(volume));
+        let rays = Rays::new(&field, &VIEW, &axes);
+        let mut shader = Shader::new(&field, &VIEW, &axes);
+        let starts: Vec<_> = (0..60).map(|y| start(&rays, [36.0, f64::from(y)])).collect();
+        let mut raymarcher = GpuRaymarcher::new(gpu, volume).unwrap();
+        let mut colors = |turn: f64| {
+            shader.light = (shader.light + axes.right * turn).normalize();
+            let found = trace(&mut raymarcher, &VIEW, &rays, &shader, &starts);
+            found.iter().flat_map(|&[r, g, b, _]| encode(Light::new(r, g, b))).collect::<Vec<u8>>()
+        };
+        let (first, same, turned) = (colors(0.0), colors(0.0), colors(1f64.to_radians()));
+        assert_eq!(first, same);
+        let mean = first.iter().zip(&turned).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>()
+            / first.len() as f64;
+        assert!(mean > 0.1, "{mean}");
+    });
 }

@@ -1,4 +1,4 @@
-//! A view as the shader reads it: everything that does not change from ray to ray, prepared in double precision.
+//! The uniform buffer of a view, prepared in double precision.
 
 use bytemuck::{Pod, Zeroable};
 use cutis_volume::Volume;
@@ -9,7 +9,7 @@ use crate::field::Field;
 use crate::rays::Rays;
 use crate::shade::{DIRECTIONS, SKIN, Shader, TISSUE, decode};
 
-/// The `View` of the shader.
+/// `struct View` of the shader.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct ViewUniform {
@@ -75,8 +75,8 @@ impl ViewUniform {
     }
 }
 
-/// The nearest single that is neither infinite nor subnormal. What is beyond 10³⁰ lies outside of every grid, and what is
-/// below 10⁻³⁰ moves nothing.
+/// The nearest `f32` that is neither infinite nor subnormal. Positions beyond 10³⁰ are outside
+/// every grid, and changes below 10⁻³⁰ have no effect.
 pub fn single(x: f64) -> f32 {
     if x.abs() >= 1e-30 { x.clamp(-1e30, 1e30) as f32 } else { 0.0 }
 }

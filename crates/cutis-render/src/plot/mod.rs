@@ -1,4 +1,4 @@
-//! Charts of lines and points as self-contained SVG.
+//! Line and point charts as self-contained SVG.
 
 mod span;
 
@@ -6,12 +6,12 @@ use std::fmt::Write;
 
 use span::Span;
 
-/// How values lie along an axis.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Linear scale.
     Linear,
-    /// By their decimal logarithm; values that are not above zero are left out.
+    /// Logarithmic scale. Values that are not above zero are omitted.
     Log,
 }
 
@@ -20,47 +20,47 @@ pub enum Scale {
 pub struct Axis<'a> {
     /// Quantity and unit, as in `"gape / mm"`.
     pub label: &'a str,
-    /// Linear or logarithmic.
+    /// Linear or logarithmic scale.
     pub scale: Scale,
 }
 
-/// One line of a chart.
+/// A series of points.
 #[derive(Clone, Copy, Debug)]
 pub struct Series<'a> {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: &'a str,
-    /// Points `[x, y]`; the line breaks where one is not finite.
+    /// Points `[x, y]`. The line is interrupted at values that are not finite.
     pub points: &'a [[f64; 2]],
-    /// How they are drawn.
+    /// Style of the points.
     pub mark: Mark,
 }
 
-/// How the points of a series are drawn.
+/// Style of the points of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// A line through them.
     Line,
-    /// A thin line through them and a dot at each.
+    /// A thin line with a dot at each point.
     Dots,
-    /// A small ring at each and no line.
+    /// A small ring at each point, without a line.
     Rings,
-    /// A wide pale band behind everything else, with a ring around each: what stands out among the others, such as a Pareto
-    /// front.
+    /// A wide pale band behind all other series with a ring around each point. It emphasizes some
+    /// points, such as a Pareto front.
     Band,
 }
 
-/// Most series whose legend lies inside the plot.
+/// Largest number of series with a legend inside the plot.
 pub const INSIDE: usize = 5;
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 440.0;
 /// Plot area: left, top, right, bottom.
 const AREA: [f64; 4] = [76.0, 44.0, 700.0, 384.0];
-/// Colors that can be told apart without full color vision (Okabe and Ito, 2008).
+/// Colors that are distinguishable without full color vision (Okabe and Ito, 2008).
 const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 
-/// An SVG document of several series with title, axes, ticks and legend. With more than [`INSIDE`] series the legend stands
-/// beside the plot, else in its emptiest corner.
+/// Draws a chart as an SVG document with title, axes, ticks and legend. The legend is in the
+/// emptiest corner of the plot, or next to the plot if there are more than [`INSIDE`] series.
 ///
 /// ```
 /// use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
@@ -73,9 +73,10 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
     let [left, top, right, bottom] = AREA;
     let across = Span::new(x.scale, series.iter().flat_map(|s| s.points).map(|p| p[0]), [left, right]);
     let upward = Span::new(y.scale, series.iter().flat_map(|s| s.points).map(|p| p[1]), [bottom, top]);
-    let beside = series.len() > INSIDE;
-    let [wide, high] = legend_size(series);
-    let [width, height] = if beside { [WIDTH + wide, HEIGHT.max(top + high)] } else { [WIDTH, HEIGHT] };
+    let outside = series.len() > INSIDE;
+    let [legend_width, legend_height] = legend_size(series);
+    let [width, height] =
+        if outside { [WIDTH + legend_width, HEIGHT.max(top + legend_height)] } else { [WIDTH, HEIGHT] };
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
          font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
@@ -107,7 +108,7 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
     add(format_args!("{}", text(middle, 26.0, " font-size=\"16\" font-weight=\"bold\"", title)));
     add(format_args!("{}", text(middle, HEIGHT - 12.0, "", x.label)));
     add(format_args!("{}", text(20.0, center, &format!(" transform=\"rotate(-90 20 {center})\""), y.label)));
-    let legend = if beside { [right, top] } else { legend_corner(series, &across, &upward) };
+    let legend = if outside { [right, top] } else { legend_corner(series, &across, &upward) };
     let bands_first = (0..series.len()).filter(|&n| series[n].mark == Mark::Band);
     let then_the_others = (0..series.len()).filter(|&n| series[n].mark != Mark::Band);
     for number in bands_first.chain(then_the_others) {
@@ -130,10 +131,10 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
     svg
 }
 
-/// Stroke of a series' line.
+/// SVG attributes of the line of a series.
 fn style(mark: Mark, number: usize) -> String {
     let color = COLORS[number % COLORS.len()];
-    // Lines past the seventh are dashed, so that no two look alike.
+    // The eighth and later lines are dashed, so that no two lines look alike.
     let dash = match number / COLORS.len() {
         0 => String::new(),
         round => format!(" stroke-dasharray=\"{0} {0}\"", 2 * round + 1),
@@ -148,7 +149,7 @@ fn style(mark: Mark, number: usize) -> String {
     }
 }
 
-/// What stands at each point; nothing if that is empty.
+/// SVG attributes of the mark at each point; empty if there is none.
 fn dot(mark: Mark, number: usize) -> String {
     match mark {
         Mark::Line => String::new(),
@@ -246,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_legend_stands_beside_the_plot() {
+    fn a_long_legend_is_next_to_the_plot() {
         let axis = |label| Axis { label, scale: Scale::Linear };
         let one = Series { name: "name", points: &[[0.0, 1.0]], mark: Mark::Dots };
         let size = |what: &str, count| {

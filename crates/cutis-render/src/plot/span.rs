@@ -1,8 +1,8 @@
-//! A range of values laid along a range of pixels, with its ticks.
+//! A range of values mapped to a range of pixels, with ticks.
 
 use super::Scale;
 
-/// A range of values laid along a range of pixels.
+/// A range of values mapped to a range of pixels.
 pub(super) struct Span {
     scale: Scale,
     /// Values, or their logarithms.
@@ -17,7 +17,7 @@ impl Span {
         let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         let (low, high) = if low > high { (0.0, 1.0) } else { (low, high) };
         let margin = if high > low { 0.04 * (high - low) } else { 0.5 * low.abs().max(f64::MIN_POSITIVE) };
-        // A quantity that is never negative starts at zero if it comes near it.
+        // The axis of a quantity that is never negative starts at zero if the values come near it.
         let from_zero = scale == Scale::Linear && low >= 0.0 && low <= 0.5 * high;
         let low = if from_zero { 0.0 } else { low - margin };
         let high = high + margin;
@@ -30,7 +30,7 @@ impl Span {
         Some(self.pixels[0] + part * (self.pixels[1] - self.pixels[0]))
     }
 
-    /// Labels and their places: about six round numbers, or the decades.
+    /// Labels and positions of ticks: about six round numbers, or decades.
     pub(super) fn ticks(&self) -> Vec<(String, f64)> {
         let rough = (self.high - self.low) / 6.0;
         let decade = 10.0_f64.powf(rough.log10().floor());
@@ -54,7 +54,7 @@ impl Span {
     }
 }
 
-/// A tick of a linear axis, with the decimals that its step needs.
+/// Label of a tick on a linear axis, with as many decimals as its step needs.
 fn linear(at: f64, step: f64) -> String {
     if !(1e-4..1e6).contains(&step) {
         return number(if at.abs() < step / 2.0 { 0.0 } else { at }, 3);

@@ -1,8 +1,7 @@
-//! Geometry, gray values, files and limits of the pictures.
+//! Geometry, gray levels, files and limits of pictures.
 
 use cutis_render::{
-    Axes, ClipPlane, Contour, Focus, Image, Plane, RenderError, Side, SliceView, View, raymarch,
-    side_by_side, slice,
+    Axes, Contour, Focus, Image, Plane, RenderError, Side, SliceView, View, raymarch, side_by_side, slice,
 };
 use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::{Point3, Vector3};
@@ -30,7 +29,8 @@ fn volume(grid: Grid, hu: impl Fn(Point3<f64>) -> f64) -> Volume {
     Volume::new(grid, voxels, 1.0, 0.0).unwrap()
 }
 
-/// Mean position of the pixels that `is_bright`, from the picture's center, to the right and upwards.
+/// Mean position of the bright pixels relative to the center of the picture, to the right and
+/// upwards.
 fn centroid(image: &Image, is_bright: impl Fn([u8; 3]) -> bool) -> [f64; 2] {
     let (mut sum, mut count) = ([0.0; 2], 0.0);
     for y in 0..image.height {
@@ -55,7 +55,7 @@ const MARKS: [(&str, [f64; 3]); 6] = [
     ("I", [0.0, 0.0, -12.0]),
 ];
 
-/// The mark must lie where the picture's own letter for that direction stands.
+/// The mark must be at the picture's own letter for its direction.
 fn assert_at_letter(found: [f64; 2], letters: &[String; 4], mark: &str, context: &str) {
     let [left, right, top, bottom] = letters;
     let expected = match mark {
@@ -168,15 +168,17 @@ fn a_ball_is_a_disc_of_its_radius_from_any_side() {
 }
 
 #[test]
-fn a_clip_plane_shows_what_is_inside() {
+fn a_face_of_the_volume_shows_the_inside_in_gray() {
     let ball = ball([1.0; 3], [60; 3], 20.0);
     let view = View { width: 100, height: 100, annotate: false, ..View::new(Side::Anterior) };
-    let clip = [ClipPlane { point_mm: [0.0; 3], keep: [0.0, -1.0, 0.0] }];
-    let cut = raymarch(&ball, &View { clip: &clip, ..view }).unwrap();
-    let [r, g, b] = cut.pixel(50, 50).unwrap();
+    // The front half is missing, so that the ball reaches the anterior face of the volume.
+    let grid = Grid { shape: [60, 30, 60], affine: ball.grid().affine };
+    let half: Vec<i16> = (0..grid.len()).map(|v| ball.voxels()[ball.grid().index(grid.point(v))]).collect();
+    let half = Volume::new(grid, half, 1.0, 0.0).unwrap();
+    let [r, g, b] = raymarch(&half, &view).unwrap().pixel(50, 50).unwrap();
     assert!(r == g && g == b && r > 60, "the cut face is gray");
     let [r, _, b] = raymarch(&ball, &view).unwrap().pixel(50, 50).unwrap();
-    assert!(r > b, "the skin is not");
+    assert!(r > b, "the skin is not gray");
 }
 
 #[test]
@@ -209,7 +211,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn contours_follow_the_surface() {
     let ball = ball([1.0; 3], [60; 3], 20.0);
-    // An octahedron of 15 mm; its cut at height 0 is a square with corners on the axes.
+    // An octahedron of 15 mm. Its section at height 0 is a square with corners on the axes.
     let tip = |x: f32, y: f32, z: f32| Point3::new(x, y, z) * 0.015;
     let positions = [
         tip(1.0, 0.0, 0.0),
@@ -266,7 +268,7 @@ fn png_files_decode_to_the_same_pixels() {
 }
 
 #[test]
-fn hostile_sizes_and_settings_are_refused_by_name() {
+fn invalid_sizes_and_settings_are_refused() {
     let ball = ball([1.0; 3], [20; 3], 6.0);
     let good = View { width: 20, height: 20, ..View::new(Side::Anterior) };
     for (width, height) in [(0, 5), (5, 0), (usize::MAX, usize::MAX), (1 << 40, 1 << 30), (1 << 20, 1 << 20)]
@@ -287,7 +289,6 @@ fn hostile_sizes_and_settings_are_refused_by_name() {
         ("focus.size_mm", View { focus: focus(0.0, 0.0), ..good }),
         ("focus.center_mm", View { focus: focus(f64::INFINITY, 1.0), ..good }),
         ("side", View { side: Side::From([0.0; 3]), ..good }),
-        ("clip", View { clip: &[ClipPlane { point_mm: [0.0; 3], keep: [0.0; 3] }], ..good }),
     ];
     for (key, view) in bad {
         let error = raymarch(&ball, &view).unwrap_err();

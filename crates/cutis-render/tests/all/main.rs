@@ -1,0 +1,5 @@
+//! Integration tests of pictures.
+
+#[cfg(feature = "gpu")]
+mod gpu;
+mod pictures;
