@@ -1,44 +1,43 @@
-//! A 256³ volume through a Kuhn lattice of 1.5 million tets on one thread: all of them moving, a ball of them, none.
-
-#[path = "../tests/common/mod.rs"]
-mod common;
+//! A volume of 256³ voxels through a lattice of 1.5 million tets on one thread: with all tets
+//! moving, with a ball of them moving, and with none.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use cutis_resample::{Warp, resample};
-use cutis_volume::{Affine, Grid};
+use cutis_test_kit::{Kuhn, Random};
+use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::{Point3, Vector3};
 
 fn bench(criterion: &mut Criterion) {
     let affine =
         Affine::from_spacing([0.9765625, 0.9765625, 1.5], [-125.0, -125.0, 0.0]).expect("invertible");
     let grid = Grid { shape: [256; 3], affine };
-    let volume = common::noise(grid, 1);
-    let mesh = common::lattice(&grid, [63; 3], [0.0; 3], [255.0; 3]);
+    let mut random = Random::new(1);
+    let voxels = (0..grid.len()).map(|_| random.below(3000) as i16 - 1024).collect();
+    let volume = Volume::new(grid, voxels, 1.0, 0.0).expect("as many voxels as the grid has");
+    let Kuhn { positions, tets, .. } = Kuhn::new([64; 3], 255.0 / 63.0);
+    let origin_mm = affine.to_mm(Point3::origin());
+    let local =
+        |index: &Point3<f64>| Point3::from(((affine.to_mm(*index) - origin_mm) / 1000.0).cast::<f32>());
+    let rest: Vec<Point3<f32>> = positions.iter().map(local).collect();
     let wave =
         |p: &Point3<f32>| p + Vector3::new((40.0 * p.y).sin(), (30.0 * p.z).sin(), (50.0 * p.x).sin()) * 2e-3;
-    let center = mesh.rest[mesh.rest.len() / 2];
+    let center = rest[rest.len() / 2];
     let cases = [
-        ("all move", mesh.rest.iter().map(wave).collect::<Vec<_>>()),
+        ("all move", rest.iter().map(wave).collect::<Vec<_>>()),
         (
             "a ball moves",
-            mesh.rest.iter().map(|p| if (p - center).norm() < 0.05 { wave(p) } else { *p }).collect(),
+            rest.iter().map(|p| if (p - center).norm() < 0.05 { wave(p) } else { *p }).collect(),
         ),
-        ("none moves", mesh.rest.clone()),
+        ("none moves", rest.clone()),
     ];
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let mut group = criterion.benchmark_group("resample 256³, 1.5 M tets, 1 thread");
     group.sample_size(10);
     for (name, deformed) in &cases {
-        let warp = Warp {
-            origin_mm: mesh.origin_mm,
-            rest: &mesh.rest,
-            deformed,
-            tets: &mesh.tets,
-            body_tets: mesh.tets.len(),
-            removed: &[],
-        };
+        let warp =
+            Warp { origin_mm, rest: &rest, deformed, tets: &tets, body_tets: tets.len(), removed: &[] };
         group.bench_function(*name, |b| {
             b.iter(|| pool.install(|| black_box(resample(&volume, &warp, &|_, _| {}).expect("valid warp"))));
         });

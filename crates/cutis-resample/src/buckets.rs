@@ -1,14 +1,14 @@
-//! Tets sorted by the z-slabs that they touch.
+//! Lists of the tets that touch each z-slab.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Tets per independently sorted chunk.
+/// Number of tets in a chunk that is sorted independently.
 const CHUNK: usize = 1 << 17;
 
-/// For each slab the tets that touch it, in ascending order. Built by a counting sort of fixed chunks of tets, in parallel,
-/// so that the contents do not depend on the number of threads.
+/// For each slab the tets that touch it, in ascending order. A counting sort of chunks with fixed
+/// sizes runs in parallel, so that the result does not depend on the number of threads.
 pub struct Buckets {
     chunks: Vec<Chunk>,
 }
@@ -19,7 +19,8 @@ struct Chunk {
 }
 
 impl Buckets {
-    /// Sorts tets `0..count`; `slabs_of` gives the slabs that a tet touches (empty: none), within `0..slabs`.
+    /// Sorts the tets `0..count`. `slabs_of` gives the slabs that a tet touches, a range within
+    /// `0..slabs` that may be empty.
     pub fn new(count: usize, slabs: usize, slabs_of: impl Fn(usize) -> Range<usize> + Sync) -> Self {
         let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
             let tets = chunk * CHUNK..count.min((chunk + 1) * CHUNK);
@@ -48,7 +49,7 @@ impl Buckets {
         Self { chunks: chunks.collect() }
     }
 
-    /// The tets of a slab, ascending.
+    /// The tets of a slab in ascending order.
     pub fn slab(&self, slab: usize) -> impl Iterator<Item = usize> + '_ {
         self.chunks.iter().flat_map(move |chunk| {
             let range = chunk.offsets[slab] as usize..chunk.offsets[slab + 1] as usize;

@@ -1,13 +1,13 @@
-//! The crate's error type.
+//! Errors of resampling.
 
 use cutis_volume::VolumeError;
 
-/// Everything that can be wrong with a warp.
+/// Why a volume could not be resampled.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ResampleError {
-    /// Rest and deformed positions describe the same vertices.
-    #[error("{rest} rest positions but {deformed} deformed positions: each vertex needs one of both")]
+    /// The numbers of rest and deformed positions differ.
+    #[error("{rest} rest positions but {deformed} deformed positions: there must be one of each per vertex")]
     VertexCount {
         /// Number of rest positions.
         rest: usize,
@@ -21,7 +21,7 @@ pub enum ResampleError {
         which: &'static str,
         /// Index of the vertex (0 for the origin and the offset).
         vertex: usize,
-        /// Its coordinates, local meters (mm for the origin).
+        /// Its coordinates in local meters (mm for the origin).
         position: [f64; 3],
     },
     /// A tet names a vertex that does not exist.
@@ -36,46 +36,36 @@ pub enum ResampleError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// The body tets are the first ones of the list.
+    /// There are fewer tets than body tets.
     #[error("body_tets is {body_tets}, but there are only {tets} tets")]
     BodyTets {
-        /// Given number of body tets.
+        /// Number of body tets.
         body_tets: usize,
-        /// Number of tets.
+        /// Number of all tets.
         tets: usize,
     },
-    /// Tet numbers are stored in 32 bits.
-    #[error("{tets} tets given, at most {limit} can be numbered")]
+    /// There are more tets than can be numbered.
+    #[error("{tets} tets: at most {limit} can be numbered")]
     TooManyTets {
         /// Number of tets.
         tets: usize,
-        /// The largest number allowed.
+        /// Largest number of tets.
         limit: usize,
     },
-    /// The region asked for is empty or leaves the volume.
-    #[error("region {start:?}..{end:?} must not be empty and must lie within the volume's shape {shape:?}")]
-    Region {
-        /// First voxel per axis.
-        start: [usize; 3],
-        /// End, exclusive, per axis.
-        end: [usize; 3],
-        /// The volume's shape.
-        shape: [usize; 3],
-    },
-    /// Voxels are numbered in 16 bits along each axis by the kernels of the GPU.
-    #[error("the volume's shape is {shape:?}, but a GPU resamples at most {limit} voxels along each axis")]
+    /// The volume is too large for the kernels, which number voxels along an axis in 16 bits.
+    #[error("the shape of the volume is {shape:?}: a GPU resamples at most {limit} voxels along each axis")]
     TooLarge {
-        /// The volume's shape.
+        /// Shape of the volume.
         shape: [usize; 3],
-        /// The largest number of voxels along an axis.
+        /// Largest number of voxels along an axis.
         limit: usize,
     },
-    /// There are slabs of so many slices only.
-    #[error("slab {slab} was asked for, but there are only {slabs}")]
+    /// There is no slab with this number.
+    #[error("there is no slab {slab}: the volume is divided into {slabs} slabs, numbered from 0")]
     NoSuchSlab {
-        /// The slab asked for.
+        /// Number of the requested slab.
         slab: usize,
-        /// How many there are.
+        /// Number of slabs.
         slabs: usize,
     },
     /// The result is not a valid volume.

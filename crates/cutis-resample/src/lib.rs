@@ -1,18 +1,19 @@
 //! Resampling a CT volume through a deformed tetrahedral mesh.
 //!
-//! The inverse warp is evaluated by rasterizing the deformed tetrahedra: an output voxel whose center lies inside a
-//! deformed tet takes, through barycentric coordinates, the input's trilinear value at the matching rest position, rounded
-//! to the nearest stored `int16`. Contract, held by the tests:
+//! The inverse warp is evaluated by rasterizing the deformed tetrahedra. An output voxel whose
+//! center lies in a deformed tet takes the trilinear value of the input at the matching rest
+//! position, rounded to the nearest stored `int16`. Barycentric coordinates map between the two
+//! positions. The tests hold these rules:
 //!
 //! * a tet that did not move copies the input bit for bit;
-//! * of several tets that hold a voxel center the one with the lowest index owns it;
-//! * a voxel that the body left (it is in the rest shape, but in no deformed tet) becomes air;
+//! * if several tets hold a voxel center, the tet with the lowest index owns the voxel;
+//! * a voxel that the body has left (it is in the rest shape, but in no deformed tet) becomes air;
 //! * a voxel that neither shape covers keeps its input value;
-//! * no value outside the input's range appears;
-//! * the result is the same, bit for bit, for any number of threads.
+//! * values stay within the range of the input;
+//! * the result has the same bits for any number of threads.
 //!
-//! With the feature `gpu` the same contract is held by a GPU: `resample_gpu` for one state of a mesh, `ResamplerGpu` for many,
-//! and the module `twin` with the arithmetic of its kernels in plain Rust, to compare them with.
+//! With the feature `gpu`, the same rules hold on a GPU: `resample_gpu` resamples through one state
+//! of a mesh, and `ResamplerGpu` through many.
 //!
 //! ```
 //! use cutis_resample::{Warp, resample};
@@ -22,7 +23,7 @@
 //! let grid = Grid { shape: [4, 4, 4], affine: Affine::from_spacing([1.0; 3], [0.0; 3])? };
 //! let volume = Volume::new(grid, (0..64).collect(), 1.0, 0.0)?;
 //! // One tet in local meters, moved by one voxel (1 mm) along +i.
-//! let rest = [[0.0, 0.0, 0.0], [0.002, 0.0, 0.0], [0.0, 0.002, 0.0], [0.0, 0.0, 0.002]].map(Point3::from);
+//! let rest = [[0.0; 3], [0.002, 0.0, 0.0], [0.0, 0.002, 0.0], [0.0, 0.0, 0.002]].map(Point3::from);
 //! let deformed = rest.map(|p| Point3::new(p.x + 0.001, p.y, p.z));
 //! let warp = Warp {
 //!     origin_mm: Point3::origin(),
@@ -48,15 +49,13 @@ mod report;
 mod sample;
 mod slab;
 mod space;
-#[cfg(feature = "gpu")]
-pub mod twin;
 mod warp;
 
 pub use error::ResampleError;
 #[cfg(feature = "gpu")]
-pub use gpu::{ResamplerGpu, ResamplerOptions, SlabDifference, SlabState, resample_gpu};
+pub use gpu::{GridUniform, ResamplerGpu, ResamplerOptions, Setup, SlabState, resample_gpu};
 pub use report::ResampleReport;
-pub use warp::{Warp, resample, resample_region};
+pub use warp::{Warp, resample};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,51 +1,54 @@
-//! One tetrahedron as four linear functions over the voxel grid, and the rows of voxel centers that it covers.
+//! One tetrahedron over the voxel grid, and the rows of voxel centers that it covers.
 
 use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 
-/// Share of the tolerance that covers the rounding of `f64`, so that a center on a shared face is inside both tets.
+/// Part of the tolerance that covers the rounding of `f64`, so that a center on a shared face is
+/// inside both tets.
 const ROUNDING: f64 = 1.0 / 1024.0;
 
-/// A deformed tet over the voxel grid. Its barycentric coordinates are linear functions `λ(x) = constant + gradient · x` of the
-/// continuous voxel index.
+/// A deformed tet over the voxel grid.
 ///
-/// A center counts as inside when no face has it further out than the tolerance, a length in voxels. With the rounding of
-/// `f32` positions as tolerance no center falls between two tets that share a face.
+/// Its barycentric coordinates are linear functions `λ(x) = constant + gradient · x` of the
+/// continuous voxel index. A center counts as inside if it is at most the tolerance (a length in
+/// voxels) outside of every face. With the rounding of `f32` positions as tolerance, no center
+/// falls between two tets that share a face.
 pub struct TetRaster {
     constant: [f64; 4],
     gradient: [Vector3<f64>; 4],
-    /// Where a row enters the tet: the largest of four columns.
+    /// Columns where a row enters the tet: the largest of four.
     enter: Crossings,
-    /// Where it leaves: the smallest of four columns.
+    /// Columns where a row leaves the tet: the smallest of four.
     leave: Crossings,
     low: [f64; 3],
     high: [f64; 3],
 }
 
-/// Columns at which row `(j, k)` crosses the four faces: `constant + by_j · j + by_k · k`. A face that the row crosses in the
-/// other direction has an infinite constant and takes no part.
+/// Columns at which row `(j, k)` crosses the four faces: `constant + by_j · j + by_k · k`. A face
+/// that the row crosses in the other direction has an infinite constant, and so has no effect.
 struct Crossings {
     constant: [f64; 4],
     by_j: [f64; 4],
     by_k: [f64; 4],
-    /// The tolerance as a number of columns, towards the inside.
+    /// The tolerance as a number of columns, positive towards the inside.
     slack: [f64; 4],
 }
 
-/// Columns, as first and end, of a row by how firmly the tet holds their centers; each range lies in the one before.
+/// Ranges of columns of a row, as first and end, by how firmly the tet holds their centers. Each
+/// range lies in the one before.
 #[derive(Clone, Copy)]
-pub struct Row {
-    /// Inside, or outside by no more than the tolerance.
+pub struct HeldColumns {
+    /// Inside, or outside by at most the tolerance.
     pub near: (usize, usize),
-    /// Inside, or on a face, edge or corner, as far as `f64` can tell.
+    /// Inside or on a face, edge or corner, within the rounding of `f64`.
     pub inside: (usize, usize),
     /// Inside by more than the tolerance.
     pub strict: (usize, usize),
 }
 
 impl TetRaster {
-    /// `None` for a tet without volume.
+    /// Prepares a tet. `None` if it has no volume.
     #[inline]
     pub fn new(corners: &[Point3<f64>; 4], tolerance: f64) -> Option<Self> {
         let [a, b, c, d] = corners;
@@ -63,8 +66,8 @@ impl TetRaster {
         for corner in 0..4 {
             let g = &gradient[corner];
             constant[corner] -= g.dot(&a.coords);
-            // A face along the row is crossed far away, on the side that keeps or drops the whole row; the bound keeps the
-            // products finite.
+            // A row parallel to the face crosses it far away, on the side that keeps or drops the
+            // whole row. The lower bound of 1e-200 keeps the products finite.
             let along = if g.x.abs() < 1e-200 { 1e-200 } else { g.x };
             let crossings = if along > 0.0 { &mut enter } else { &mut leave };
             let per_column = 1.0 / along;
@@ -81,7 +84,7 @@ impl TetRaster {
         Some(raster)
     }
 
-    /// Visits the rows of `region` that come near the tet: `visit(j, k, row)`.
+    /// Calls `visit(j, k, row)` for the rows of `region` that come near the tet.
     #[inline(always)]
     pub fn rows(&self, region: &[Range<usize>; 3], mut visit: impl FnMut(usize, usize, RowCrossings<'_>)) {
         let span =
@@ -105,13 +108,13 @@ impl TetRaster {
         std::array::from_fn(|c| self.constant[c] + self.gradient[c].dot(&Vector3::from(center)))
     }
 
-    /// ∇λ of a corner.
+    /// Gradient of the barycentric coordinate of a corner.
     #[inline]
     pub fn gradient_of(&self, corner: usize) -> Vector3<f64> {
         self.gradient[corner]
     }
 
-    /// λ of a corner at voxel index (0, 0, 0).
+    /// Barycentric coordinate of a corner at voxel index (0, 0, 0).
     #[inline]
     pub fn constant_of(&self, corner: usize) -> f64 {
         self.constant[corner]
@@ -135,35 +138,35 @@ impl Crossings {
     }
 }
 
-/// One row and where it meets the tet's faces.
+/// One row with its crossings of the tet's faces.
 pub struct RowCrossings<'a> {
     raster: &'a TetRaster,
     enter: [f64; 4],
     leave: [f64; 4],
-    /// Columns, as first and end, that are inside or outside by no more than the tolerance.
+    /// Columns, as first and end, that are inside or outside by at most the tolerance.
     pub near: (usize, usize),
 }
 
 impl RowCrossings<'_> {
-    /// The columns by how firmly the tet holds them.
+    /// The ranges of columns by how firmly the tet holds them.
     #[inline]
-    pub fn firmness(&self) -> Row {
+    pub fn columns(&self) -> HeldColumns {
         let level = |times: f64| {
             let enter = std::array::from_fn(|c| self.enter[c] + times * self.raster.enter.slack[c]);
             let leave = std::array::from_fn(|c| self.leave[c] + times * self.raster.leave.slack[c]);
             covered(largest(&enter), smallest(&leave), self.near.0, self.near.1)
         };
-        Row { near: self.near, inside: level(1.0 - ROUNDING), strict: level(2.0) }
+        HeldColumns { near: self.near, inside: level(1.0 - ROUNDING), strict: level(2.0) }
     }
 }
 
-/// The smaller number, without the care for NaN that costs [`f64::min`] three instructions.
+/// The smaller number. It does not handle NaN, which takes [`f64::min`] three more instructions.
 #[inline]
 fn less(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// The larger number.
+/// The larger number, without handling NaN.
 #[inline]
 fn more(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
@@ -179,13 +182,13 @@ fn largest(x: &[f64; 4]) -> f64 {
     more(more(x[0], x[1]), more(x[2], x[3]))
 }
 
-/// The integers of `start..end` between `low` and `high`, both included, as first and end.
+/// The integers of `start..end` in the closed interval from `low` to `high`, as first and end.
 #[inline]
 fn covered(low: f64, high: f64, start: usize, end: usize) -> (usize, usize) {
     let low = more(low, start as f64);
     let high = less(high, end as f64 - 1.0);
     if low <= high {
-        // Both lie in the range, which is not negative, so that the conversion's truncation is a floor.
+        // Both are in the range and not negative, so that truncation is a floor.
         let floor = low as usize;
         (floor + usize::from((floor as f64) < low), high as usize + 1)
     } else {
@@ -221,7 +224,7 @@ mod tests {
             let raster = TetRaster::new(&corners, 1e-9).unwrap();
             let mut found = 0;
             raster.rows(&[0..10, 0..10, 0..10], |_, _, row| {
-                let row = row.firmness();
+                let row = row.columns();
                 found += row.strict.1 - row.strict.0;
                 assert_eq!((row.near, row.inside), (row.strict, row.strict), "no center lies near a face");
             });

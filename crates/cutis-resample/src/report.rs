@@ -1,21 +1,21 @@
-//! What happened to the voxels.
+//! Counts of a resampling.
 
 use std::ops::Add;
 
 use serde::Serialize;
 
-/// Counts over the voxels and tets of one resampling. Voxels are those of the region that was asked for.
+/// Counts of voxels and tets in one resampling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ResampleReport {
-    /// Voxels whose center lies in a deformed tet.
+    /// Voxels whose center is in a deformed tet.
     pub covered_voxels: usize,
     /// Covered voxels whose tet moved.
     pub moved_voxels: usize,
-    /// Voxels of the rest shape that no deformed tet covers any more: they became air.
+    /// Voxels of the rest shape that no deformed tet covers. They became air.
     pub vacated_voxels: usize,
-    /// Voxels whose center lies strictly inside two or more deformed body tets.
+    /// Voxels whose center is strictly inside two or more deformed body tets.
     pub folds: usize,
-    /// Tets, of the whole mesh, whose volume changed its sign or vanished.
+    /// Tets of the whole mesh whose volume changed its sign or vanished.
     pub inverted_tets: usize,
 }
 

@@ -3,11 +3,13 @@
 use cutis_volume::{AIR_HU, Volume};
 use rayon::prelude::*;
 
-/// The trilinear value at a continuous index, rounded to the nearest stored value (halves upwards). Positions outside the
-/// grid are clamped to it, so the value always lies between the smallest and the largest of the voxels read.
+/// The trilinear value at a continuous index, rounded to the nearest stored value (halves upwards).
 ///
-/// Of the voxels read, those outside `scanned` are padding: where they meet voxels inside it, they count as its nearest
-/// end (air), so that padding never bleeds into tissue. Among themselves, and at a voxel's center, they keep their value.
+/// Positions outside the grid are clamped to it, so that the value lies between the smallest and
+/// the largest of the voxels that are read. Voxels outside the range `scanned` are padding. Where
+/// padding meets other voxels, it counts as the nearest end of the range (air), so that it never
+/// bleeds into tissue. Where all eight voxels are padding, and at a voxel's center, values stay as
+/// they are.
 #[inline]
 pub fn trilinear(voxels: &[i16], shape: [usize; 3], scanned: [i16; 2], position: [f64; 3]) -> i16 {
     let (mut base, mut stride) = (0, 1);
@@ -43,12 +45,12 @@ pub fn trilinear(voxels: &[i16], shape: [usize; 3], scanned: [i16; 2], position:
         a + fy * (b - a)
     };
     let (a, b) = (along_y(0), along_y(4));
-    // Shifted to positive numbers, where the conversion's truncation is a floor.
+    // Shifted to positive numbers, for which truncation is a floor.
     let shift = 32768.0;
     (((a + fz * (b - a)) + (shift + 0.5)) as i32 - shift as i32) as i16
 }
 
-/// The stored value nearest to −1024 HU, held within the range of the stored values, so that no HU is invented.
+/// The stored value nearest to −1024 HU, clamped to the range of the stored values.
 pub fn stored_air(volume: &Volume) -> i16 {
     let widen = |(a, b): (i16, i16), (c, d): (i16, i16)| (a.min(c), b.max(d));
     let empty = (i16::MAX, i16::MIN);
@@ -58,8 +60,8 @@ pub fn stored_air(volume: &Volume) -> i16 {
     (exact.round() as i16).max(low).min(high)
 }
 
-/// The stored values that can come from a scan: air (as [`stored_air`] gives it) and all denser ones. What lies beyond is
-/// padding.
+/// The range of stored values that can come from a scan: air (see [`stored_air`]) and everything
+/// denser. Values outside of it are padding.
 pub fn scanned_range(volume: &Volume, air: i16) -> [i16; 2] {
     if volume.slope() > 0.0 { [air, i16::MAX] } else { [i16::MIN, air] }
 }

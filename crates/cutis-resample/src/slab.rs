@@ -1,4 +1,4 @@
-//! Filling one z-slab of the output.
+//! Resampling of one z-slab of the output.
 
 use std::ops::Range;
 
@@ -10,14 +10,15 @@ use crate::sample::trilinear;
 use crate::space::IndexSpace;
 use crate::warp::Warp;
 
-/// Bits of a voxel's state. The lowest two bits count the body tets that hold it strictly, up to two.
+/// Bits of a voxel's state. The lowest two bits count the body tets that hold it strictly, up to
+/// two.
 const STRICT_COUNT: u8 = 0b11;
 const NEAR: u8 = 1 << 2;
 const INSIDE: u8 = 1 << 3;
 const MOVED: u8 = 1 << 4;
 const VACATED: u8 = 1 << 5;
 
-/// What a slab is filled from.
+/// The input of a slab.
 pub struct Source<'a> {
     pub warp: &'a Warp<'a>,
     pub space: &'a IndexSpace,
@@ -25,32 +26,38 @@ pub struct Source<'a> {
     pub shape: [usize; 3],
     /// Stored value of a vacated voxel.
     pub air: i16,
-    /// Stored values that are no padding.
+    /// Range of stored values that are not padding.
     pub scanned: [i16; 2],
 }
 
-/// A box of output voxels, a few slices thick.
+/// A few slices of output voxels.
 pub struct Slab<'a> {
     source: &'a Source<'a>,
-    region: [Range<usize>; 3],
+    slices: Range<usize>,
     values: &'a mut [i16],
     state: Vec<u8>,
 }
 
 impl<'a> Slab<'a> {
-    /// `values` are the output voxels of `region`, filled with the input.
-    pub fn new(source: &'a Source<'a>, region: [Range<usize>; 3], values: &'a mut [i16]) -> Self {
+    /// A slab of `slices`. `values` are its output voxels and hold the input values.
+    pub fn new(source: &'a Source<'a>, slices: Range<usize>, values: &'a mut [i16]) -> Self {
         let state = vec![0; values.len()];
-        Self { source, region, values, state }
+        Self { source, slices, values, state }
     }
 
-    /// Position in `values` of the first voxel of row `(j, k)`, less the region's first column.
+    /// The voxels of the slab along each axis.
+    fn region(&self) -> [Range<usize>; 3] {
+        let [columns, rows, _] = self.source.shape;
+        [0..columns, 0..rows, self.slices.clone()]
+    }
+
+    /// Position in `values` of the first voxel of row `(j, k)`.
     fn row(&self, j: usize, k: usize) -> usize {
-        let [columns, rows, slices] = &self.region;
-        ((k - slices.start) * rows.len() + (j - rows.start)) * columns.len()
+        let [columns, rows, _] = self.source.shape;
+        ((k - self.slices.start) * rows + j) * columns
     }
 
-    /// Gives the voxels of a deformed tet to it. Tets must come in ascending order.
+    /// Sets the voxels that a deformed tet owns. Tets must come in ascending order.
     pub fn deform(&mut self, tet: usize) {
         let Source { warp, space, voxels, shape, scanned, .. } = *self.source;
         let vertices = warp.tets[tet].map(|v| v as usize);
@@ -67,11 +74,11 @@ impl<'a> Slab<'a> {
         let Some(raster) = TetRaster::new(&deformed, space.tolerance) else { return };
         let inverse = warp.tet_moved(tet).then(|| RestMap::new(&raster, place(warp.rest)));
         let in_body = tet < warp.body_tets;
-        let region = self.region.clone();
+        let region = self.region();
         raster.rows(&region, |j, k, row| {
-            let row = row.firmness();
+            let row = row.columns();
             let first = self.row(j, k);
-            let at = |i: usize| first + i - region[0].start;
+            let at = |i: usize| first + i;
             if in_body {
                 for state in &mut self.state[at(row.strict.0)..at(row.strict.1)] {
                     *state += u8::from(*state & STRICT_COUNT < 2);
@@ -81,7 +88,8 @@ impl<'a> Slab<'a> {
                 let inside = (row.inside.0..row.inside.1).contains(&i);
                 let claim = if inside { INSIDE } else { NEAR };
                 let state = &mut self.state[at(i)];
-                // The first tet wins, and a tet that holds the center wins over one that only comes near it.
+                // The first tet wins, and a tet that holds the center wins over one that only comes
+                // near it.
                 if *state & (INSIDE | claim) != 0 {
                     continue;
                 }
@@ -99,15 +107,16 @@ impl<'a> Slab<'a> {
         });
     }
 
-    /// Turns the voxels of a tet at rest that no deformed tet covers to air. Call it after all [`Slab::deform`].
+    /// Sets voxels to air that a tet covers at rest and no deformed tet covers. Call it after every
+    /// [`Slab::deform`].
     pub fn vacate(&mut self, vertices: [u32; 4]) {
         let Source { warp, space, air, .. } = *self.source;
         let rest = vertices.map(|v| space.index(warp.rest[v as usize]));
         let Some(raster) = TetRaster::new(&rest, space.tolerance) else { return };
-        let region = self.region.clone();
+        let region = self.region();
         raster.rows(&region, |j, k, row| {
             let first = self.row(j, k);
-            for at in first + row.near.0 - region[0].start..first + row.near.1 - region[0].start {
+            for at in first + row.near.0..first + row.near.1 {
                 if self.state[at] & (NEAR | INSIDE | VACATED) == 0 {
                     self.state[at] = VACATED;
                     self.values[at] = air;
@@ -116,7 +125,7 @@ impl<'a> Slab<'a> {
         });
     }
 
-    /// Counts of this slab.
+    /// The counts of this slab.
     pub fn report(&self) -> ResampleReport {
         let mut report = ResampleReport::default();
         for &state in &self.state {
@@ -129,7 +138,7 @@ impl<'a> Slab<'a> {
     }
 }
 
-/// Deformed index → rest index inside one tet.
+/// The map from deformed to rest voxel indices inside one tet.
 struct RestMap {
     corners: [Point3<f64>; 4],
     linear: Matrix3<f64>,
@@ -153,7 +162,8 @@ impl RestMap {
         (self.linear * Vector3::from(index) + self.offset).into()
     }
 
-    /// For a center just outside: the coordinates are held in the tet, however thin it is.
+    /// The rest index for a center just outside the tet. The barycentric coordinates are clamped to
+    /// the tet, however thin it is.
     fn nearest(&self, lambda: [f64; 4]) -> [f64; 3] {
         let held = lambda.map(|l| l.max(0.0));
         let sum: f64 = held.iter().sum();

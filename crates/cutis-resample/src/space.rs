@@ -1,23 +1,24 @@
-//! Local meters of the mesh → continuous voxel index of the volume.
+//! The map from local meters of the mesh to continuous voxel indices of the volume.
 
 use cutis_volume::Affine;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-/// The affine map from local meters to voxel index, with the rounding error that `f32` positions have there.
+/// An affine map from local meters to voxel indices, with the rounding error of `f32` positions.
 pub struct IndexSpace {
     /// Voxels per meter.
     pub linear: Matrix3<f64>,
-    /// Index of the local origin.
+    /// Voxel index of the local origin.
     pub offset: Vector3<f64>,
-    /// Length in voxels below which two `f32` positions cannot be told apart.
+    /// Length in voxels below which two `f32` positions cannot be distinguished.
     pub tolerance: f64,
 }
 
 impl IndexSpace {
-    /// The map for a mesh at `origin_mm`. The tolerance is four roundings of the largest coordinate of `positions`.
+    /// The map for a mesh with its local origin at `origin_mm`. The tolerance is four roundings of
+    /// the largest coordinate of `positions`.
     pub fn new(affine: &Affine, origin_mm: Point3<f64>, positions: [&[Point3<f32>]; 2]) -> Self {
-        // A power of two, so that the division is exact, of the size of a body.
+        // A power of two, so that the division is exact, and about the size of a body.
         let reach = 1024.0;
         let zero = affine.to_index(Point3::origin());
         let column = |axis: usize| {
@@ -37,13 +38,13 @@ impl IndexSpace {
         }
     }
 
-    /// Continuous index of a position in local meters.
+    /// Continuous voxel index of a position in local meters.
     #[inline]
     pub fn index(&self, local: Point3<f32>) -> Point3<f64> {
         Point3::from(self.linear * local.coords.map(f64::from) + self.offset)
     }
 
-    /// Third component of [`IndexSpace::index`], the same bits.
+    /// The third component of [`IndexSpace::index`], with the same bits.
     #[inline]
     pub fn slice(&self, local: Point3<f32>) -> f64 {
         self.index(local).z

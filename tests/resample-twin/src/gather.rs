@@ -1,12 +1,13 @@
-//! `gather.wgsl`: each voxel takes its value.
+//! `gather.wgsl`: the value of each voxel.
 
 use std::ops::Range;
 
 use cutis_volume::Volume;
 
-use super::passes::Mesh;
-use super::tet::{Vec3, Vec4, heights, row_of, tet_of};
-use crate::gpu::{Grid, NEAR, NONE, SlabState};
+use crate::is_marked;
+use crate::passes::Mesh;
+use crate::tet::{Vec3, Vec4, heights, row_of, tet_of};
+use cutis_resample::{GridUniform, SlabState};
 
 fn voxel_at(volume: &Volume, i: i32, j: i32, k: i32) -> i32 {
     i32::from(volume.voxels()[volume.grid().index([i as usize, j as usize, k as usize])])
@@ -16,9 +17,9 @@ fn between(a: f32, b: f32, fraction: f32) -> f32 {
     a + fraction * (b - a)
 }
 
-/// The trilinear value at a place, rounded to the nearest stored value, halves upwards. Where padding meets anything else it
-/// counts as the nearest value that is none.
-fn trilinear(place: Vec3, volume: &Volume, grid: &Grid) -> i32 {
+/// The trilinear value at a place, rounded to the nearest stored value, halves upwards. Where
+/// padding meets other voxels, it counts as the nearest value that is not padding.
+fn trilinear(place: Vec3, volume: &Volume, grid: &GridUniform) -> i32 {
     let at: Vec3 = std::array::from_fn(|n| place[n].clamp(grid.first[n], grid.last[n]));
     let low = at.map(f32::floor);
     let f: Vec3 = std::array::from_fn(|n| at[n] - low[n]);
@@ -41,7 +42,8 @@ fn trilinear(place: Vec3, volume: &Volume, grid: &Grid) -> i32 {
     (between(y0, y1, f[2]) + 0.5).floor() as i32
 }
 
-/// Where a point of a deformed tet was at rest. A point just outside is held in the tet, however thin that is.
+/// Place at rest of a point in a deformed tet. A point just outside is clamped to the tet, however
+/// thin it is.
 fn rest_place(mesh: &Mesh<'_>, corners: [u32; 4], point: Vec3, held: bool) -> Vec3 {
     let [a, b, c, d] = mesh.now(corners);
     let tet = tet_of(a, b, c, d, mesh.grid.tolerance);
@@ -56,7 +58,8 @@ fn rest_place(mesh: &Mesh<'_>, corners: [u32; 4], point: Vec3, held: bool) -> Ve
     })
 }
 
-/// Each voxel of the slab takes its value: through its owner, air where the body has gone, else what it was.
+/// Computes the value of each voxel of the slab: through its owner, air if the body has left it,
+/// else the input value.
 pub fn gather(mesh: &Mesh<'_>, slab: &Range<u32>, tets: &[[u32; 4]], volume: &Volume, state: &mut SlabState) {
     let grid = mesh.grid;
     let [columns, rows, _] = grid.shape;
@@ -66,17 +69,17 @@ pub fn gather(mesh: &Mesh<'_>, slab: &Range<u32>, tets: &[[u32; 4]], volume: &Vo
         let point: Vec3 = std::array::from_fn(|n| grid.region[n] + index[n] as f32);
         let [i, j, k]: [i32; 3] = std::array::from_fn(|n| point[n] as i32 + grid.center[n]);
         let owner = state.owners[voxel];
-        let value = if owner == NONE {
-            let gone = state.is_marked(2, voxel);
+        let value = if owner == SlabState::NONE {
+            let gone = is_marked(state, 2, voxel);
             state.counts[2] += u32::from(gone);
             if gone { grid.air } else { voxel_at(volume, i, j, k) }
         } else {
-            let corners = tets[(owner & !NEAR) as usize];
+            let corners = tets[(owner & !SlabState::NEAR) as usize];
             state.counts[0] += 1;
-            state.counts[3] += u32::from(state.is_marked(1, voxel));
+            state.counts[3] += u32::from(is_marked(state, 1, voxel));
             if mesh.has_moved(corners) {
                 state.counts[1] += 1;
-                trilinear(rest_place(mesh, corners, point, owner & NEAR == 0), volume, grid)
+                trilinear(rest_place(mesh, corners, point, owner & SlabState::NEAR == 0), volume, grid)
             } else {
                 voxel_at(volume, i, j, k)
             }

@@ -2,30 +2,31 @@
 
 use std::ops::Range;
 
-use super::tet::{Tet, Vec3, Vec4, box_of, has_volume, heights, row_of, tet_of, volume_of};
-use crate::gpu::{Grid, NEAR, SlabState};
+use crate::mark;
+use crate::tet::{Tet, Vec3, Vec4, box_of, has_volume, heights, row_of, tet_of, volume_of};
+use cutis_resample::{GridUniform, SlabState};
 
-/// A mesh over the grid: what the passes over its tets read.
+/// A mesh over the grid, as the passes over its tets read it.
 #[derive(Clone, Copy, Debug)]
 pub struct Mesh<'a> {
-    /// The volume and the region.
-    pub grid: &'a Grid,
-    /// Places of the vertices as they are now; the fourth component is 1 for those that moved.
+    /// The volume, and the map from positions to places.
+    pub grid: &'a GridUniform,
+    /// Places of the deformed vertices. The fourth component is 1 for vertices that moved.
     pub places: &'a [Vec4],
     /// Places of the vertices at rest.
     pub rest_places: &'a [Vec4],
 }
 
 impl Mesh<'_> {
-    pub(super) fn now(&self, corners: [u32; 4]) -> [Vec3; 4] {
+    pub(crate) fn now(&self, corners: [u32; 4]) -> [Vec3; 4] {
         corners.map(|v| xyz(self.places[v as usize]))
     }
 
-    pub(super) fn at_rest(&self, corners: [u32; 4]) -> [Vec3; 4] {
+    pub(crate) fn at_rest(&self, corners: [u32; 4]) -> [Vec3; 4] {
         corners.map(|v| xyz(self.rest_places[v as usize]))
     }
 
-    pub(super) fn has_moved(&self, corners: [u32; 4]) -> bool {
+    pub(crate) fn has_moved(&self, corners: [u32; 4]) -> bool {
         corners.iter().any(|&v| self.places[v as usize][3] > 0.0)
     }
 }
@@ -34,8 +35,8 @@ fn xyz([x, y, z, _]: Vec4) -> Vec3 {
     [x, y, z]
 }
 
-/// Positions of the vertices → places.
-pub fn place(grid: &Grid, positions: &[Vec4], rest: &[Vec4]) -> Vec<Vec4> {
+/// Maps positions of vertices to places.
+pub fn place(grid: &GridUniform, positions: &[Vec4], rest: &[Vec4]) -> Vec<Vec4> {
     let [x, y, z] = grid.linear;
     let along = |row: Vec3, p: Vec3, offset: f32| ((row[0] * p[0] + row[1] * p[1]) + row[2] * p[2]) + offset;
     let place = |(&position, &rest): (&Vec4, &Vec4)| {
@@ -47,8 +48,9 @@ pub fn place(grid: &Grid, positions: &[Vec4], rest: &[Vec4]) -> Vec<Vec4> {
     positions.iter().zip(rest).map(place).collect()
 }
 
-/// The slices that a tet comes near: the first, and the end in the upper half; zero for none.
-fn span_of([a, b, c, d]: [Vec3; 4], grid: &Grid) -> u32 {
+/// The slices that a tet comes near: the first in the lower half, the end in the upper half; 0 for
+/// none.
+fn span_of([a, b, c, d]: [Vec3; 4], grid: &GridUniform) -> u32 {
     let finite = [a, b, c, d].iter().all(|p| p.iter().all(|x| x.is_finite()));
     if !finite || !has_volume(&tet_of(a, b, c, d, grid.tolerance)) {
         return 0;
@@ -63,7 +65,8 @@ fn is_inverted([a, b, c, d]: [Vec3; 4], [e, f, g, h]: [Vec3; 4]) -> bool {
     now.is_finite() && before.is_finite() && now * (if before < 0.0 { -1.0 } else { 1.0 }) <= 0.0
 }
 
-/// The slices of each tet as it is now and, if it moved, as it was at rest; and how many tets are inverted.
+/// The slices of each deformed tet and, if it moved, of the tet at rest; and the number of inverted
+/// tets.
 pub fn span(mesh: &Mesh<'_>, tets: &[[u32; 4]]) -> (Vec<[u32; 2]>, usize) {
     let mut inverted = 0;
     let spans = tets.iter().map(|&corners| {
@@ -77,7 +80,7 @@ pub fn span(mesh: &Mesh<'_>, tets: &[[u32; 4]]) -> (Vec<[u32; 2]>, usize) {
     (spans.collect(), inverted)
 }
 
-/// The slices of tets that exist at rest only.
+/// The slices of removed tets, which exist at rest only.
 pub fn span_removed(mesh: &Mesh<'_>, removed: &[[u32; 4]]) -> Vec<[u32; 2]> {
     removed.iter().map(|&corners| [0, span_of(mesh.at_rest(corners), mesh.grid)]).collect()
 }
@@ -86,8 +89,13 @@ fn touches_slab(span: u32, slab: &Range<u32>) -> bool {
     (span & 0xffff) < slab.end && (span >> 16) > slab.start
 }
 
-/// Each voxel of the slab that the tet holds or comes near: `take(tet, height, voxel)`.
-fn walk_rows(corners: [Vec3; 4], grid: &Grid, slab: &Range<u32>, mut take: impl FnMut(&Tet, Vec4, usize)) {
+/// Calls `take(tet, height, voxel)` for each voxel of the slab that the tet holds or comes near.
+fn walk_rows(
+    corners: [Vec3; 4],
+    grid: &GridUniform,
+    slab: &Range<u32>,
+    mut take: impl FnMut(&Tet, Vec4, usize),
+) {
     let [a, b, c, d] = corners;
     let mut covered = box_of(a, b, c, d, grid);
     covered.first[2] = covered.first[2].max(slab.start);
@@ -107,7 +115,7 @@ fn walk_rows(corners: [Vec3; 4], grid: &Grid, slab: &Range<u32>, mut take: impl 
     }
 }
 
-/// Each deformed tet claims the voxels that it holds or comes near: the smallest key wins.
+/// Each deformed tet claims the voxels that it holds or comes near. The smallest key wins.
 pub fn claim(
     mesh: &Mesh<'_>,
     slab: &Range<u32>,
@@ -122,19 +130,19 @@ pub fn claim(
         }
         walk_rows(mesh.now(corners), mesh.grid, slab, |tet, height, voxel| {
             let holds = (0..4).all(|c| height[c] >= -tet.rounding[c]);
-            let key = t as u32 | if holds { 0 } else { NEAR };
+            let key = t as u32 | if holds { 0 } else { SlabState::NEAR };
             state.owners[voxel] = state.owners[voxel].min(key);
             if t < body_tets && (0..4).all(|c| height[c] > tet.near[c]) {
-                let first_to_hold = state.mark(0, voxel);
+                let first_to_hold = mark(state, 0, voxel);
                 if !first_to_hold {
-                    state.mark(1, voxel);
+                    mark(state, 1, voxel);
                 }
             }
         });
     }
 }
 
-/// Each tet that moved or was removed marks the voxels that it held at rest.
+/// Each tet that moved or was removed marks the voxels that it covers at rest.
 pub fn vacate(
     mesh: &Mesh<'_>,
     slab: &Range<u32>,
@@ -145,7 +153,7 @@ pub fn vacate(
     for (&corners, span) in tets.iter().zip(spans) {
         if touches_slab(span[1], slab) {
             walk_rows(mesh.at_rest(corners), mesh.grid, slab, |_, _, voxel| {
-                state.mark(2, voxel);
+                mark(state, 2, voxel);
             });
         }
     }

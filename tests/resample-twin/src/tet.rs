@@ -1,36 +1,36 @@
-//! `tet.wgsl` and `box.wgsl`: a tet over the voxels, and the voxels that it can hold.
+//! `tet.wgsl` and `box.wgsl`: a tet over the voxels, and the voxels that it may hold.
 
-use crate::gpu::Grid;
+use cutis_resample::GridUniform;
 
 /// Three components of a `vec3f`.
 pub type Vec3 = [f32; 3];
 /// Four components of a `vec4f`.
 pub type Vec4 = [f32; 4];
 
-/// A tet over the voxels: on which side of its faces a center lies, as far as `f32` can tell. Component c of a [`Vec4`] belongs to
-/// the face opposite corner c.
+/// A tet over the voxels, for finding the side of its faces on which a center lies. Component c of
+/// a [`Vec4`] belongs to the face opposite corner c.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tet {
-    /// The corner that each face is measured from.
+    /// The corner from which the height over each face is measured.
     pub base: [Vec4; 3],
-    /// Normals that point inwards, twice the area of the face long.
+    /// Normals that point inwards, with a length of twice the area of the face.
     pub normal: [Vec4; 3],
     /// Six times the volume.
     pub volume: f32,
-    /// What rounding can make of a height of zero.
+    /// Bound of the rounding error of a height of zero.
     pub rounding: Vec4,
-    /// What it can make of the height of a point just within the tolerance.
+    /// Bound of the rounding error of a height just within the tolerance.
     pub near: Vec4,
 }
 
-/// Bound of the error of a height, over |edge| · |edge| · reach: 16 roundings of 2⁻²⁴.
+/// Bound of the error of a height, relative to |edge| · |edge| · reach: 16 roundings of 2⁻²⁴.
 pub const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
 fn sub(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|n| a[n] - b[n])
 }
 
-/// Each component of four corners through `f32::min` or `f32::max`.
+/// Reduces each component of four corners by `f32::min` or `f32::max`.
 fn extreme(pick: fn(f32, f32) -> f32, [a, b, c, d]: [Vec3; 4]) -> Vec3 {
     std::array::from_fn(|n| pick(pick(a[n], b[n]), pick(c[n], d[n])))
 }
@@ -81,36 +81,38 @@ pub fn tet_of(a: Vec3, b: Vec3, c: Vec3, d: Vec3, tolerance: f32) -> Tet {
     }
 }
 
-/// False for a tet whose volume cannot be told from zero, or is beyond `f32`: it holds no center.
+/// False if the volume cannot be distinguished from zero, or exceeds `f32`. Such a tet holds no
+/// center.
 pub fn has_volume(tet: &Tet) -> bool {
     tet.volume.is_finite()
         && (tet.near[0] + ((tet.near[1] + tet.near[2]) + tet.near[3])).is_finite()
         && tet.volume > tet.rounding[1]
 }
 
-/// What the heights of the points of a row along x share.
+/// The part of the heights that all points of a row along x share.
 pub fn row_of(tet: &Tet, y: f32, z: f32) -> Vec4 {
     let [_, normal_y, normal_z] = tet.normal;
     let [_, base_y, base_z] = tet.base;
     std::array::from_fn(|c| normal_y[c] * (y - base_y[c]) + normal_z[c] * (z - base_z[c]))
 }
 
-/// Heights over the four faces, times twice their areas; over `volume` they are the barycentric coordinates.
+/// Heights over the four faces, times twice their areas. Divided by `volume` they are the
+/// barycentric coordinates.
 pub fn heights(tet: &Tet, row: Vec4, x: f32) -> Vec4 {
     std::array::from_fn(|c| tet.normal[0][c] * (x - tet.base[0][c]) + row[c])
 }
 
-/// Voxels of the region, `first` included, `end` not.
+/// A box of voxels, with `first` included and `end` excluded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VoxelBox {
     /// First voxel.
     pub first: [u32; 3],
-    /// End, exclusive; zero where there are none.
+    /// End, excluded; zero for an empty box.
     pub end: [u32; 3],
 }
 
-/// The voxels that can lie in the tet or come near it.
-pub fn box_of(a: Vec3, b: Vec3, c: Vec3, d: Vec3, grid: &Grid) -> VoxelBox {
+/// The voxels that the tet may hold or come near.
+pub fn box_of(a: Vec3, b: Vec3, c: Vec3, d: Vec3, grid: &GridUniform) -> VoxelBox {
     let low = extreme(f32::min, [a, b, c, d]).map(|x| x - grid.tolerance);
     let high = extreme(f32::max, [a, b, c, d]).map(|x| x + grid.tolerance);
     let first: Vec3 = std::array::from_fn(|n| (low[n].ceil() - grid.region[n]).max(0.0));

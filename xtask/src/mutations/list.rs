@@ -52,7 +52,7 @@ impl Suite {
         match self {
             Self::Conformance => &["-p", "cutis-conformance", "--test", "all", "builtin"],
             Self::Solver => &["-p", "cutis-solver-gpu", "--test", "suite"],
-            Self::Resample => &["-p", "cutis-resample", "--features", "gpu", "--test", "gpu"],
+            Self::Resample => &["-p", "cutis-resample", "--features", "gpu", "--test", "all", "gpu::"],
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],
             Self::Stability => &["-p", "cutis-tests", "--test", "all", "stability::"],
             Self::ChainMail => &["-p", "cutis-chainmail", "--features", "gpu", "--tests"],

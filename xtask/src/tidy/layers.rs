@@ -80,7 +80,7 @@ const LAYERS: &[Layer] = &[
 
 /// Tests, studies and their kit: they may use any crate, no product crate depends on them except for
 /// its own tests, and they are not published.
-const UNPUBLISHED: &[&str] = &["cutis-studies", "cutis-test-kit", "cutis-tests"];
+const UNPUBLISHED: &[&str] = &["cutis-resample-twin", "cutis-studies", "cutis-test-kit", "cutis-tests"];
 
 /// What the rule looks at of a workspace member.
 #[derive(Debug)]

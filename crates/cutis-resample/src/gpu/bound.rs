@@ -1,4 +1,4 @@
-//! Memory bound to the kernels: chunks of tets, and slabs.
+//! Buffers and bind groups of chunks of tets and of slabs.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use super::kernels::{Kernels, WalkGroups};
 use super::memory::{COUNTS, Memory};
 use super::uniform::{Chunk, Slab};
 
-/// Tets that exist now.
+/// A chunk of the deformed tets.
 pub struct TetChunk {
     pub tets: Buffer<[u32; 4]>,
     spans: Buffer<[u32; 2]>,
@@ -19,7 +19,8 @@ pub struct TetChunk {
 }
 
 impl TetChunk {
-    /// `tets` from tet `first` on, `body` of them the body's; `list` and the one after it are their lists of large tets.
+    /// Uploads `tets`. `first` is the number of the first one among all tets, and `body` of them
+    /// belong to the body. `list` and `list + 1` are the lists of large tets of this chunk.
     pub fn new(
         gpu: &Gpu,
         kernels: &Kernels,
@@ -55,7 +56,7 @@ impl TetChunk {
     }
 }
 
-/// Tets that were removed.
+/// A chunk of removed tets.
 pub struct RemovedChunk {
     pub tets: Buffer<[u32; 4]>,
     spans: Buffer<[u32; 2]>,
@@ -94,10 +95,10 @@ fn chunk(gpu: &Gpu, first: usize, count: usize, body: usize, list: usize) -> Res
     gpu.uniform("resample: chunk", &Chunk { first, count, body, list })
 }
 
-/// A slab and its values, two voxels to a word.
+/// A slab with its output values, two voxels per word.
 pub struct BoundSlab {
     pub voxels: usize,
-    /// Where its counts lie among the counters.
+    /// Range of its counts among the counters.
     pub counts: Range<usize>,
     pub values: Buffer<u32>,
     pub clear: BindGroup,
@@ -107,7 +108,8 @@ pub struct BoundSlab {
 }
 
 impl BoundSlab {
-    /// Slab `number`, of `slices` of `slice_voxels` voxels; there are `lists` lists of large tets.
+    /// Binds slab `number`, with the given slices of `slice_voxels` voxels each. There are `lists`
+    /// lists of large tets.
     pub fn new(
         gpu: &Gpu,
         kernels: &Kernels,

@@ -1,12 +1,12 @@
-//! The kernels, and the walk over the tets of a slab, which two of them share.
+//! The kernels, and the visit of a slab's tets that two of them share.
 
 use cutis_gpu::{BindGroup, Binding, Buffer, Gpu, GpuError, Kernel, Pass, WORKGROUP};
 use cutis_shaders::resample as shaders;
 
-/// Most workgroups that work through a list of large tets.
+/// Largest number of workgroups for a list of large tets.
 const GROUPS_FOR_LARGE: usize = 256;
 
-/// Every kernel of the resampler.
+/// All kernels of the resampler.
 pub struct Kernels {
     pub place: Kernel,
     pub span: Kernel,
@@ -18,7 +18,7 @@ pub struct Kernels {
 }
 
 impl Kernels {
-    /// Every source passes through `change`.
+    /// Compiles the kernels. Every source passes through `change`.
     pub fn new(gpu: &Gpu, change: &dyn Fn(String) -> String) -> Result<Self, GpuError> {
         let kernel = |label, source, entry| gpu.kernel(label, &change(source), entry);
         Ok(Self {
@@ -33,13 +33,14 @@ impl Kernels {
     }
 }
 
-/// A walk over the voxels of tets: small ones by a thread each, then the large ones by a workgroup each.
+/// Two kernels that visit the voxels of tets: one thread for each small tet, one workgroup for each
+/// large one.
 pub struct Walk {
     all: Kernel,
     large: Kernel,
 }
 
-/// Bind groups of both kernels of a walk.
+/// Bind groups of both kernels.
 pub struct WalkGroups {
     all: BindGroup,
     large: BindGroup,
@@ -53,7 +54,7 @@ impl Walk {
         })
     }
 
-    /// Group 0, what belongs to the slab: `bindings` without the reaches, which large tets have behind them.
+    /// Binds group 0, the slab. Only the kernel for all tets needs the reaches.
     pub fn slab<'a>(
         &self,
         gpu: &Gpu,
@@ -67,7 +68,7 @@ impl Walk {
         })
     }
 
-    /// Group 1, the tets: `bindings` without the spans, which large tets have behind them.
+    /// Binds group 1, the tets. Only the kernel for all tets needs the spans.
     pub fn tets(
         &self,
         gpu: &Gpu,
@@ -81,7 +82,7 @@ impl Walk {
         })
     }
 
-    /// Walks `tets` tets in `threads` threads; at most `listed` of them can be on the list of the large ones.
+    /// Visits tets with `threads` threads. At most `listed` of them are on the list of large tets.
     pub fn dispatch(
         &self,
         pass: &mut Pass<'_>,
@@ -91,7 +92,7 @@ impl Walk {
         listed: usize,
     ) {
         pass.dispatch(&self.all, &[&slab.all, &tets.all], threads);
-        // A full list is rare: two tets for each workgroup then.
+        // A full list is rare; each workgroup then processes two tets.
         let groups = listed.min(threads).div_ceil(2).min(GROUPS_FOR_LARGE);
         pass.dispatch(&self.large, &[&slab.large, &tets.large], WORKGROUP * groups);
     }

@@ -1,4 +1,4 @@
-//! How the work is split, and the memory that all of it shares.
+//! How the work is divided, and the buffers that all parts share.
 
 use std::ops::Range;
 
@@ -7,42 +7,44 @@ use cutis_volume::Volume;
 
 use super::setup::{ResamplerOptions, Setup};
 use super::state::mark_words;
-use super::uniform::Grid;
+use super::uniform::GridUniform;
 use crate::Warp;
 
-/// The owners of a slab take no more than this, whatever the device offers: WebGPU's baseline for a binding.
+/// Largest size of a slab's owners on any device: WebGPU's baseline limit for a binding.
 const OWNER_BYTES: u64 = 128 << 20;
-/// One of so many tets of a chunk, and at least one, can be on a list of large tets; what finds no room there is walked by a
-/// thread alone.
+/// A list of large tets has room for one of this many tets of a chunk, and for at least one. A
+/// large tet without room on the list is visited by a single thread.
 const TETS_PER_PLACE: usize = 8;
-/// Counts of a slab: covered, moved, vacated and folded voxels.
+/// Number of counters per slab: covered, moved, vacated and folded voxels.
 pub const COUNTS: usize = 4;
 
-/// The reach of no tets.
+/// The reach of a chunk without tets.
 pub const NO_REACH: [u32; 2] = [u32::MAX, 0];
 
-/// How tets and slices are split.
+/// Division of tets into chunks and of slices into slabs.
 pub struct Plan {
-    /// Most tets in a buffer.
+    /// Largest number of tets in a buffer.
     pub chunk_tets: usize,
-    /// Chunks of the tets that exist now; one without tets if there are none, so that voxels get their value all the same.
+    /// Number of chunks of deformed tets. There is at least one, so that voxels get values even
+    /// without tets.
     pub chunks: usize,
     pub removed_chunks: usize,
-    /// Most tets on a list of large ones.
+    /// Largest number of tets on a list of large tets.
     pub listed: usize,
-    /// Slices of each slab, relative to the region.
+    /// Slices of each slab.
     pub slabs: Vec<Range<usize>>,
-    /// Voxels of the largest slab.
+    /// Number of voxels in the largest slab.
     pub slab_voxels: usize,
 }
 
 impl Plan {
-    pub fn new(gpu: &Gpu, setup: &Setup, warp: &Warp<'_>, options: &ResamplerOptions) -> Self {
+    pub fn new(gpu: &Gpu, shape: [usize; 3], warp: &Warp<'_>, options: &ResamplerOptions) -> Self {
+        let [columns, rows, slices] = shape;
+        let slice_voxels = columns * rows;
         let chunk_tets = gpu.chunk_len(size_of::<[u32; 4]>());
         let limits = gpu.limits();
         let room = limits.max_binding_bytes.min(limits.max_buffer_bytes).min(OWNER_BYTES) as usize;
-        let fitting = (room / size_of::<u32>() / setup.slice_voxels()).max(1);
-        let slices = setup.region[2].len();
+        let fitting = (room / size_of::<u32>() / slice_voxels).max(1);
         let slab = options.slab_slices.unwrap_or(fitting).clamp(1, fitting).min(slices);
         Self {
             chunk_tets,
@@ -50,30 +52,31 @@ impl Plan {
             removed_chunks: warp.removed.len().div_ceil(chunk_tets),
             listed: (chunk_tets.min(warp.tets.len().max(warp.removed.len())) / TETS_PER_PLACE).max(1),
             slabs: (0..slices).step_by(slab).map(|start| start..slices.min(start + slab)).collect(),
-            slab_voxels: slab * setup.slice_voxels(),
+            slab_voxels: slab * slice_voxels,
         }
     }
 
-    /// Number of lists of large tets: those that claim and those that vacate in each chunk, and the removed ones.
+    /// Number of lists of large tets: two for each chunk (claim and vacate), and one for each
+    /// removed chunk.
     pub fn lists(&self) -> usize {
         2 * self.chunks + self.removed_chunks
     }
 }
 
-/// What lies on the device once.
+/// Buffers that exist once on the device.
 pub struct Memory {
     pub source: Texture3d,
-    pub grid: Buffer<Grid>,
+    pub grid: Buffer<GridUniform>,
     pub rest: Buffer<[f32; 4]>,
     pub rest_places: Buffer<[f32; 4]>,
     pub places: Buffer<[f32; 4]>,
     pub owners: Buffer<u32>,
     pub marks: Buffer<u32>,
-    /// Lengths of the lists of large tets, then the list in use.
+    /// Lengths of the lists of large tets, followed by the list in use.
     pub large: Buffer<u32>,
-    /// For each of these lists: first slice and end of all that its tets come near.
+    /// For each of these lists: first and end of the slices that its tets come near.
     pub reaches: Buffer<[u32; 2]>,
-    /// Inverted tets, then [`COUNTS`] for each slab.
+    /// Number of inverted tets, followed by [`COUNTS`] counters for each slab.
     pub counters: Buffer<u32>,
 }
 
@@ -93,7 +96,7 @@ impl Memory {
         })
     }
 
-    /// Bytes of all of it.
+    /// Size of all buffers in bytes.
     pub fn bytes(&self) -> u64 {
         let Self { source, grid, rest, rest_places, places, owners, marks, large, reaches, counters } = self;
         let volume = source.shape().iter().product::<usize>() as u64 * size_of::<i16>() as u64;

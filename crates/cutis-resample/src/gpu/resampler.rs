@@ -1,4 +1,4 @@
-//! A volume and a mesh that stay on the device, and the states of the mesh that the volume is resampled through.
+//! A resampler that keeps a volume and a mesh on the device.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Pass};
 use cutis_volume::Volume;
@@ -13,10 +13,11 @@ use crate::report::ResampleReport;
 use crate::warp::check_finite;
 use crate::{ResampleError, Warp};
 
-/// Resampling of one volume through the states of one mesh, on a GPU.
+/// Resamples one volume through many states of one mesh, on a GPU.
 ///
-/// The volume, the tets and the rest positions go up once. A state comes from the host ([`ResamplerGpu::resample`]) or lies on
-/// the device already ([`ResamplerGpu::resample_device`]). The result stays there until it is asked for.
+/// The volume, the tets and the rest positions are uploaded once. A state comes from the host
+/// ([`ResamplerGpu::resample`]) or is already on the device ([`ResamplerGpu::resample_device`]).
+/// The result stays on the device until [`ResamplerGpu::volume`] reads it.
 pub struct ResamplerGpu {
     gpu: Gpu,
     kernels: Kernels,
@@ -29,18 +30,18 @@ pub struct ResamplerGpu {
     chunks: Vec<TetChunk>,
     removed: Vec<RemovedChunk>,
     slabs: Vec<BoundSlab>,
-    /// Most tets on a list of large ones.
+    /// Largest number of tets on a list of large tets.
     listed: usize,
-    /// Positions that came from the host, once some did.
+    /// Buffer for positions from the host, created by the first upload.
     uploaded: Option<Buffer<[f32; 4]>>,
 }
 
 impl ResamplerGpu {
-    /// Takes the volume, and of the warp all but the deformed positions, to the device.
+    /// Uploads the volume and the warp without its deformed positions.
     ///
     /// # Errors
-    /// As [`resample_region`](crate::resample_region), [`ResampleError::TooLarge`], and [`ResampleError::Gpu`] when the device
-    /// refuses or has no room.
+    /// The errors of [`Setup::new`], and [`ResampleError::Gpu`] if the device refuses or has too
+    /// little memory.
     pub fn new(
         gpu: &Gpu,
         volume: &Volume,
@@ -50,10 +51,11 @@ impl ResamplerGpu {
         Self::with_sources(gpu, volume, warp, options, &|source| source)
     }
 
-    /// The same with each kernel's source passed through `change`: for the controls of comparisons, which have to see a change.
+    /// As [`ResamplerGpu::new`], with each kernel source passed through `change`. Parity tests use
+    /// it to show that they detect a wrong kernel.
     ///
     /// # Errors
-    /// As [`ResamplerGpu::new`].
+    /// The errors of [`ResamplerGpu::new`].
     pub fn with_sources(
         gpu: &Gpu,
         volume: &Volume,
@@ -62,7 +64,7 @@ impl ResamplerGpu {
         change: &dyn Fn(String) -> String,
     ) -> Result<Self, ResampleError> {
         let setup = Setup::new(volume, warp, options)?;
-        let plan = Plan::new(gpu, &setup, warp, options);
+        let plan = Plan::new(gpu, volume.grid().shape, warp, options);
         let kernels = Kernels::new(gpu, change)?;
         let memory = Memory::new(gpu, volume, &setup, &plan)?;
         let mut chunks = Vec::with_capacity(plan.chunks);
@@ -78,8 +80,9 @@ impl ResamplerGpu {
             .enumerate()
             .map(|(n, tets)| RemovedChunk::new(gpu, &kernels, &memory, tets, 2 * plan.chunks + n))
             .collect::<Result<Vec<_>, _>>()?;
+        let [columns, rows, _] = volume.grid().shape;
         let bind_slab = |(number, slices)| {
-            BoundSlab::new(gpu, &kernels, &memory, number, slices, setup.slice_voxels(), plan.lists())
+            BoundSlab::new(gpu, &kernels, &memory, number, slices, columns * rows, plan.lists())
         };
         let slabs = plan.slabs.iter().enumerate().map(bind_slab).collect::<Result<Vec<_>, _>>()?;
         let Memory { grid, places, rest_places, counters, reaches, .. } = &memory;
@@ -94,10 +97,10 @@ impl ResamplerGpu {
             span_mesh: gpu.bind(&kernels.span, 0, &mesh)?,
             gpu: gpu.clone(),
             kernels,
-            grid: setup.volume_grid,
+            grid: *volume.grid(),
             slope: volume.slope(),
             intercept: volume.intercept(),
-            offset: setup.offset,
+            offset: options.offset,
             memory,
             chunks,
             removed,
@@ -109,7 +112,8 @@ impl ResamplerGpu {
         Ok(resampler)
     }
 
-    /// Resamples through these positions, local meters, one per vertex. Does not wait for the device.
+    /// Resamples through deformed positions in local meters, one per vertex. Does not wait for the
+    /// device.
     ///
     /// # Errors
     /// [`ResampleError::VertexCount`], [`ResampleError::NotFinite`], [`ResampleError::Gpu`].
@@ -127,12 +131,14 @@ impl ResamplerGpu {
         done
     }
 
-    /// Resamples through positions that lie on the device: x, y, z local meters less
-    /// [`offset`](ResamplerOptions::offset), w ignored; vertices beyond the mesh's are ignored. Nothing is read back, and the
-    /// host does not wait. A tet with a position that is not finite holds no voxel.
+    /// Resamples through positions that are on the device: x, y, z in local meters minus
+    /// [`offset`](ResamplerOptions::offset). The fourth component is ignored, and so are positions
+    /// beyond the number of vertices. Nothing is read back, and the host does not wait. A tet with
+    /// a position that is not finite holds no voxel.
     ///
     /// # Errors
-    /// [`ResampleError::VertexCount`] if there are fewer positions than vertices, [`ResampleError::Gpu`].
+    /// [`ResampleError::VertexCount`] if there are fewer positions than vertices,
+    /// [`ResampleError::Gpu`].
     pub fn resample_device(&mut self, positions: &Buffer<[f32; 4]>) -> Result<(), ResampleError> {
         if positions.len() < self.memory.rest.len() {
             return self.check_count(positions.len());
@@ -151,7 +157,7 @@ impl ResamplerGpu {
         Ok(())
     }
 
-    /// Counts of the last resampling; waits for it.
+    /// Reads the counts of the last resampling. Waits for the device.
     ///
     /// # Errors
     /// [`ResampleError::Gpu`].
@@ -162,8 +168,8 @@ impl ResamplerGpu {
         Ok(slabs.iter().map(report).fold(inverted, |a, b| a + b))
     }
 
-    /// The resampled volume, or the region of it that was asked for; waits for it. `progress(done, total)` is called for each
-    /// slab that came back.
+    /// Reads the resampled volume. Waits for the device. `progress(done, total)` is called for each
+    /// slab that was read.
     ///
     /// # Errors
     /// [`ResampleError::Gpu`].
@@ -176,7 +182,8 @@ impl ResamplerGpu {
         Ok(Volume::new(self.grid, voxels, self.slope, self.intercept)?)
     }
 
-    /// Bytes on the device, but for some hundreds for each slab and each chunk of tets.
+    /// Memory on the device in bytes, without some hundred bytes for each slab and each chunk of
+    /// tets.
     pub fn bytes(&self) -> u64 {
         let tets =
             self.chunks.iter().map(TetChunk::bytes).chain(self.removed.iter().map(RemovedChunk::bytes));
@@ -185,12 +192,13 @@ impl ResamplerGpu {
         self.memory.bytes() + tets.chain(values).sum::<u64>() + uploaded
     }
 
-    /// How many slabs the region is filled in.
+    /// Number of slabs that the volume is divided into.
     pub fn slabs(&self) -> usize {
         self.slabs.len()
     }
 
-    /// Fills a slab once more, and reads all of its state: for comparisons with the [`twin`](crate::twin).
+    /// Resamples one slab again and reads its whole state, for comparisons with a reference
+    /// implementation.
     ///
     /// # Errors
     /// [`ResampleError::NoSuchSlab`], [`ResampleError::Gpu`].
@@ -216,12 +224,12 @@ impl ResamplerGpu {
         if deformed == rest { Ok(()) } else { Err(ResampleError::VertexCount { rest, deformed }) }
     }
 
-    /// Threads for so many items; a kernel strides over the rest.
+    /// Number of threads for `items`; each thread of a kernel may process several items.
     fn threads(&self, items: usize) -> usize {
         items.min(self.gpu.chunk_len(1))
     }
 
-    /// Places at rest, and the spans of removed tets.
+    /// Computes the places at rest and the spans of the removed tets.
     fn rest(&self) -> Result<(), GpuError> {
         let Memory { grid, rest, rest_places, reaches, .. } = &self.memory;
         let Kernels { place, span_removed, .. } = &self.kernels;
@@ -240,7 +248,7 @@ impl ResamplerGpu {
         pass.submit()
     }
 
-    /// Places of the vertices, spans of the tets.
+    /// Computes the places of the vertices and the spans of the tets.
     fn place(&self, pass: &mut Pass<'_>, positions: &Buffer<[f32; 4]>) -> Result<(), GpuError> {
         let Memory { grid, rest, places, .. } = &self.memory;
         let Kernels { place, span, .. } = &self.kernels;
@@ -253,7 +261,7 @@ impl ResamplerGpu {
         Ok(())
     }
 
-    /// The passes over a slab.
+    /// Runs all passes of a slab.
     fn fill(&self, pass: &mut Pass<'_>, slab: usize) {
         let slab = &self.slabs[slab];
         let Kernels { clear, claim, vacate, gather, .. } = &self.kernels;

@@ -1,37 +1,36 @@
-//! A resampling in `f32`: what the kernels and their twin both start from.
-
-use std::ops::Range;
+//! The input of a resampling in `f32`, validated and scaled, as the kernels read it.
 
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::uniform::Grid;
+use super::uniform::GridUniform;
 use crate::sample::{scanned_range, stored_air};
 use crate::space::IndexSpace;
-use crate::warp::sub_grid;
 use crate::{ResampleError, Warp};
 
-/// Most voxels along an axis: slices are numbered in 16 bits.
-const LONGEST: usize = u16::MAX as usize;
-/// Most tets: the first bit of an owner's key says whether it holds the voxel.
-const MOST_TETS: usize = (u32::MAX >> 1) as usize;
+/// Largest number of voxels along an axis: the kernels number slices in 16 bits.
+const MAX_SIDE: usize = u16::MAX as usize;
+/// Largest number of tets: the highest bit of an owner's key is a flag.
+const MAX_TETS: usize = (u32::MAX >> 1) as usize;
+/// The tolerance as a multiple of the rounding error of the largest place: four roundings for the
+/// positions, as on the CPU, and four for the map from positions to places.
+const TOLERANCE: f32 = 8.0;
 
-/// What to resample, and how.
+/// Options of a [`ResamplerGpu`](crate::ResamplerGpu).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ResamplerOptions {
-    /// The box of voxels to fill; the whole volume if there is none.
-    pub region: Option<[Range<usize>; 3]>,
-    /// Positions on the device are local meters less this: the same `f32` subtraction for rest and deformed ones. A point in
-    /// the middle of the body serves precision best.
+    /// Positions on the device are local meters minus this offset, for rest and deformed positions
+    /// alike. A point in the middle of the body gives the best precision.
     pub offset: [f32; 3],
-    /// Slices that are filled at a time. The result does not depend on it. Without it as many as memory limits allow.
+    /// Number of slices in a slab; by default as many as memory limits allow. The result does not
+    /// depend on it.
     pub slab_slices: Option<usize>,
 }
 
 impl ResamplerOptions {
-    /// The whole volume, with positions relative to the middle of the body at rest.
-    pub fn centerd(warp: &Warp<'_>) -> Self {
+    /// Default options, with the middle of the body at rest as offset.
+    pub fn centered(warp: &Warp<'_>) -> Self {
         let widen = |(low, high): (Point3<f32>, Point3<f32>), p: &Point3<f32>| (low.inf(p), high.sup(p));
         let offset = warp.rest.first().map_or([0.0; 3], |&first| {
             let (low, high) = warp.rest.iter().fold((first, first), widen);
@@ -41,27 +40,32 @@ impl ResamplerOptions {
     }
 }
 
-/// A validated problem: the region, and where things are in `f32`.
+/// The input of the kernels: the grid and the rest positions in `f32`.
+///
+/// It is public so that a reference implementation of the kernels can start from the same numbers.
 pub struct Setup {
-    pub grid: Grid,
-    pub region: [Range<usize>; 3],
-    /// The grid of the region.
-    pub volume_grid: cutis_volume::Grid,
-    /// Rest positions less the offset; the fourth component is 0.
+    /// The volume, and the map from positions to voxels.
+    pub grid: GridUniform,
+    /// Rest positions minus the offset, in meters; the fourth component is 0.
     pub rest: Vec<[f32; 4]>,
-    pub offset: [f32; 3],
+    offset: [f32; 3],
 }
 
 impl Setup {
+    /// Validates the input and converts it to `f32`.
+    ///
+    /// # Errors
+    /// The errors of [`resample`](crate::resample), [`ResampleError::TooLarge`], and
+    /// [`ResampleError::NotFinite`] for the offset.
     pub fn new(volume: &Volume, warp: &Warp<'_>, options: &ResamplerOptions) -> Result<Self, ResampleError> {
         warp.validate()?;
         let tets = warp.tets.len().max(warp.removed.len());
-        if tets > MOST_TETS {
-            return Err(ResampleError::TooManyTets { tets, limit: MOST_TETS });
+        if tets > MAX_TETS {
+            return Err(ResampleError::TooManyTets { tets, limit: MAX_TETS });
         }
         let shape = volume.grid().shape;
-        if shape.iter().any(|&side| side > LONGEST) {
-            return Err(ResampleError::TooLarge { shape, limit: LONGEST });
+        if shape.iter().any(|&side| side > MAX_SIDE) {
+            return Err(ResampleError::TooLarge { shape, limit: MAX_SIDE });
         }
         let offset = options.offset;
         if !offset.iter().all(|c| c.is_finite()) {
@@ -71,32 +75,25 @@ impl Setup {
                 position: offset.map(f64::from),
             });
         }
-        let region = options.region.clone().unwrap_or_else(|| shape.map(|side| 0..side));
-        let volume_grid = sub_grid(volume.grid(), &region)?;
         let rest = relative(warp.rest, offset);
-        let grid = grid(volume, warp.origin_mm, &rest, offset, &region);
-        Ok(Self { grid, region, volume_grid, rest, offset })
+        let grid = grid(volume, warp.origin_mm, &rest, offset);
+        Ok(Self { grid, rest, offset })
     }
 
-    /// Voxels of a slice of the region.
-    pub fn slice_voxels(&self) -> usize {
-        self.region[0].len() * self.region[1].len()
+    /// Positions as the kernels read them: minus the offset, with 0 as fourth component.
+    pub fn positions(&self, positions: &[Point3<f32>]) -> Vec<[f32; 4]> {
+        relative(positions, self.offset)
     }
 }
 
-/// Positions as they lie on the device: less the offset, the fourth component 0.
-pub fn relative(positions: &[Point3<f32>], offset: [f32; 3]) -> Vec<[f32; 4]> {
+/// Positions minus the offset, with 0 as fourth component.
+pub(super) fn relative(positions: &[Point3<f32>], offset: [f32; 3]) -> Vec<[f32; 4]> {
     let [x, y, z] = offset;
     positions.par_iter().map(|p| [p.x - x, p.y - y, p.z - z, 0.0]).collect()
 }
 
-fn grid(
-    volume: &Volume,
-    origin_mm: Point3<f64>,
-    rest: &[[f32; 4]],
-    offset: [f32; 3],
-    region: &[Range<usize>; 3],
-) -> Grid {
+/// The grid of a volume with the map from positions to places, and the tolerance of places.
+fn grid(volume: &Volume, origin_mm: Point3<f64>, rest: &[[f32; 4]], offset: [f32; 3]) -> GridUniform {
     let shape = volume.grid().shape;
     let space = IndexSpace::new(&volume.grid().affine, origin_mm, [&[], &[]]);
     let middle = space.linear * Vector3::from(offset.map(f64::from)) + space.offset;
@@ -113,12 +110,12 @@ fn grid(
     let stretch = (0..3).map(|row| space.linear.row(row).norm()).fold(0.0, f64::max);
     let corner = (0..3).map(|axis| first[axis].abs().max(last[axis])).fold(0.0, f32::max);
     let air = stored_air(volume);
-    Grid {
+    GridUniform {
         linear,
         offset,
         tolerance: TOLERANCE * f32::EPSILON * ((body * stretch) as f32).max(corner),
-        region: std::array::from_fn(|axis| place(region[axis].start, axis)),
-        shape: region.each_ref().map(|range| range.len() as u32),
+        region: first,
+        shape: shape.map(|side| side as u32),
         first,
         last,
         center,
@@ -127,6 +124,3 @@ fn grid(
         unused: 0,
     }
 }
-
-/// The tolerance over the roundings of the largest place: four for the positions, as on the CPU, and four for the map to places.
-const TOLERANCE: f32 = 8.0;

@@ -1,34 +1,35 @@
-//! What the kernels are told, as they read it.
+//! The uniform buffers of the kernels, with the layout that WGSL expects.
 
 use bytemuck::{Pod, Zeroable};
 
-/// `struct Grid` of the kernels: the volume, the region of it that is filled, and the way from positions to places.
+/// `struct Grid` of the kernels: the volume, and the map from positions to places.
 ///
-/// A place is a voxel index relative to the voxel `center` of the volume, so that `f32` is fine near the body.
+/// A place is a voxel index relative to the voxel `center`, so that `f32` has its best resolution
+/// near the body.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Grid {
-    /// Rows of the matrix that turns positions (meters) into places (voxels).
+pub struct GridUniform {
+    /// Rows of the matrix that maps positions (meters) to places (voxels).
     pub linear: [[f32; 3]; 3],
-    /// Place of the position zero.
+    /// Place of position zero.
     pub offset: [f32; 3],
-    /// Length in voxels below which two positions cannot be told apart.
+    /// Length in voxels below which two positions cannot be distinguished.
     pub tolerance: f32,
-    /// Place of the region's first voxel.
+    /// Place of the first voxel that is filled.
     pub region: [f32; 3],
-    /// Shape of the region.
+    /// Number of voxels that are filled along each axis.
     pub shape: [u32; 3],
     /// Place of the volume's first voxel.
     pub first: [f32; 3],
-    /// Place of its last voxel.
+    /// Place of the volume's last voxel.
     pub last: [f32; 3],
     /// The voxel at place zero.
     pub center: [i32; 3],
     /// Stored value of a vacated voxel.
     pub air: i32,
-    /// Stored values that are no padding, both ends included.
+    /// Range of stored values that are not padding, both ends included.
     pub scanned: [i32; 2],
-    /// Fills the last block of 16 bytes.
+    /// Padding to a multiple of 16 bytes.
     pub unused: u32,
 }
 
@@ -36,7 +37,7 @@ pub struct Grid {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Slab {
-    /// First slice, relative to the region.
+    /// First slice.
     pub first: u32,
     /// Number of slices.
     pub slices: u32,
@@ -44,22 +45,22 @@ pub struct Slab {
     pub voxels: u32,
     /// Number of lists of large tets.
     pub lists: u32,
-    /// Where the counts of this slab begin among the counters.
+    /// Index of this slab's first counter.
     pub counts: u32,
-    /// Fills the last block of 16 bytes.
+    /// Padding to a multiple of 16 bytes.
     pub unused: [u32; 3],
 }
 
-/// `struct Chunk` of the kernels: tets that lie in one buffer.
+/// `struct Chunk` of the kernels: tets that share a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Chunk {
-    /// Number of the first tet among all.
+    /// Number of the first tet among all tets.
     pub first: u32,
     /// Number of tets.
     pub count: u32,
-    /// How many of them, the first ones, are the body's.
+    /// Number of tets that belong to the body; they come first.
     pub body: u32,
-    /// Which list of large tets is theirs.
+    /// Index of their list of large tets.
     pub list: u32,
 }

@@ -4,7 +4,7 @@
 //! differ; the contents are noise, so that a shift by a fiftieth of a voxel changes nearly all.
 
 use cutis_gpu::Gpu;
-use cutis_resample::{ResamplerGpu, ResamplerOptions, SlabState, Warp, twin};
+use cutis_resample::{ResamplerGpu, ResamplerOptions, SlabState, Warp};
 use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::{Point3, Vector3};
 
@@ -33,9 +33,9 @@ struct Scene {
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     let name = "resample: one slab";
     let scene = Scene::new()?;
-    let options = ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centerd(&scene.warp()) };
+    let options = ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centered(&scene.warp()) };
     let expected =
-        twin::resample_slab(&scene.volume, &scene.warp(), &options, NUMBER * SLAB..(NUMBER + 1) * SLAB)?;
+        cutis_resample_twin::resample_slab(&scene.volume, &scene.warp(), &options, NUMBER * SLAB..(NUMBER + 1) * SLAB)?;
     let measure = |gpu: &Gpu, policy, deformed: &[Point3<f32>]| {
         let mut resampler = ResamplerGpu::new(gpu, &scene.volume, &scene.warp(), &options)?;
         resampler.resample(deformed)?;

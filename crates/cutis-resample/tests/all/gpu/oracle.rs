@@ -1,5 +1,6 @@
-//! The resampling in `f64` by brute force, with what `f32` can make of it: for each voxel the values that it may have, and for
-//! each count the least and the most that it may be. Nothing may lie outside, not one voxel.
+//! Resampling by brute force in `f64`, with bounds for the rounding of `f32`. For each voxel it
+//! gives the allowed values, and for each count the smallest and the largest allowed value. Not a
+//! single voxel may be outside.
 
 use std::ops::RangeInclusive;
 
@@ -7,9 +8,9 @@ use cutis_resample::ResampleReport;
 use cutis_volume::Volume;
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::scenes::Scene;
+use super::scenes::Scene;
 
-/// A tet in voxel indices, and how far off `f32` may have it.
+/// A tet in voxel indices, with bounds of its `f32` errors.
 struct Tet {
     corners: [Point3<f64>; 4],
     /// Unit normals that point inwards.
@@ -18,17 +19,19 @@ struct Tet {
     heights: [f64; 4],
     /// Error of a corner's place.
     place_error: f64,
-    /// Error of a distance to each face, with the corners where they are.
+    /// Error of a distance to each face, for exact corners.
     rounding: [f64; 4],
-    /// What decides on which side of a face a point is: both errors, and the margin that `f32` allows for its own.
+    /// Total error of a distance to each face: both errors above, and the margin that the kernels
+    /// add.
     errors: [f64; 4],
-    /// False for a tet so flat, or with so distant a corner, that `f32` cannot tell its volume from zero: it may be left out,
-    /// and may hold whatever it comes near.
+    /// False if `f32` cannot distinguish the volume from zero, because the tet is too flat or a
+    /// corner too far away. Such a tet may be ignored, and may hold any voxel that it comes near.
     is_firm: bool,
 }
 
 impl Tet {
-    /// `largest` is the largest place that matters; a corner may be farther away, and is less exact then.
+    /// `largest` is the largest place in the volume. A corner may be farther away, and is less
+    /// exact then.
     fn new(corners: [Point3<f64>; 4], center: Vector3<f64>, largest: f64) -> Self {
         let place = |c: &Point3<f64>| (c.coords - center).amax();
         let place_error = PLACE_ERROR * corners.iter().map(place).fold(largest, f64::max);
@@ -58,25 +61,26 @@ impl Tet {
         std::array::from_fn(|c| (p - self.corners[FACES[c][0]]).dot(&self.normals[c]))
     }
 
-    /// True if all distances are at least `slack` and so many errors.
+    /// True if every distance is at least `slack` plus `errors` times its error.
     fn holds(&self, distances: &[f64; 4], slack: f64, errors: f64) -> bool {
         (self.is_firm || errors < 0.0) && (0..4).all(|c| distances[c] >= slack + errors * self.errors[c])
     }
 }
 
-/// Corners of the faces, each opposite the corner of its number; the first is the one it is measured from.
+/// Corners of the faces; each face is opposite the corner with its number. Distances are measured
+/// from the first corner.
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 /// One rounding of `f32`.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
-/// Error of a place over the largest one. The coefficients, the positions, the offset, the product and three sums are rounded,
-/// of up to √3 places together, and there are three axes.
+/// Relative error of a place. Coefficients, positions, the offset, the product and three sums are
+/// rounded, of terms of up to √3 places in three axes.
 const PLACE_ERROR: f64 = 21.0 * ROUNDING;
 
-/// What a scene may become.
+/// The allowed results of a scene.
 pub struct Oracle {
-    /// Intervals of the values that each voxel may have.
+    /// Intervals of the allowed values of each voxel.
     pub allowed: Vec<Vec<RangeInclusive<f64>>>,
-    /// Voxels for which there are several that do not overlap.
+    /// Number of voxels with several intervals that do not overlap.
     pub ambiguous: usize,
     least: ResampleReport,
     most: ResampleReport,
@@ -97,7 +101,7 @@ impl Oracle {
             (along().fold(f64::MIN, f64::max) + along().fold(f64::MAX, f64::min)) / 2.0
         };
         let center = Vector3::from_fn(|axis, _| middle(axis).clamp(0.0, shape[axis]));
-        // Half a voxel because the GPU's center is a voxel's.
+        // Half a voxel, because the center on the GPU is a whole voxel.
         let largest = rest
             .iter()
             .map(|p| p.coords)
@@ -187,7 +191,7 @@ impl Oracle {
         oracle
     }
 
-    /// The first voxel or count that is not allowed, in words.
+    /// Describes the first voxel or count that is not allowed. `None` if all are.
     pub fn objection(&self, volume: &Volume, report: &ResampleReport) -> Option<String> {
         for (voxel, (&value, allowed)) in volume.voxels().iter().zip(&self.allowed).enumerate() {
             if !allowed.iter().any(|range| range.contains(&f64::from(value))) {
@@ -201,7 +205,7 @@ impl Oracle {
     }
 }
 
-/// The volume with its rule of padding.
+/// The volume and its rule for padding.
 struct Sampler<'a> {
     volume: &'a Volume,
     air: f64,
@@ -215,7 +219,7 @@ impl<'a> Sampler<'a> {
         Self { volume, air }
     }
 
-    /// Adds the values around the place at rest of a point with these distances to the faces.
+    /// Adds the values around the rest position of a point with the given distances to the faces.
     fn allow(
         &self,
         tet: &Tet,
@@ -227,7 +231,7 @@ impl<'a> Sampler<'a> {
         let held: Vec<f64> = (0..4).map(|c| (distances[c] / tet.heights[c]).max(0.0)).collect();
         let sum: f64 = held.iter().sum();
         let place: Vector3<f64> = (0..4).map(|c| rest[c].coords * (held[c] / sum)).sum();
-        // Deformed → rest: how errors of the one become errors of the other.
+        // The gradient of the map from deformed to rest positions transforms errors.
         let edges =
             |corners: &[Point3<f64>; 4]| Matrix3::from_columns(&[1, 2, 3].map(|c| corners[c] - corners[0]));
         let gradient =
@@ -237,7 +241,8 @@ impl<'a> Sampler<'a> {
             + (1..4).map(|c| tet.rounding[c] / tet.heights[c] * (rest[c] - rest[0]).norm()).sum::<f64>()
             + if outside { gradient * 2.0 * tolerance } else { 0.0 };
         let change = error * self.steepness(place, error);
-        // The rule of padding jumps: it is asked on each side of where the place may be.
+        // The rule for padding is not continuous, so that it is evaluated on all sides of the
+        // position.
         for corner in 0..9 {
             let side = |axis: usize| {
                 if corner == 8 {
@@ -269,7 +274,7 @@ impl<'a> Sampler<'a> {
         Vector3::from_fn(|axis, _| p[axis].clamp(0.0, shape[axis] as f64 - 1.0))
     }
 
-    /// The trilinear value as the contract has it; and that of the voxel itself where the place may be its center.
+    /// The trilinear value, and the value of the voxel itself if the position may be its center.
     fn at(&self, p: Vector3<f64>, error: f64) -> Vec<f64> {
         let p = self.clamped(p);
         let low: [i64; 3] = std::array::from_fn(|axis| p[axis].floor() as i64);
@@ -297,7 +302,7 @@ impl<'a> Sampler<'a> {
         values
     }
 
-    /// Bound of the change of the value by a step of one voxel near a place.
+    /// Bound of the change of the value per voxel near a position.
     fn steepness(&self, p: Vector3<f64>, error: f64) -> f64 {
         let p = self.clamped(p);
         let (mut least, mut most) = (f64::MAX, f64::MIN);

@@ -1,25 +1,25 @@
-//! The GPU and its twin give the same bits on every adapter that computes as written; on any, each voxel and each count is one
-//! that `f64` allows.
+//! The GPU gives the bits of its twin on every adapter that does not fuse operations. On any
+//! adapter, each voxel and each count is allowed by the `f64` oracle.
 
-use cutis_gpu::{AdapterKind, Gpu};
+use cutis_gpu::Gpu;
 use cutis_resample::{
-    ResampleError, ResampleReport, ResamplerGpu, ResamplerOptions, SlabDifference, SlabState, resample,
-    resample_gpu, twin,
+    ResampleError, ResampleReport, ResamplerGpu, ResamplerOptions, SlabState, resample, resample_gpu,
 };
+use cutis_resample_twin as twin;
+use cutis_test_kit::gpu::{is_exact, on_each_adapter};
 use cutis_volume::{Grid, Volume};
 
-use crate::gpu;
-use crate::oracle::Oracle;
-use crate::scenes::{self, Scene};
+use super::oracle::Oracle;
+use super::scenes::{self, Scene};
 
-/// Slabs that no scene's slices fill evenly.
+/// Slices per slab; no scene is divided evenly.
 const SLAB: usize = 7;
 
 fn options(scene: &Scene) -> ResamplerOptions {
-    ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centerd(&scene.warp()) }
+    ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centered(&scene.warp()) }
 }
 
-/// State of every slab and number of inverted tets, by kernels with changed sources.
+/// The state of every slab and the number of inverted tets, with changed kernel sources.
 fn on_gpu(gpu: &Gpu, scene: &Scene, change: &dyn Fn(String) -> String) -> (Vec<SlabState>, usize) {
     let mut resampler =
         ResamplerGpu::with_sources(gpu, &scene.volume, &scene.warp(), &options(scene), change).unwrap();
@@ -39,28 +39,29 @@ fn by_twin(scene: &Scene) -> (Vec<SlabState>, usize) {
 }
 
 #[test]
-fn every_slab_is_the_twins_bit_for_bit() {
-    let Some(gpu) = gpu() else { return };
-    if gpu.adapter().kind != AdapterKind::Software {
-        eprintln!("skipped: {} may contract products and sums", gpu.adapter().name);
-        return;
-    }
-    for mut scene in scenes::all() {
-        let (found, expected) = (on_gpu(&gpu, &scene, &|source| source), by_twin(&scene));
-        assert!(found == expected, "{}", scene.name);
-        let (_, report) = resample_gpu(&gpu, &scene.volume, &scene.warp(), &|_, _| {}).unwrap();
-        let (_, of_twin) = twin::resample(&scene.volume, &scene.warp(), &options(&scene)).unwrap();
-        assert_eq!(report, of_twin, "{}", scene.name);
-
-        let extent = scene.mesh.rest.iter().fold(0.0, |most: f32, p| most.max(p.coords.amax()));
-        for p in scene.deformed.iter_mut().step_by(3) {
-            p.y += 16.0 * f32::EPSILON * extent;
+fn every_slab_has_the_bits_of_the_twin() {
+    on_each_adapter(|gpu| {
+        if !is_exact(gpu) {
+            eprintln!("skipped: {} may fuse products and sums", gpu.adapter().name);
+            return;
         }
-        assert!(by_twin(&scene) != expected, "control: {} with vertices off by 16 roundings", scene.name);
-    }
+        for mut scene in scenes::all() {
+            let (found, expected) = (on_gpu(gpu, &scene, &|source| source), by_twin(&scene));
+            assert!(found == expected, "{}", scene.name);
+            let (_, report) = resample_gpu(gpu, &scene.volume, &scene.warp(), &|_, _| {}).unwrap();
+            let (_, by_the_twin) = twin::resample(&scene.volume, &scene.warp(), &options(&scene)).unwrap();
+            assert_eq!(report, by_the_twin, "{}", scene.name);
+
+            let extent = scene.mesh.rest.iter().fold(0.0, |most: f32, p| most.max(p.coords.amax()));
+            for p in scene.deformed.iter_mut().step_by(3) {
+                p.y += 16.0 * f32::EPSILON * extent;
+            }
+            assert!(by_twin(&scene) != expected, "control: {} with vertices off by 16 roundings", scene.name);
+        }
+    });
 }
 
-/// A change of one operation each, in a part of a source that occurs once.
+/// Replacements of one operation each. The first text occurs in a source.
 const MUTATIONS: &[(&str, &str)] = &[
     ("grid.yz * p.z", "grid.zy * p.z"),
     ("any(p != rest[v].xyz)", "all(p != rest[v].xyz)"),
@@ -92,98 +93,93 @@ const MUTATIONS: &[(&str, &str)] = &[
 ];
 
 #[test]
-fn every_mutation_of_the_kernels_is_seen() {
-    let Some(gpu) = gpu() else { return };
-    if gpu.adapter().kind != AdapterKind::Software {
-        return;
-    }
-    let scenes: Vec<_> = scenes::all().into_iter().map(|scene| (by_twin(&scene), scene)).collect();
-    for (from, to) in MUTATIONS {
-        let used = std::cell::Cell::new(false);
-        let change = |source: String| {
-            used.set(used.get() || source.contains(from));
-            source.replace(from, to)
-        };
-        let seen = scenes.iter().find(|(expected, scene)| on_gpu(&gpu, scene, &change) != *expected);
-        eprintln!("{to}: {:?}", seen.map(|(_, scene)| scene.name));
-        assert!(used.get(), "no kernel has {from}");
-        assert!(seen.is_some(), "{from} → {to}");
-    }
+fn every_mutation_of_the_kernels_is_detected() {
+    on_each_adapter(|gpu| {
+        if !is_exact(gpu) {
+            return;
+        }
+        let scenes: Vec<_> = scenes::all().into_iter().map(|scene| (by_twin(&scene), scene)).collect();
+        for (from, to) in MUTATIONS {
+            let used = std::cell::Cell::new(false);
+            let change = |source: String| {
+                used.set(used.get() || source.contains(from));
+                source.replace(from, to)
+            };
+            let detected = scenes.iter().find(|(expected, scene)| on_gpu(gpu, scene, &change) != *expected);
+            eprintln!("{to}: {:?}", detected.map(|(_, scene)| scene.name));
+            assert!(used.get(), "no kernel contains {from}");
+            assert!(detected.is_some(), "{from} → {to}");
+        }
+    });
 }
 
-/// Through the twin, and through the GPU where there is one.
-fn results(gpu: Option<&Gpu>, scene: &Scene) -> Vec<(&'static str, Volume, ResampleReport)> {
-    let (volume, report) = twin::resample(&scene.volume, &scene.warp(), &options(scene)).unwrap();
-    let mut results = vec![("twin", volume, report)];
-    if let Some(gpu) = gpu {
-        let (volume, report) = resample_gpu(gpu, &scene.volume, &scene.warp(), &|_, _| {}).unwrap();
-        results.push(("GPU", volume, report));
-    }
-    results
+type Resampled = (Volume, ResampleReport);
+
+fn through_twin(scene: &Scene) -> Resampled {
+    twin::resample(&scene.volume, &scene.warp(), &options(scene)).unwrap()
 }
 
-#[test]
-fn every_voxel_and_count_is_one_that_f64_allows() {
-    let gpu = gpu();
+fn through_gpu(gpu: &Gpu, scene: &Scene) -> Resampled {
+    resample_gpu(gpu, &scene.volume, &scene.warp(), &|_, _| {}).unwrap()
+}
+
+/// Each voxel and each count must be one that `f64` allows, and vertices that are off by 0.02 mm
+/// must be detected.
+fn assert_allowed(run: impl Fn(&Scene) -> Resampled) {
     for mut scene in scenes::all() {
         let oracle = Oracle::new(&scene);
-        let voxels = scene.volume.voxels().len();
-        eprintln!("{}: {voxels} voxels, {} of them ambiguous", scene.name, oracle.ambiguous);
-        for (what, volume, report) in results(gpu.as_ref(), &scene) {
-            assert_eq!(oracle.objection(&volume, &report), None, "{what}: {}", scene.name);
-        }
+        eprintln!("{}: {} ambiguous voxels", scene.name, oracle.ambiguous);
+        let (volume, report) = run(&scene);
+        assert_eq!(oracle.objection(&volume, &report), None, "{}", scene.name);
         for p in scene.deformed.iter_mut().step_by(3) {
             p.x += 2e-5;
         }
-        for (what, volume, report) in results(gpu.as_ref(), &scene) {
-            let objection = oracle.objection(&volume, &report);
-            assert!(objection.is_some(), "control: {what}: {}, vertices off by 0.02 mm", scene.name);
-        }
+        let (volume, report) = run(&scene);
+        assert!(oracle.objection(&volume, &report).is_some(), "control: {}", scene.name);
     }
 }
 
 #[test]
-fn the_cpu_gives_the_same_but_for_roundings() {
-    let gpu = gpu();
+fn the_twin_gives_voxels_and_counts_that_f64_allows() {
+    assert_allowed(through_twin);
+}
+
+#[test]
+fn the_gpu_gives_voxels_and_counts_that_f64_allows() {
+    on_each_adapter(|gpu| assert_allowed(|scene| through_gpu(gpu, scene)));
+}
+
+/// The result differs from the CPU's by roundings only. Where `exact`, no scene has a difference of
+/// more than 1.
+fn assert_near_cpu(exact: bool, run: impl Fn(&Scene) -> Resampled) {
     for scene in scenes::near() {
-        let (of_cpu, report_of_cpu) = resample(&scene.volume, &scene.warp(), &|_, _| {}).unwrap();
+        let (on_cpu, report_on_cpu) = resample(&scene.volume, &scene.warp(), &|_, _| {}).unwrap();
         let oracle = Oracle::new(&scene);
-        assert_eq!(oracle.objection(&of_cpu, &report_of_cpu), None, "{}", scene.name);
-        for (what, volume, report) in results(gpu.as_ref(), &scene) {
-            let pairs = || volume.voxels().iter().zip(of_cpu.voxels());
-            let apart = |least| pairs().filter(|(a, b)| a.abs_diff(**b) >= least).count();
-            eprintln!("{what}: {}: {} voxels differ, {} by more than 1", scene.name, apart(1), apart(2));
-            // None does in these scenes where products and sums are not contracted.
-            let exact = gpu.as_ref().is_none_or(|gpu| gpu.adapter().kind == AdapterKind::Software);
-            assert!(apart(2) <= if exact { 0 } else { oracle.ambiguous }, "{what}: {}", scene.name);
-            if exact {
-                assert_eq!(report, report_of_cpu, "{what}: {}", scene.name);
-            }
+        assert_eq!(oracle.objection(&on_cpu, &report_on_cpu), None, "{}", scene.name);
+        let (volume, report) = run(&scene);
+        let pairs = || volume.voxels().iter().zip(on_cpu.voxels());
+        let apart = |least| pairs().filter(|(a, b)| a.abs_diff(**b) >= least).count();
+        eprintln!("{}: {} voxels differ, {} by more than 1", scene.name, apart(1), apart(2));
+        assert!(apart(2) <= if exact { 0 } else { oracle.ambiguous }, "{}", scene.name);
+        if exact {
+            assert_eq!(report, report_on_cpu, "{}", scene.name);
         }
     }
 }
 
 #[test]
-fn differences_are_told_apart() {
-    let states = by_twin(&scenes::half_at_rest()).0;
-    let same = states[0].difference(&states[0]);
-    assert_eq!(same, SlabDifference::default());
-    let mut other = states[0].clone();
-    other.owners[7] ^= 1 << 31;
-    other.values[7] += 3;
-    other.owners[9] ^= 1;
-    other.values[9] -= 5;
-    let found = states[0].difference(&other);
-    assert_eq!(found, SlabDifference { owners: 1, values: 1, largest: 3, largest_elsewhere: 5 });
+fn the_twin_differs_from_the_cpu_by_roundings_only() {
+    assert_near_cpu(true, through_twin);
 }
 
 #[test]
-fn the_twin_refuses_what_cannot_be_numbered() {
+fn the_gpu_differs_from_the_cpu_by_roundings_only() {
+    on_each_adapter(|gpu| assert_near_cpu(is_exact(gpu), |scene| through_gpu(gpu, scene)));
+}
+
+#[test]
+fn a_volume_that_is_too_long_for_the_kernels_is_refused() {
     let scene = scenes::half_at_rest();
-    let slab = |slices| twin::resample_slab(&scene.volume, &scene.warp(), &options(&scene), slices);
-    assert!(matches!(slab(5..5), Err(ResampleError::Region { .. })));
-    assert!(matches!(slab(0..20), Err(ResampleError::Region { .. })));
-    assert!(slab(18..19).is_ok(), "control");
     let grid = Grid { shape: [1, 65_536, 1], affine: scene.volume.grid().affine };
     let long = Volume::new(grid, vec![0; 65_536], 1.0, 0.0).unwrap();
     let found = twin::resample(&long, &scene.warp(), &ResamplerOptions::default()).unwrap_err();

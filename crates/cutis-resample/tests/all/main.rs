@@ -1,0 +1,7 @@
+//! Integration tests of resampling.
+
+mod bodies;
+mod errors;
+#[cfg(feature = "gpu")]
+mod gpu;
+mod identities;
