@@ -1,16 +1,21 @@
-//! Developer commands of the workspace, started by `cargo xtask`: the tests, the checks they consist of, and nothing else.
+//! Developer commands of the workspace, started by `cargo xtask`: run the tests, check the rules,
+//! count lines, pack the crates. They install nothing and change nothing outside the checkout.
 
-mod deny;
+mod default_features;
+mod examples;
 mod leaving_out;
+mod lines;
+mod miri;
 mod mutations;
 mod parity;
 mod publish;
 mod python;
 mod results;
-mod spdx;
 mod steps;
 mod tidy;
+mod tools;
 mod tuning;
+mod unsafe_files;
 mod vulkan;
 mod workspace;
 
@@ -18,17 +23,24 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use mutations::Choice;
+use steps::Selection;
 use workspace::Workspace;
 
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
-  test [--quick]      everything a change must pass; --quick leaves out the slow steps and lists them
-  ci                  the same with CI=true: nothing may be skipped, the lock files must be up to date
-  tidy                layers, file headers, unsafe, shaders, paths named in the docs, links, manifests
-  licenses            licenses, bans and sources of every dependency, by deny.toml
-  python              outputs and awkward inputs compared with nibabel and SimpleITK, a bent beam with scikit-fem
-  cantilever          a bent beam at rest and in real time compared with scikit-fem: docs/results/cantilever.md
+  test                run all tests and checks; a change must pass them
+  test --quick        run only the quick steps, and list the steps that were skipped
+  test --only STEP    run one step
+  test --list         print the names of the steps
+  ci                  as `test`, with CI=true: no test may be skipped, lock files must be current
+  tidy [--all]        check the rules of sources, manifests and pages; --all also where a rule is not
+                      in force yet
+  licenses            check licenses, bans and sources of all dependencies with cargo-deny
+  python              compare outputs with nibabel and SimpleITK, and a bent beam with scikit-fem
+  lines [--at REV]    count lines per tree and language, in the checkout or in a revision of git
+  publish --dry-run   pack every crate as for crates.io and build it from its package
+  cantilever          compare a bent beam with scikit-fem: docs/results/cantilever.md
   parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
                       lists the options, and the exit code is that of the comparison
   parity-page         the same three ways, as it is, in small chunks and at full size: docs/results/parity.md
@@ -43,8 +55,7 @@ usage: cargo xtask COMMAND
                       those that one suite of tests must see, and only its section is written
   results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
   leaving-out         what a region or a graded lattice saves and costs, against the whole body: docs/results/
-  tuning              `cutis tune` on the demo, and whether a full run keeps what it promises: docs/results/
-  publish --dry-run   packages every crate as for crates.io and builds it from the package";
+  tuning              `cutis tune` on the demo, and whether a full run keeps what it promises: docs/results/";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -61,11 +72,19 @@ fn main() -> ExitCode {
 fn dispatch(words: &[&str]) -> Result<ExitCode> {
     let workspace = Workspace::find()?;
     match words {
-        ["test"] => steps::run_all(&workspace, false),
-        ["test", "--quick"] => steps::run_all(&workspace, true),
-        ["ci"] => steps::run_all(&workspace.in_ci(), false),
+        ["test"] => steps::run_all(&workspace, Selection::All),
+        ["test", "--quick"] => steps::run_all(&workspace, Selection::Quick),
+        ["test", "--list"] => {
+            println!("{}", steps::names().join("\n"));
+            Ok(())
+        }
+        ["test", "--only", step] => steps::run_all(&workspace, Selection::Only(step)),
+        ["ci"] => steps::run_all(&workspace.in_ci(), Selection::All),
         ["tidy"] => tidy::run(&workspace),
-        ["licenses"] => deny::run(&workspace),
+        ["tidy", "--all"] => tidy::check(&workspace, true),
+        ["licenses"] => steps::run_all(&workspace, Selection::Only("licenses")),
+        ["lines"] => lines::run(&workspace, None),
+        ["lines", "--at", revision] => lines::run(&workspace, Some(revision)),
         ["python"] => steps::build_for_python(&workspace).and_then(|()| python::run(&workspace)),
         ["cantilever"] => steps::cantilever(&workspace),
         ["parity", arguments @ ..] => {
@@ -89,7 +108,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["tuning"] => steps::build_program(&workspace).and_then(|()| tuning::run(&workspace)),
         ["publish", "--dry-run"] => publish::dry_run(&workspace),
         ["publish"] => bail!(
-            "only `cargo xtask publish --dry-run` is offered; a release is made by `cargo publish --workspace`"
+            "`cargo xtask` only offers `publish --dry-run`; make a release with `cargo publish --workspace`"
         ),
         [] | ["help" | "--help" | "-h"] => {
             println!("{USAGE}");

@@ -1,4 +1,4 @@
-//! The steps of `cargo xtask test`, in order, each timed; the first failure ends the run.
+//! The steps of `cargo xtask test`, in order and timed. The first failure ends the run.
 
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 
 use crate::workspace::{Workspace, execute};
-use crate::{deny, publish, python, tidy, vulkan};
+use crate::{default_features, examples, miri, publish, python, tidy, tools, vulkan};
 
 struct Step {
     name: &'static str,
@@ -16,81 +16,111 @@ struct Step {
 }
 
 const STEPS: &[Step] = &[
-    Step { name: "tools", quick: true, run: tools },
     Step { name: "format", quick: true, run: format },
     Step { name: "tidy", quick: true, run: tidy::run },
-    Step { name: "licenses", quick: true, run: deny::run },
+    Step { name: "licenses", quick: true, run: licenses },
     Step { name: "xtask", quick: true, run: xtask },
     Step { name: "clippy", quick: true, run: clippy },
     Step { name: "tests", quick: true, run: tests },
+    Step { name: "examples", quick: false, run: examples::run },
+    Step { name: "no-default-features", quick: false, run: default_features::run },
     Step { name: "third-party", quick: false, run: third_party },
     Step { name: "parity", quick: false, run: parity },
+    Step { name: "miri", quick: false, run: miri::run },
     Step { name: "documentation", quick: false, run: documentation },
     Step { name: "program", quick: false, run: build_program },
     Step { name: "python", quick: false, run: python::run },
-    Step { name: "publish --dry-run", quick: false, run: publish::dry_run },
+    Step { name: "publish", quick: false, run: publish::dry_run },
 ];
 
-/// Runs every step, or with `quick` the quick ones; prints what was run, how long it took and what was left out.
-pub fn run_all(workspace: &Workspace, quick: bool) -> Result<()> {
-    if quick && workspace.ci {
-        bail!("`--quick` leaves steps out, and CI is set: run `cargo xtask test`");
-    }
-    let start = Instant::now();
-    let mut outcomes = Vec::new();
-    let mut failure = None;
-    for (number, step) in STEPS.iter().enumerate() {
-        if failure.is_some() {
-            outcomes.push((step.name, "not reached", None));
-        } else if quick && !step.quick {
-            outcomes.push((step.name, "left out by --quick", None));
-        } else {
-            println!("\n=== {}/{} {}", number + 1, STEPS.len(), step.name);
-            let step_start = Instant::now();
-            let result = (step.run)(workspace).with_context(|| format!("step `{}` failed", step.name));
-            outcomes.push((
-                step.name,
-                if result.is_ok() { "passed" } else { "FAILED" },
-                Some(step_start.elapsed()),
-            ));
-            println!("=== {} took {:.1} s", step.name, step_start.elapsed().as_secs_f64());
-            failure = result.err();
+/// Which steps to run.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Selection<'a> {
+    All,
+    Quick,
+    Only(&'a str),
+}
+
+impl Selection<'_> {
+    fn includes(self, step: &Step) -> bool {
+        match self {
+            Self::All => true,
+            Self::Quick => step.quick,
+            Self::Only(name) => step.name == name,
         }
     }
-    print!("\n{}", summary(&outcomes, start.elapsed()));
+}
+
+/// The names of all steps, in order.
+pub fn names() -> Vec<&'static str> {
+    STEPS.iter().map(|step| step.name).collect()
+}
+
+/// Runs the selected steps and prints the result and the time of each.
+///
+/// # Errors
+/// A tool is missing, a step failed, or the selection is not valid.
+pub fn run_all(workspace: &Workspace, selection: Selection<'_>) -> Result<()> {
+    match selection {
+        Selection::Quick if workspace.ci => {
+            bail!("`--quick` skips steps, and CI is set: run `cargo xtask test`")
+        }
+        Selection::Only(name) if !names().contains(&name) => {
+            bail!("there is no step `{name}`; the steps are {}", names().join(", "))
+        }
+        Selection::Only(_) => {}
+        Selection::All | Selection::Quick => tools::require(workspace, selection == Selection::All)?,
+    }
+    let start = Instant::now();
+    let mut results = Vec::new();
+    let mut failure = None;
+    for (number, step) in STEPS.iter().enumerate().filter(|(_, step)| selection.includes(step)) {
+        if failure.is_some() {
+            results.push((step.name, "not reached", None));
+            continue;
+        }
+        println!("\n=== {}/{} {}", number + 1, STEPS.len(), step.name);
+        let step_start = Instant::now();
+        let result = (step.run)(workspace).with_context(|| format!("step `{}` failed", step.name));
+        let time = step_start.elapsed();
+        results.push((step.name, if result.is_ok() { "passed" } else { "FAILED" }, Some(time)));
+        println!("=== {} took {:.1} s", step.name, time.as_secs_f64());
+        failure = result.err();
+    }
+    if selection == Selection::Quick {
+        results.extend(
+            STEPS.iter().filter(|step| !step.quick).map(|step| (step.name, "skipped by --quick", None)),
+        );
+    }
+    print!("\n{}", summary(&results, start.elapsed()));
     failure.map_or(Ok(()), Err)
 }
 
-fn summary(outcomes: &[(&str, &str, Option<Duration>)], total: Duration) -> String {
+fn summary(results: &[(&str, &str, Option<Duration>)], total: Duration) -> String {
     let mut table = String::new();
-    for (name, outcome, time) in outcomes {
+    for (name, result, time) in results {
         let time = time.map_or_else(String::new, |time| format!("{:8.1} s", time.as_secs_f64()));
-        table += format!("{name:<20}{outcome:<22}{time}").trim_end();
+        table += format!("{name:<22}{result:<22}{time}").trim_end();
         table.push('\n');
     }
-    table + &format!("{:<20}{:<22}{:8.1} s\n", "total", "", total.as_secs_f64())
-}
-
-/// Everything that later steps need, asked for before the long ones begin.
-fn tools(workspace: &Workspace) -> Result<()> {
-    for (subcommand, component) in [("fmt", "rustfmt"), ("clippy", "clippy")] {
-        let found = workspace
-            .command(workspace.cargo(subcommand).get_program())
-            .args([subcommand, "--version"])
-            .output();
-        if !found.is_ok_and(|output| output.status.success()) {
-            bail!("`cargo {subcommand}` is missing; install it with `rustup component add {component}`");
-        }
-    }
-    let python = python::require(workspace)?;
-    let adapters = vulkan::require(workspace)?;
-    println!("rustfmt, clippy and {python} are there; adapters for GPU tests: {adapters}");
-    Ok(())
+    table + &format!("{:<22}{:<22}{:8.1} s\n", "total", "", total.as_secs_f64())
 }
 
 fn format(workspace: &Workspace) -> Result<()> {
     for manifest in workspace.manifests() {
         execute(workspace.cargo("fmt").arg("--manifest-path").arg(manifest).args(["--all", "--check"]))?;
+    }
+    Ok(())
+}
+
+/// Checks `deny.toml` against the dependencies of every workspace. Advisories need a database from
+/// the network and are not part of the tests.
+fn licenses(workspace: &Workspace) -> Result<()> {
+    tools::require_cargo_deny(workspace)?;
+    for manifest in workspace.manifests() {
+        let mut command = workspace.cargo("deny");
+        command.arg("--manifest-path").arg(manifest).args(["check", "--config", "deny.toml"]);
+        execute(command.args(["--hide-inclusion-graph", "bans", "licenses", "sources"]))?;
     }
     Ok(())
 }
@@ -119,8 +149,8 @@ fn tests(workspace: &Workspace) -> Result<()> {
     execute(vulkan::for_gpu_tests(workspace.cargo("test").args(["--workspace", "--no-fail-fast"])))
 }
 
-/// The crate that adds constraints from outside, as a user's would. It shares the folder of builds: what does not differ
-/// is not built again.
+/// The crate that adds constraints from outside, as a user's crate would. It shares the build folder
+/// of the workspace, so that cargo builds common dependencies only once.
 fn third_party(workspace: &Workspace) -> Result<()> {
     let (manifest, target) = (workspace.third_party_manifest(), workspace.target_dir()?);
     let cargo = |subcommand: &str| {
@@ -167,9 +197,9 @@ fn released(workspace: &Workspace, program: &str, arguments: &[&str]) -> Command
     command
 }
 
-/// Runs the program that the step `tests` has built. `cargo run` would build it once more, since the features of shared
-/// dependencies differ from those of the whole workspace. Once as the device is, and once in small chunks within the limits
-/// that any device has.
+/// Compares the backends: once with the limits of the device, and once in small chunks with the limits
+/// that every device has. It runs the program that the step `tests` has built. `cargo run` would build
+/// the program again, because its dependencies have other features than in the whole workspace.
 fn parity(workspace: &Workspace) -> Result<()> {
     for arguments in [&["--quick"][..], &["--quick", "--chunk-cap", "200", "--baseline-limits"]] {
         execute(vulkan::for_gpu_tests(workspace.command(workspace.parity()?).args(arguments)))?;
@@ -177,13 +207,13 @@ fn parity(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
-/// Libraries only: the program `cutis` and the crate `cutis` would write the same page.
+/// Only libraries, because the program `cutis` and the crate `cutis` would write the same page.
 fn documentation(workspace: &Workspace) -> Result<()> {
     let mut command = workspace.cargo("doc");
     execute(command.args(["--workspace", "--lib", "--no-deps", "--quiet"]).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Builds what the Python checks run: the release program, and the one that bends beams.
+/// Builds the programs that the Python checks run.
 pub fn build_for_python(workspace: &Workspace) -> Result<()> {
     build_program(workspace)?;
     build_cantilever(workspace, &[])
@@ -226,6 +256,22 @@ mod tests {
     #[test]
     fn quick_is_refused_in_ci() {
         let workspace = Workspace { root: ".".into(), ci: true };
-        assert!(run_all(&workspace, true).unwrap_err().to_string().contains("--quick"));
+        let error = run_all(&workspace, Selection::Quick).unwrap_err().to_string();
+        assert!(error.contains("--quick"), "{error}");
+    }
+
+    #[test]
+    fn an_unknown_step_is_an_error_that_names_the_steps() {
+        let workspace = Workspace { root: ".".into(), ci: false };
+        let error = run_all(&workspace, Selection::Only("test")).unwrap_err().to_string();
+        assert!(names().iter().all(|name| error.contains(name)), "{error}");
+    }
+
+    #[test]
+    fn a_selection_includes_its_steps() {
+        let count = |selection: Selection<'_>| STEPS.iter().filter(|step| selection.includes(step)).count();
+        assert_eq!(count(Selection::All), STEPS.len());
+        assert_eq!(count(Selection::Only("miri")), 1);
+        assert!((2..STEPS.len()).contains(&count(Selection::Quick)));
     }
 }

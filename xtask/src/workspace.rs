@@ -21,8 +21,6 @@ pub enum Scope {
     Members,
     /// Those and all that they resolve to with their default features.
     Dependencies,
-    /// Those and all that they resolve to with any feature.
-    AllDependencies,
 }
 
 impl Workspace {
@@ -65,16 +63,21 @@ impl Workspace {
         command
     }
 
+    /// The cargo that started this program.
+    pub fn cargo_program() -> OsString {
+        std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
+    }
+
     /// `cargo SUBCOMMAND`, with `--locked` in CI where the subcommand resolves dependencies.
     pub fn cargo(&self, subcommand: &str) -> Command {
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut command = self.command(cargo);
+        let mut command = self.command(Self::cargo_program());
         command.arg(subcommand);
         if self.ci && subcommand != "fmt" {
             command.arg("--locked");
         }
         if self.ci {
-            command.env("CARGO_INCREMENTAL", "0"); // nothing is built twice: what incremental builds keep only costs time
+            // CI builds everything once, so that the files of incremental builds only cost time.
+            command.env("CARGO_INCREMENTAL", "0");
         }
         command
     }
@@ -86,7 +89,6 @@ impl Workspace {
         command.args(match scope {
             Scope::Members => Some("--no-deps"),
             Scope::Dependencies => None,
-            Scope::AllDependencies => Some("--all-features"),
         });
         let output = command.output().context("cannot start cargo")?;
         if !output.status.success() {

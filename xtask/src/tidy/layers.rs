@@ -1,4 +1,4 @@
-//! The layers of the workspace: a crate depends only on crates of lower layers, and only on those named for it.
+//! The layers of the workspace: a crate depends only on crates of lower layers that its row names.
 
 use anyhow::{Context, Result};
 use serde_json::Value;
@@ -12,7 +12,7 @@ struct Layer {
     may_use: MayUse,
 }
 
-/// Which crates of lower layers a crate may depend on.
+/// The crates of lower layers that a crate may depend on.
 enum MayUse {
     These(&'static [&'static str]),
     AnyBelow,
@@ -78,17 +78,22 @@ const LAYERS: &[Layer] = &[
     Layer { name: "cutis-cli", level: 6, may_use: AnyBelow },
 ];
 
-/// Tests, studies and their kit: they may use any crate, no product crate depends on them except for
-/// its own tests, and they are not published.
-const UNPUBLISHED: &[&str] = &["cutis-resample-twin", "cutis-studies", "cutis-test-kit", "cutis-tests"];
+/// The test kit. Product crates may use it for their own tests.
+const TEST_KIT: &str = "cutis-test-kit";
 
-/// What the rule looks at of a workspace member.
+/// Tests, studies and their kit. They may use any crate, no product crate depends on them, and they
+/// are not published.
+const UNPUBLISHED: &[&str] = &["cutis-resample-twin", "cutis-studies", TEST_KIT, "cutis-tests"];
+
+/// The facts about a workspace member that the rule needs.
 #[derive(Debug)]
 pub struct Package {
     name: String,
     publish: bool,
     /// Names of normal and build dependencies.
     dependencies: Vec<String>,
+    /// Names of the dependencies of its tests, examples and benchmarks.
+    dev_dependencies: Vec<String>,
 }
 
 impl Package {
@@ -106,18 +111,21 @@ pub fn packages(metadata: &Value) -> Result<Vec<Package>> {
         .map(|package| {
             let dependencies =
                 package["dependencies"].as_array().context("a package without dependencies")?;
-            let dependencies = dependencies
-                .iter()
-                .filter(|dependency| dependency["kind"] != "dev")
-                .filter_map(|dependency| dependency["name"].as_str().map(str::to_owned))
-                .collect();
-            let name = package["name"].as_str().context("a package without a name")?.to_owned();
-            Ok(Package { name, publish: package["publish"] != Value::Array(Vec::new()), dependencies })
+            let names = |dev: bool| {
+                let of_kind = dependencies.iter().filter(|dependency| (dependency["kind"] == "dev") == dev);
+                of_kind.filter_map(|dependency| dependency["name"].as_str().map(str::to_owned)).collect()
+            };
+            Ok(Package {
+                name: package["name"].as_str().context("a package without a name")?.to_owned(),
+                publish: package["publish"] != Value::Array(Vec::new()),
+                dependencies: names(false),
+                dev_dependencies: names(true),
+            })
         })
         .collect()
 }
 
-/// Every arrow that does not point down, every crate without a row, every row without a crate.
+/// Finds arrows that do not point down, crates without a row, and rows without a crate.
 pub fn check(packages: &[Package]) -> Vec<Finding> {
     let mut findings = Vec::new();
     for package in
@@ -135,6 +143,12 @@ pub fn check(packages: &[Package]) -> Vec<Finding> {
                 && let Some(complaint) = complaint(from, dependency)
             {
                 findings.push(Finding::failure(&package.name, 0, complaint));
+            }
+        }
+        for dependency in &package.dev_dependencies {
+            if UNPUBLISHED.contains(&dependency.as_str()) && dependency != TEST_KIT {
+                let message = format!("the tests use `{dependency}`; only `{TEST_KIT}` is for all crates");
+                findings.push(Finding::failure(&package.name, 0, message));
             }
         }
     }
@@ -175,7 +189,7 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    /// The whole table without dependencies, but for `name`'s.
+    /// The crates of the table. Only `name` has dependencies.
     fn with(name: &str, dependencies: &[&str]) -> Vec<Package> {
         let dependencies: Vec<String> =
             dependencies.iter().map(|&dependency| dependency.to_owned()).collect();
@@ -185,6 +199,7 @@ mod tests {
                 name: member.to_owned(),
                 publish: true,
                 dependencies: if member == name { dependencies.clone() } else { Vec::new() },
+                dev_dependencies: Vec::new(),
             })
             .collect()
     }
@@ -229,12 +244,32 @@ mod tests {
     }
 
     #[test]
-    fn none_may_use_the_tests_and_they_stay_unpublished() {
+    fn only_tests_may_use_the_test_kit() {
+        let mut packages = with("cutis-mesh", &[]);
+        let mesh = packages.iter().position(|package| package.name == "cutis-mesh").unwrap();
+        packages.push(Package {
+            name: TEST_KIT.to_owned(),
+            publish: false,
+            dependencies: Vec::new(),
+            dev_dependencies: Vec::new(),
+        });
+        packages[mesh].dev_dependencies = vec![TEST_KIT.to_owned()];
+        assert_eq!(check(&packages), []);
+        packages[mesh].dev_dependencies = vec!["cutis-studies".to_owned()];
+        assert_eq!(check(&packages).len(), 1);
+        packages[mesh].dev_dependencies.clear();
+        packages[mesh].dependencies = vec![TEST_KIT.to_owned()];
+        assert_eq!(check(&packages).len(), 1);
+    }
+
+    #[test]
+    fn no_product_crate_uses_unpublished_crates() {
         let mut packages = with("cutis", &[UNPUBLISHED[0]]);
         packages.push(Package {
             name: UNPUBLISHED[0].to_owned(),
             publish: false,
             dependencies: vec!["cutis".to_owned()],
+            dev_dependencies: Vec::new(),
         });
         assert_eq!(check(&packages).len(), 1);
         packages.last_mut().unwrap().publish = true;
@@ -242,12 +277,13 @@ mod tests {
     }
 
     #[test]
-    fn build_dependencies_count_and_dev_dependencies_do_not() {
+    fn dev_dependencies_are_kept_apart() {
         let metadata = json!({ "packages": [{ "name": "a", "publish": null, "dependencies": [
             { "name": "normal", "kind": null }, { "name": "build", "kind": "build" }, { "name": "dev", "kind": "dev" }
         ] }] });
         let packages = packages(&metadata).unwrap();
         assert_eq!(packages[0].dependencies, ["normal", "build"]);
+        assert_eq!(packages[0].dev_dependencies, ["dev"]);
         assert!(packages[0].publish);
     }
 }

@@ -2,17 +2,11 @@
 
 use super::Finding;
 use super::source::{Line, Source};
+use crate::unsafe_files;
 
 /// Every rule about sources.
 pub const ALL: &[fn(&Source) -> Vec<Finding>] =
     &[begins_with_title, unsafe_is_listed_and_explained, no_leftovers, nothing_ignored, not_too_long];
-
-/// The only files that may hold `unsafe`.
-const UNSAFE_ALLOWED: &[&str] = &[
-    "crates/cutis-solver/src/colored.rs", // proves that no two threads touch one vertex
-    "crates/cutis-chainmail/src/simd.rs", // asks the processor which instructions it has
-    "crates/cutis-solver-cpu/tests/allocations.rs", // an allocator that counts
-];
 
 /// Beyond this many lines a file is listed.
 const LONG: usize = 400;
@@ -38,7 +32,7 @@ fn unsafe_is_listed_and_explained(source: &Source) -> Vec<Finding> {
         if !has_word(&line.code, "unsafe") {
             continue;
         }
-        if !UNSAFE_ALLOWED.contains(&source.path.as_str()) {
+        if !unsafe_files::is_allowed(&source.path) {
             findings.push(Finding::failure(
                 &source.path,
                 index + 1,
@@ -164,6 +158,7 @@ fn positions<'a>(text: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unsafe_files::UNSAFE_FILES;
 
     fn count(rule: fn(&Source) -> Vec<Finding>, path: &str, text: &str) -> usize {
         rule(&Source::parse(path, text)).len()
@@ -180,7 +175,7 @@ mod tests {
     #[test]
     fn unlisted_unsafe_is_caught() {
         let text = "// SAFETY: indices of a color are disjoint.\nunsafe { f() }\n";
-        assert_eq!(count(unsafe_is_listed_and_explained, UNSAFE_ALLOWED[0], text), 0);
+        assert_eq!(count(unsafe_is_listed_and_explained, UNSAFE_FILES[0].path, text), 0);
         assert_eq!(count(unsafe_is_listed_and_explained, "crates/cutis/src/lib.rs", text), 1);
         let harmless = "#![forbid(unsafe_code)] // unsafe\nlet a = \"unsafe\";\n";
         assert_eq!(count(unsafe_is_listed_and_explained, "crates/cutis/src/lib.rs", harmless), 0);
@@ -197,7 +192,7 @@ mod tests {
             ("// SAFETY: of another statement.\ng();\nunsafe { f() }\n", 1),
             ("// SAFETY: too far away.\n\nunsafe { f() }\n", 1),
         ] {
-            assert_eq!(count(unsafe_is_listed_and_explained, UNSAFE_ALLOWED[0], text), findings, "{text}");
+            assert_eq!(count(unsafe_is_listed_and_explained, UNSAFE_FILES[0].path, text), findings, "{text}");
         }
     }
 

@@ -1,5 +1,5 @@
-//! A source in Rust or WGSL split into code and comments, line by line, with the contents of literals removed: enough to look
-//! for words without mistaking a string or a comment for code.
+//! Splits a source in Rust or WGSL into code, comments and literals, line by line. Rules then never
+//! take a string or a comment for code.
 
 /// One source file.
 pub struct Source {
@@ -9,17 +9,19 @@ pub struct Source {
     pub lines: Vec<Line>,
 }
 
-/// One line of a source, taken apart.
+/// The parts of one line of a source.
 #[derive(Debug, Default, PartialEq)]
 pub struct Line {
     /// The code, without comments; string and character literals are empty.
     pub code: String,
     /// The comments, with their slashes.
     pub comment: String,
+    /// The literals, with their quotes.
+    pub literals: String,
 }
 
 impl Source {
-    /// Takes a text apart. Text that is not Rust gives some split, never a panic.
+    /// Splits a text. Text that is not Rust gives some split, but never a panic.
     pub fn parse(path: &str, text: &str) -> Self {
         let mut scanner = Scanner { rest: text, lines: vec![Line::default()] };
         while !scanner.rest.is_empty() {
@@ -48,7 +50,7 @@ impl<'a> Scanner<'a> {
         self.lines.last_mut().expect("starts with one line and only grows")
     }
 
-    /// Hands each piece of `text` between line breaks to `keep`, and starts a line at each break.
+    /// Calls `keep` with each piece of `text` between line breaks, and starts a line at each break.
     fn put(&mut self, text: &str, keep: fn(&mut Line, &str)) {
         for (number, piece) in text.split('\n').enumerate() {
             if number > 0 {
@@ -69,7 +71,7 @@ impl<'a> Scanner<'a> {
         } else if let Some(length) = literal(rest, self.line().code.chars().last()) {
             let text = self.take(length);
             self.line().code += "\"\"";
-            self.put(text, |_, _| {});
+            self.put(text, |line, text| line.literals += text);
         } else {
             let length = rest.chars().next().map_or(1, char::len_utf8);
             let text = self.take(length);
@@ -78,7 +80,7 @@ impl<'a> Scanner<'a> {
     }
 }
 
-/// Length of the block comment, nested ones included, that `text` begins with.
+/// Length of the block comment at the start of `text`, with the comments inside it.
 fn block_comment(text: &str) -> usize {
     let mut depth = 0_usize;
     let mut position = 0;
@@ -100,8 +102,8 @@ fn block_comment(text: &str) -> usize {
     text.len()
 }
 
-/// Length of the string or character literal that `text` begins with; a prefix such as `r#` counts only where no
-/// identifier ends just before it.
+/// Length of the string or character literal at the start of `text`. A prefix such as `r#` counts only
+/// where no identifier ends just before it.
 fn literal(text: &str, before: Option<char>) -> Option<usize> {
     let in_word = before.is_some_and(|character| character.is_alphanumeric() || character == '_');
     let prefixes: &[&str] = if in_word { &[] } else { &["br", "cr", "b", "c", "r"] };
@@ -135,7 +137,7 @@ fn quote_follows(text: &str, prefix: &str) -> bool {
     rest.starts_with('"') || (prefix == "b" && rest.starts_with('\''))
 }
 
-/// Length up to and with the unescaped `quote` after the first byte.
+/// Length up to and including the unescaped `quote` after the first byte.
 fn escaped_until(text: &str, quote: u8) -> usize {
     let mut escaped = false;
     for (position, byte) in text.bytes().enumerate().skip(1) {
@@ -183,8 +185,16 @@ mod tests {
     #[test]
     fn comments_are_kept() {
         let lines = Source::parse("x.rs", "//! Title.\nlet a; // note").lines;
-        assert_eq!(lines[0], Line { code: String::new(), comment: "//! Title.".to_owned() });
+        assert_eq!(lines[0], Line { comment: "//! Title.".to_owned(), ..Line::default() });
         assert_eq!(lines[1].comment, "// note");
+    }
+
+    #[test]
+    fn literals_are_kept() {
+        let lines = Source::parse("x.rs", "f(\"a // b\", 'c'); // \"d\"\ng(r#\"e\nf\"#);").lines;
+        assert_eq!(lines[0].literals, "\"a // b\"'c'");
+        assert_eq!(lines[1].literals, "r#\"e");
+        assert_eq!(lines[2].literals, "f\"#");
     }
 
     #[test]

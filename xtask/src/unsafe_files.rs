@@ -1,0 +1,65 @@
+//! The files that may hold `unsafe` code, and the tests that run them under Miri.
+
+/// A file with `unsafe` code.
+pub struct UnsafeFile {
+    /// Path from the root of the checkout.
+    pub path: &'static str,
+    /// Why the file needs `unsafe`. `None` in `tests` must be explained here, too.
+    pub reason: &'static str,
+    /// Tests for Miri.
+    pub tests: Option<Tests>,
+}
+
+/// Unit tests of one package.
+pub struct Tests {
+    pub package: &'static str,
+    /// The tests whose names contain this text.
+    pub filter: &'static str,
+    /// Instructions that Miri must offer beyond those of every processor.
+    pub target_features: &'static str,
+}
+
+/// `tidy` refuses `unsafe` in every other file.
+pub const UNSAFE_FILES: &[UnsafeFile] = &[
+    UnsafeFile {
+        path: "crates/cutis-solver/src/colored.rs",
+        reason: "threads move the vertices of one color at the same time",
+        tests: Some(Tests { package: "cutis-solver", filter: "colored::", target_features: "" }),
+    },
+    UnsafeFile {
+        path: "crates/cutis-chainmail/src/simd.rs",
+        reason: "calls functions for vector units that only some processors have",
+        tests: Some(Tests { package: "cutis-chainmail", filter: "wide::", target_features: "+avx2" }),
+    },
+    UnsafeFile {
+        path: "crates/cutis-solver-cpu/tests/allocations.rs",
+        reason: "an allocator that counts; it only forwards to the allocator of the system, so Miri has nothing to check",
+        tests: None,
+    },
+];
+
+/// Whether the file may hold `unsafe` code.
+pub fn is_allowed(path: &str) -> bool {
+    UNSAFE_FILES.iter().any(|file| file.path == path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_exists_and_says_why() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        for file in UNSAFE_FILES {
+            assert!(root.join(file.path).is_file(), "{} does not exist", file.path);
+            assert!(!file.reason.is_empty());
+        }
+    }
+
+    #[test]
+    fn product_code_with_unsafe_has_tests_for_miri() {
+        for file in UNSAFE_FILES.iter().filter(|file| file.path.contains("/src/")) {
+            assert!(file.tests.is_some(), "{}", file.path);
+        }
+    }
+}
