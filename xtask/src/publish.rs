@@ -1,127 +1,131 @@
-//! `cargo xtask publish --dry-run`: packages every publishable crate and builds each from its package.
+//! `cargo xtask publish --dry-run`: packs every publishable crate and compiles each from its
+//! package.
+//!
+//! `cargo publish --dry-run` can compile packages, too, but it unpacks them into cargo's home
+//! folder and takes the packages of an earlier run for the same, because name and version are the
+//! same. So this module unpacks them into the target folder and compiles them there.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
 
 use crate::workspace::{Scope, Workspace, execute};
 
-/// Outside CI a dirty checkout is allowed.
-pub fn dry_run(workspace: &Workspace) -> Result<()> {
-    if let Some(home) = cargo_home() {
-        forget_unpacked(&home, &packages(workspace)?)?;
+/// Name and version of a crate.
+struct Package {
+    name: String,
+    version: String,
+}
+
+impl Package {
+    fn folder(&self) -> String {
+        format!("{}-{}", self.name, self.version)
     }
-    forget_built(&workspace.target_dir()?.join("debug"))?;
-    let mut command = workspace.cargo("publish");
-    // Nothing of what is built is run: debug information would be a quarter of the time.
-    command.args(["--workspace", "--dry-run", "--quiet"]).env("CARGO_PROFILE_DEV_DEBUG", "false");
+}
+
+/// Packs and compiles. Outside CI the checkout may have changes that are not committed.
+pub fn dry_run(workspace: &Workspace) -> Result<()> {
+    let target = workspace.target_dir()?;
+    let root = workspace.root.join("Cargo.toml");
+    let packages = publishable(&workspace.metadata(&root, Scope::Members)?)?;
+    let mut command = workspace.cargo("package");
+    command.args(["--no-verify", "--quiet"]);
+    command.args(packages.iter().flat_map(|package| ["--package", package.name.as_str()]));
     if !workspace.ci {
         command.arg("--allow-dirty");
     }
-    execute(&mut command)
-}
+    execute(&mut command)?;
 
-/// Part of the path of a source that was unpacked from a registry in a folder: its name begins with a dash, since a path has no
-/// host.
-const TRIAL: &str = "/registry/src/-";
-
-/// Removes what cargo unpacked of these packages in earlier trials.
-///
-/// A trial packs the crates into a registry in the target folder and unpacks them from there into cargo's home, where it takes
-/// a package of the same name and version for the same: the next trial would build against the sources of the last one.
-fn forget_unpacked(home: &Path, packages: &[String]) -> Result<()> {
-    let Ok(registries) = fs::read_dir(home.join("registry/src")) else { return Ok(()) };
-    for registry in registries {
-        let registry = registry?;
-        if !registry.file_name().to_string_lossy().starts_with('-') {
-            continue;
-        }
-        for package in packages {
-            let folder = registry.path().join(package);
-            if folder.is_dir() {
-                fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
-            }
-        }
+    let folder = target.join("unpacked-packages");
+    unpack(workspace, &packages, &target.join("package"), &folder)?;
+    let manifest = folder.join("Cargo.toml");
+    let root_manifest = fs::read_to_string(&root).context("Cargo.toml")?;
+    fs::write(&manifest, workspace_manifest(&packages, &root_manifest)?)?;
+    fs::copy(workspace.root.join("Cargo.lock"), folder.join("Cargo.lock")).context("Cargo.lock")?;
+    for package in &packages {
+        // Without `--locked`: cargo removes the unpublished crates from the copy of the lock file.
+        let mut command = workspace.command(Workspace::cargo_program());
+        command.args(["check", "--quiet", "--package", &package.name, "--manifest-path"]).arg(&manifest);
+        execute(command.env("CARGO_TARGET_DIR", &target))?;
     }
+    println!("{} crates compile from their packages", packages.len());
     Ok(())
 }
 
-/// Makes cargo build again what it built in earlier trials: for it, a package from a registry never changes.
-fn forget_built(profile: &Path) -> Result<()> {
-    let Ok(files) = fs::read_dir(profile.join("deps")) else { return Ok(()) };
-    for file in files {
-        let path = file?.path();
-        let Some(stem) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
-        if path.extension() != Some("d".as_ref()) || !stem.starts_with("cutis_") {
-            continue;
-        }
-        let inputs = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        if inputs.replace('\\', "/").contains(TRIAL) {
-            let fingerprint = profile.join(".fingerprint").join(stem.replace('_', "-"));
-            if fingerprint.is_dir() {
-                fs::remove_dir_all(&fingerprint).with_context(|| fingerprint.display().to_string())?;
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Name and version of each member, joined by a dash.
-fn packages(workspace: &Workspace) -> Result<Vec<String>> {
-    let metadata = workspace.metadata(&workspace.root.join("Cargo.toml"), Scope::Members)?;
+/// The members of the workspace without `publish = false`.
+fn publishable(metadata: &Value) -> Result<Vec<Package>> {
     let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
-    let name = |package: &serde_json::Value| {
-        Some(format!("{}-{}", package["name"].as_str()?, package["version"].as_str()?))
+    let published = packages.iter().filter(|package| package["publish"] != Value::Array(Vec::new()));
+    let package = |package: &Value| {
+        let text = |key: &str| package[key].as_str().map(str::to_owned);
+        let (name, version) = text("name").zip(text("version")).context("a package without a name")?;
+        Ok(Package { name, version })
     };
-    Ok(packages.iter().filter_map(name).collect())
+    published.map(package).collect()
 }
 
-fn cargo_home() -> Option<PathBuf> {
-    std::env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(std::env::home_dir()?.join(".cargo")))
+/// Unpacks every `.crate` file of `from` into the empty folder `to`.
+fn unpack(workspace: &Workspace, packages: &[Package], from: &Path, to: &Path) -> Result<()> {
+    if to.exists() {
+        fs::remove_dir_all(to).with_context(|| to.display().to_string())?;
+    }
+    fs::create_dir_all(to).with_context(|| to.display().to_string())?;
+    for package in packages {
+        // `m` gives the files the current time. Cargo packs all files with the same old time and
+        // would not see that they changed.
+        let archive = from.join(format!("{}.crate", package.folder()));
+        let status = workspace.command("tar").arg("-xzmf").arg(&archive).arg("-C").arg(to).status();
+        if !status.context("cannot start tar")?.success() {
+            bail!("tar cannot unpack {}", archive.display());
+        }
+    }
+    Ok(())
+}
+
+/// A manifest under which the unpacked crates depend on each other, with the profiles of the
+/// checkout, so that cargo does not compile other dependencies again.
+fn workspace_manifest(packages: &[Package], root_manifest: &str) -> Result<String> {
+    let root: toml::Table = root_manifest.parse().context("Cargo.toml is not TOML")?;
+    let folders = packages.iter().map(|package| toml::Value::String(package.folder())).collect();
+    let patches = packages.iter().map(|package| {
+        let path = toml::Table::from_iter([("path".to_owned(), toml::Value::String(package.folder()))]);
+        (package.name.clone(), toml::Value::Table(path))
+    });
+    let mut manifest: toml::Table =
+        "[workspace]\nresolver = \"3\"\nmembers = []\n[patch.crates-io]\n".parse()?;
+    manifest["workspace"]["members"] = toml::Value::Array(folders);
+    manifest["patch"]["crates-io"] = toml::Value::Table(patches.collect());
+    if let Some(profiles) = root.get("profile") {
+        manifest.insert("profile".to_owned(), profiles.clone());
+    }
+    Ok(manifest.to_string())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
-    /// An empty folder that goes when the test ends well.
-    fn folder(name: &str) -> PathBuf {
-        std::env::temp_dir().join(format!("cutis-xtask-{name}-{}", std::process::id()))
+    #[test]
+    fn unpublished_crates_are_not_packed() {
+        let metadata = json!({ "packages": [
+            { "name": "a", "version": "0.1.0", "publish": null },
+            { "name": "tests", "version": "0.1.0", "publish": [] },
+        ] });
+        let folders: Vec<String> = publishable(&metadata).unwrap().iter().map(Package::folder).collect();
+        assert_eq!(folders, ["a-0.1.0"]);
     }
 
     #[test]
-    fn sources_of_an_earlier_trial_go_and_others_stay() {
-        let home = folder("unpacked");
-        let of = |registry: &str, package: &str| home.join("registry/src").join(registry).join(package);
-        let all = [
-            of("-0123", "cutis-mesh-0.1.0"),
-            of("-0123", "other-1.0.0"),
-            of("index.crates.io-0123", "cutis-mesh-0.1.0"),
-        ];
-        all.iter().for_each(|folder| fs::create_dir_all(folder).unwrap());
-        forget_unpacked(&home, &["cutis-mesh-0.1.0".into()]).unwrap();
-        assert_eq!(all.each_ref().map(|folder| folder.exists()), [false, true, true]);
-        fs::remove_dir_all(&home).unwrap();
-        forget_unpacked(&home, &["cutis-mesh-0.1.0".into()]).unwrap();
-    }
-
-    #[test]
-    fn what_an_earlier_trial_built_goes_and_what_the_workspace_built_stays() {
-        let profile = folder("built");
-        fs::create_dir_all(profile.join("deps")).unwrap();
-        let built = |name: &str, source: &str| {
-            let kept = profile.join(".fingerprint").join(name);
-            fs::create_dir_all(&kept).unwrap();
-            let inputs = profile.join("deps").join(format!("{}.d", name.replace('-', "_")));
-            fs::write(inputs, format!("lib.rlib: {source}/src/lib.rs\n")).unwrap();
-            kept
-        };
-        let trial = built("cutis-mesh-01ab", "/home/me/.cargo/registry/src/-0123/cutis-mesh-0.1.0");
-        let own = built("cutis-mesh-02cd", "crates/cutis-mesh");
-        forget_built(&profile).unwrap();
-        assert_eq!([trial.exists(), own.exists()], [false, true]);
-        fs::remove_dir_all(&profile).unwrap();
-        forget_built(&profile).unwrap();
+    fn unpacked_crates_replace_those_of_the_registry() {
+        let packages = [Package { name: "a".to_owned(), version: "0.1.0".to_owned() }];
+        let text = workspace_manifest(&packages, "[profile.dev]\nopt-level = 2\n").unwrap();
+        let manifest: toml::Table = text.parse().unwrap();
+        assert_eq!(manifest["workspace"]["members"][0].as_str(), Some("a-0.1.0"));
+        assert_eq!(manifest["patch"]["crates-io"]["a"]["path"].as_str(), Some("a-0.1.0"));
+        assert_eq!(manifest["profile"]["dev"]["opt-level"].as_integer(), Some(2));
+        assert!(workspace_manifest(&packages, "not TOML").is_err());
     }
 }
