@@ -29,7 +29,7 @@ pub const UNSAFE_FILES: &[UnsafeFile] = &[
     UnsafeFile {
         path: "crates/cutis-chainmail/src/simd.rs",
         reason: "calls functions for vector units that only some processors have",
-        tests: Some(Tests { package: "cutis-chainmail", filter: "wide::", target_features: "+avx2" }),
+        tests: Some(Tests { package: "cutis-chainmail", filter: "simd::", target_features: "+avx2" }),
     },
     UnsafeFile {
         path: "crates/cutis-solver-cpu/tests/allocations.rs",
