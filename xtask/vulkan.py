@@ -1,7 +1,7 @@
-"""Prints the name of every Vulkan device, one a line; ends with 1 and a reason if there is none.
+"""Prints the name of every Vulkan device, one per line. Ends with 1 and a reason if there is none.
 
-It asks the Vulkan loader, as the tests will: a driver's file that names hardware which is not there does not count, and
-the loader's own variables (VK_DRIVER_FILES, VK_ICD_FILENAMES) hold.
+It asks the Vulkan loader, as the tests do. So the file of a driver for missing hardware does not
+count, and the variables of the loader (VK_DRIVER_FILES, VK_ICD_FILENAMES) have an effect.
 """
 
 import ctypes
@@ -9,7 +9,7 @@ import sys
 
 
 class InstanceCreateInfo(ctypes.Structure):
-    """VkInstanceCreateInfo; but for its type everything stays zero: no layers, no extensions."""
+    """VkInstanceCreateInfo. All fields but the type stay zero: no layers, no extensions."""
 
     _fields_ = [
         ("type", ctypes.c_uint32),
@@ -24,13 +24,13 @@ class InstanceCreateInfo(ctypes.Structure):
 
 
 INSTANCE_CREATE_INFO = 1  # VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO
-INCOMPATIBLE_DRIVER = -9  # VK_ERROR_INCOMPATIBLE_DRIVER: the loader found no driver that works
-NAME_OFFSET = 20  # of deviceName in VkPhysicalDeviceProperties, behind five 32-bit fields
-PROPERTIES_BYTES = 4096  # more than VkPhysicalDeviceProperties takes (824 bytes on 64-bit machines)
+INCOMPATIBLE_DRIVER = -9  # VK_ERROR_INCOMPATIBLE_DRIVER: the loader found no working driver
+NAME_OFFSET = 20  # offset of deviceName in VkPhysicalDeviceProperties, after five 32-bit fields
+PROPERTIES_BYTES = 4096  # VkPhysicalDeviceProperties needs less (824 bytes on 64-bit machines)
 
 
 def load():
-    """The Vulkan loader."""
+    """Loads the Vulkan loader."""
     for name in ("libvulkan.so.1", "libvulkan.so"):
         try:
             return ctypes.CDLL(name)
@@ -42,13 +42,13 @@ def load():
 def check(call, result):
     """Ends the program if a call of Vulkan failed."""
     if result == INCOMPATIBLE_DRIVER:
-        sys.exit("the Vulkan loader finds no driver that works")
+        sys.exit("the Vulkan loader finds no working driver")
     if result < 0:
         sys.exit(f"the Vulkan drivers have no device here ({call} ended with VkResult {result})")
 
 
 def device_names(vulkan):
-    """Names of all physical devices."""
+    """Returns the names of all physical devices."""
     instance = ctypes.c_void_p()
     info = InstanceCreateInfo(type=INSTANCE_CREATE_INFO)
     check("vkCreateInstance", vulkan.vkCreateInstance(ctypes.byref(info), None, ctypes.byref(instance)))

@@ -12,8 +12,8 @@ use serde_json::Value;
 use crate::vulkan;
 use crate::workspace::{Workspace, execute};
 
-/// Runs each example without arguments. `cargo build --workspace` reuses what the step `tests` built;
-/// `cargo run --package` would build the dependencies again with other features.
+/// Runs each example without arguments. `cargo build --workspace` reuses what the step `tests`
+/// built; `cargo run --package` would build the dependencies again with other features.
 pub fn run(workspace: &Workspace) -> Result<()> {
     let mut command = workspace.cargo("build");
     command.args(["--workspace", "--examples", "--message-format", "json-render-diagnostics"]);

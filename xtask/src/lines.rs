@@ -1,4 +1,5 @@
-//! `cargo xtask lines`: counts the lines of each tree and language, and compares them with a revision.
+//! `cargo xtask lines`: counts the lines of each tree and language, and compares them with a
+//! revision.
 
 use std::collections::BTreeMap;
 

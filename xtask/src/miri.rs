@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
 use crate::unsafe_files::{Tests, UNSAFE_FILES};
-use crate::workspace::{Workspace, execute};
+use crate::workspace::{Workspace, execute_and_read};
 
 /// How to install the checkers, the better one first.
 const INSTALL: &str = "`rustup toolchain install nightly --profile minimal --component miri,rust-src`, \
@@ -69,16 +69,24 @@ fn choose(
 pub fn run(workspace: &Workspace) -> Result<()> {
     let checker = require(workspace)?;
     println!("unsafe code is checked by {checker}");
-    for tests in UNSAFE_FILES.iter().filter_map(|file| file.tests.as_ref()) {
-        match &checker {
+    for file in UNSAFE_FILES {
+        let Some(tests) = &file.tests else {
+            println!("no check of {}: {}", file.path, file.reason);
+            continue;
+        };
+        let output = match &checker {
             Checker::Miri { toolchain } => under_miri(workspace, toolchain, tests)?,
             Checker::Valgrind => under_valgrind(workspace, tests)?,
+        };
+        match passed(&output) {
+            0 => bail!("no test of {} has `{}` in its name", tests.package, tests.filter),
+            count => println!("{}: {count} tests pass under {checker}", file.path),
         }
     }
     Ok(())
 }
 
-fn under_miri(workspace: &Workspace, toolchain: &str, tests: &Tests) -> Result<()> {
+fn under_miri(workspace: &Workspace, toolchain: &str, tests: &Tests) -> Result<String> {
     let mut command = workspace.command("rustup");
     command.args([
         "run",
@@ -96,10 +104,10 @@ fn under_miri(workspace: &Workspace, toolchain: &str, tests: &Tests) -> Result<(
     if !tests.target_features.is_empty() && cfg!(target_arch = "x86_64") {
         command.env("RUSTFLAGS", format!("-C target-feature={}", tests.target_features));
     }
-    execute(&mut command)
+    execute_and_read(&mut command)
 }
 
-fn under_valgrind(workspace: &Workspace, tests: &Tests) -> Result<()> {
+fn under_valgrind(workspace: &Workspace, tests: &Tests) -> Result<String> {
     let mut build = workspace.cargo("test");
     build.args([
         "--package",
@@ -113,7 +121,13 @@ fn under_valgrind(workspace: &Workspace, tests: &Tests) -> Result<()> {
     let program = test_program(&String::from_utf8_lossy(&output.stdout))
         .with_context(|| format!("the tests of {} do not compile", tests.package))?;
     let mut command = workspace.command("valgrind");
-    execute(command.args(["--quiet", "--error-exitcode=1"]).arg(program).arg(tests.filter))
+    execute_and_read(command.args(["--quiet", "--error-exitcode=1"]).arg(program).arg(tests.filter))
+}
+
+/// The number of tests that passed, from the output of a test program.
+fn passed(output: &str) -> usize {
+    let counts = output.lines().filter_map(|line| line.strip_prefix("test result: ok. ")?.split(' ').next());
+    counts.filter_map(|count| count.parse::<usize>().ok()).sum()
 }
 
 /// The test program among the messages of `cargo test --no-run`.
@@ -149,6 +163,13 @@ mod tests {
     fn without_a_checker_the_error_says_what_to_install() {
         let error = choose(TOOLCHAINS, |_| false, || false).unwrap_err().to_string();
         assert!(error.contains("--component miri") && error.contains("valgrind"), "{error}");
+    }
+
+    #[test]
+    fn a_filter_without_tests_is_seen() {
+        assert_eq!(passed("running 0 tests\n\ntest result: ok. 0 passed; 0 failed; 4 filtered out\n"), 0);
+        assert_eq!(passed("running 3 tests\n\ntest result: ok. 3 passed; 0 failed\n"), 3);
+        assert_eq!(passed(""), 0);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! `cargo xtask python`: runs the checks of `tests/python` in a private environment with pinned packages.
+//! `cargo xtask python`: runs the checks of `tests/python`, in an environment with pinned packages
+//! in the target folder.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,7 +21,8 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
-/// One check, in the environment, which is made again only if its requirements changed.
+/// The command of one check in the environment, which is created again only if its requirements
+/// changed.
 pub fn check(workspace: &Workspace, script: &Path) -> Result<Command> {
     let python = environment(workspace, &workspace.target_dir()?.join("venv"))?;
     let mut command = workspace.command(&python);
@@ -28,7 +30,7 @@ pub fn check(workspace: &Workspace, script: &Path) -> Result<Command> {
     Ok(command)
 }
 
-/// The checks: every `*.py` in order of name, but for `_*.py`, which the checks share.
+/// The checks: every `*.py` in order of name. They share the `_*.py`, which are not checks.
 fn scripts(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut scripts = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
@@ -45,7 +47,8 @@ fn scripts(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(scripts)
 }
 
-/// The interpreter of the environment in `folder`, made or renewed when its stamp does not fit.
+/// The interpreter of the environment in `folder`, which is created if it is missing or out of
+/// date.
 fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
     let requirements = workspace.root.join("tests/python/requirements.txt");
     let wanted =
@@ -59,7 +62,7 @@ fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
         return Ok(python);
     }
     execute(workspace.command(PYTHON).args(["-m", "venv", "--clear"]).arg(folder))
-        .context("cannot make a Python environment; on Debian: apt-get install -y python3-venv")?;
+        .context("cannot create a Python environment; on Debian: apt-get install -y python3-venv")?;
     execute(
         workspace
             .command(&python)
@@ -83,7 +86,10 @@ fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
 /// The name of the interpreter.
 pub const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 
-/// The version of the system's Python, such as `Python 3.13.5`; an error says what to install.
+/// The version of the system's Python, such as `Python 3.13.5`.
+///
+/// # Errors
+/// Python or `venv` is missing. The error says what to install.
 pub fn require(workspace: &Workspace) -> Result<String> {
     let Ok(output) = workspace.command(PYTHON).arg("--version").output() else {
         bail!("{PYTHON} is missing; on Debian: apt-get install -y python3 python3-venv");
@@ -91,7 +97,7 @@ pub fn require(workspace: &Workspace) -> Result<String> {
     let complete = workspace.command(PYTHON).args(["-c", "import ensurepip, venv"]).output();
     if !complete.is_ok_and(|output| output.status.success()) {
         bail!(
-            "{PYTHON} cannot make environments (venv or pip is missing); on Debian: apt-get install -y python3-venv"
+            "{PYTHON} cannot create environments (venv or pip is missing); on Debian: apt-get install -y python3-venv"
         );
     }
     Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())

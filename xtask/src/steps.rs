@@ -149,8 +149,8 @@ fn tests(workspace: &Workspace) -> Result<()> {
     execute(vulkan::for_gpu_tests(workspace.cargo("test").args(["--workspace", "--no-fail-fast"])))
 }
 
-/// The crate that adds constraints from outside, as a user's crate would. It shares the build folder
-/// of the workspace, so that cargo builds common dependencies only once.
+/// The crate that adds constraints from outside, as a user's crate would. It shares the build
+/// folder of the workspace, so that cargo builds common dependencies only once.
 fn third_party(workspace: &Workspace) -> Result<()> {
     let (manifest, target) = (workspace.third_party_manifest(), workspace.target_dir()?);
     let cargo = |subcommand: &str| {
@@ -170,7 +170,7 @@ pub fn parity_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     command
 }
 
-/// `cargo run` of the stability suite; its last words are `arguments`.
+/// The stability suite that `cargo xtask stability` runs.
 pub fn stability_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     let mut command = workspace.cargo("run");
     command.args(["--quiet", "--package", "cutis-tests", "--bin", "stability", "--"]).args(arguments);
@@ -178,17 +178,19 @@ pub fn stability_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     command
 }
 
-/// The measurement of error against run time that `cargo xtask accuracy` runs: released, since it takes times.
+/// The measurement of error against run time that `cargo xtask accuracy` runs. A release build,
+/// because it measures times.
 pub fn accuracy_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     released(workspace, "accuracy", arguments)
 }
 
-/// ChainMail on scans that `cargo xtask chainmail` runs: released, since it takes times.
+/// ChainMail on scans that `cargo xtask chainmail` runs. A release build, because it measures
+/// times.
 pub fn chainmail_command(workspace: &Workspace, arguments: &[&str]) -> Command {
     released(workspace, "chainmail", arguments)
 }
 
-/// A program of `cutis-tests` that takes times.
+/// A program of `cutis-tests` that measures times.
 fn released(workspace: &Workspace, program: &str, arguments: &[&str]) -> Command {
     let mut command = workspace.cargo("run");
     let build = ["--quiet", "--release", "--package", "cutis-tests", "--bin", program, "--"];
@@ -197,9 +199,10 @@ fn released(workspace: &Workspace, program: &str, arguments: &[&str]) -> Command
     command
 }
 
-/// Compares the backends: once with the limits of the device, and once in small chunks with the limits
-/// that every device has. It runs the program that the step `tests` has built. `cargo run` would build
-/// the program again, because its dependencies have other features than in the whole workspace.
+/// Compares the backends: once with the limits of the device, and once in small chunks with the
+/// limits that every device has. It runs the program that the step `tests` has built. `cargo run`
+/// would build the program again, because its dependencies have other features than in the whole
+/// workspace.
 fn parity(workspace: &Workspace) -> Result<()> {
     for arguments in [&["--quick"][..], &["--quick", "--chunk-cap", "200", "--baseline-limits"]] {
         execute(vulkan::for_gpu_tests(workspace.command(workspace.parity()?).args(arguments)))?;
@@ -223,7 +226,8 @@ fn build_cantilever(workspace: &Workspace, more: &[&str]) -> Result<()> {
     execute(workspace.cargo("build").args(["--package", "cutis-tests", "--bin", "cantilever"]).args(more))
 }
 
-/// Beams bent by the solver and by an independent FEM, all of them: writes `docs/results/cantilever.md` and its table.
+/// Compares beams bent by the solver with an independent FEM, and writes
+/// `docs/results/cantilever.md` with its table.
 pub fn cantilever(workspace: &Workspace) -> Result<()> {
     build_cantilever(workspace, &["--release"])?;
     let mut command = python::check(workspace, &workspace.root.join("tests/python/cantilever.py"))?;

@@ -5,8 +5,8 @@ use anyhow::{Result, bail};
 use crate::workspace::Workspace;
 use crate::{miri, python, vulkan};
 
-/// Checks for every tool before the long steps begin. The slow steps need some that the quick ones do
-/// not.
+/// Checks for every tool before the long steps begin. The slow steps need some that the quick ones
+/// do not.
 pub fn require(workspace: &Workspace, slow_steps: bool) -> Result<()> {
     require_subcommand(workspace, "fmt", "rustup component add rustfmt")?;
     require_subcommand(workspace, "clippy", "rustup component add clippy")?;

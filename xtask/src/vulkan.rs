@@ -1,5 +1,5 @@
-//! The Vulkan device that GPU tests need: finds one, or says what to install, and sets the variables
-//! of the tests.
+//! The Vulkan device that GPU tests need: finds one, or says what to install, and sets the
+//! variables of the tests.
 
 use std::process::Command;
 
@@ -19,12 +19,13 @@ const DEFAULTS: [(&str, &str); 2] = [
     // lavapipe then works on the calling thread: a dispatch costs 1 µs instead of 35 µs, and tests
     // make many small ones.
     ("LP_NUM_THREADS", "0"),
-    // Switches off Mesa's layer that selects a device. Without a display it prints a message for each
-    // instance.
+    // Switches off Mesa's layer that selects a device. Without a display it prints a message for
+    // each instance.
     ("NODEVICE_SELECT", "1"),
 ];
 
-/// Makes GPU tests fail instead of being skipped where they find no adapter. `CI` has the same effect.
+/// Makes GPU tests fail instead of being skipped where they find no adapter. `CI` has the same
+/// effect.
 const REQUIRE_GPU: &str = "CUTIS_REQUIRE_GPU";
 
 /// Sets the variables of GPU tests, which then may not be skipped.
@@ -58,7 +59,8 @@ pub fn require(workspace: &Workspace) -> Result<String> {
     bail!(remedy(reason, named_by))
 }
 
-/// What to do about a machine without an adapter. `named_by` is the variable that names the drivers.
+/// What to do about a machine without an adapter. `named_by` is the variable that names the
+/// drivers.
 fn remedy(reason: &str, named_by: Option<&str>) -> String {
     match named_by {
         Some(variable) => format!(

@@ -1,30 +1,31 @@
-//! The checkout that is worked on: its root, its cargo, its metadata, and how child programs are run.
+//! The checkout: its root, its cargo and its metadata, and how to run other programs in it.
 
 use std::ffi::OsString;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::{Command, ExitCode, Stdio};
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-/// The checkout, and whether it is tested under CI's stricter rules.
+/// The checkout, and whether the stricter rules of CI hold.
 pub struct Workspace {
     /// The folder that holds the root `Cargo.toml`.
     pub root: PathBuf,
-    /// True when `CI` is set: nothing is skipped and lock files must be up to date.
+    /// True when `CI` is set: no test may be skipped, and lock files must be up to date.
     pub ci: bool,
 }
 
-/// What `cargo metadata` is asked for.
+/// The packages that `cargo metadata` lists.
 pub enum Scope {
     /// The packages of a workspace.
     Members,
-    /// Those and all that they resolve to with their default features.
+    /// The packages of a workspace, and all dependencies with default features.
     Dependencies,
 }
 
 impl Workspace {
-    /// The checkout this program was started from.
+    /// The checkout that holds this program.
     pub fn find() -> Result<Self> {
         let manifest_dir = std::env::var_os("CARGO_MANIFEST_DIR")
             .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
@@ -33,17 +34,17 @@ impl Workspace {
         Ok(Self { root, ci })
     }
 
-    /// The same checkout under CI's rules.
+    /// The same checkout with the rules of CI.
     pub fn in_ci(self) -> Self {
         Self { ci: true, ..self }
     }
 
-    /// The manifest of this program, which is a workspace of its own.
+    /// The manifest of this program, which has its own workspace.
     pub fn xtask_manifest(&self) -> PathBuf {
         self.root.join("xtask/Cargo.toml")
     }
 
-    /// The manifest of the crate that uses the project from outside, in a workspace of its own too.
+    /// The manifest of the crate that uses the project from outside. It has its own workspace, too.
     pub fn third_party_manifest(&self) -> PathBuf {
         self.root.join("tests/third-party/Cargo.toml")
     }
@@ -53,7 +54,7 @@ impl Workspace {
         [self.root.join("Cargo.toml"), self.xtask_manifest(), self.third_party_manifest()]
     }
 
-    /// A program to be run from the root, told whether this is CI.
+    /// A command that runs in the root, with `CI` set if the rules of CI hold.
     pub fn command(&self, program: impl Into<OsString>) -> Command {
         let mut command = Command::new(program.into());
         command.current_dir(&self.root);
@@ -97,19 +98,20 @@ impl Workspace {
         serde_json::from_slice(&output.stdout).context("cargo metadata did not print JSON")
     }
 
-    /// The commit of the checkout, marked if there are changes since.
+    /// The commit of the checkout, with a mark if there are changes since.
     pub fn commit(&self) -> Result<String> {
         let words = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"];
         let output = self.command("git").args(words).output().context("cannot start git")?;
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     }
 
-    /// The released `cutis` program.
+    /// The `cutis` program of the release build.
     pub fn program(&self) -> Result<PathBuf> {
         self.built("release/cutis", "cargo build --release -p cutis-cli")
     }
 
-    /// Runs the released `cutis` program; what it prints, or an error with what it complains of.
+    /// Runs the `cutis` program of the release build and returns its output. The error holds its
+    /// messages.
     pub fn run_program(&self, arguments: impl FnOnce(&mut Command)) -> Result<Vec<u8>> {
         let mut command = self.command(self.program()?);
         arguments(&mut command);
@@ -120,17 +122,18 @@ impl Workspace {
         Ok(output.stdout)
     }
 
-    /// The program that compares the backends, as the tests of the workspace leave it behind.
+    /// The program that compares the backends. The tests of the workspace build it.
     pub fn parity(&self) -> Result<PathBuf> {
         self.built("debug/parity", "cargo test --workspace --no-run")
     }
 
-    /// The program that bends beams for the independent FEM, as the tests of the workspace leave it behind, or released.
+    /// The program that bends beams for the independent FEM. The tests of the workspace build it in
+    /// the profile `debug`.
     pub fn cantilever(&self, profile: &str) -> Result<PathBuf> {
         self.built(&format!("{profile}/cantilever"), "cargo build -p cutis-tests --bin cantilever")
     }
 
-    /// A program in the folder of builds; if it is missing, the error names the command that builds it.
+    /// A program in the build folder. If it is missing, the error names the command that builds it.
     fn built(&self, path: &str, build: &str) -> Result<PathBuf> {
         let program = self.target_dir()?.join(format!("{path}{}", std::env::consts::EXE_SUFFIX));
         if !program.is_file() {
@@ -139,21 +142,21 @@ impl Workspace {
         Ok(program)
     }
 
-    /// The folder of real volumes: `CUTIS_TEST_DATA`, else `shared/data` beside the checkout. None if there is none, an
-    /// error in CI.
+    /// The folder of real volumes: `CUTIS_TEST_DATA`, or else `shared/data` in the parent folder of
+    /// the checkout. `None` if it does not exist; in CI this is an error.
     pub fn test_data(&self) -> Result<Option<PathBuf>> {
         let folder = std::env::var_os("CUTIS_TEST_DATA")
             .map_or_else(|| self.root.join("../shared/data"), PathBuf::from);
         match folder.is_dir() {
             true => Ok(Some(folder)),
             false if self.ci => {
-                bail!("{} is missing; in CI the real volumes must be there", folder.display())
+                bail!("{} is missing; CI needs the real volumes", folder.display())
             }
             false => Ok(None),
         }
     }
 
-    /// Where builds go; follows `CARGO_TARGET_DIR`.
+    /// The build folder, which follows `CARGO_TARGET_DIR`.
     pub fn target_dir(&self) -> Result<PathBuf> {
         let metadata = self.metadata(&self.root.join("Cargo.toml"), Scope::Members)?;
         let folder =
@@ -162,7 +165,10 @@ impl Workspace {
     }
 }
 
-/// Runs a program with its output shown, after printing its command line; an error if it does not end with 0.
+/// Prints the command line and runs the program, which prints its own output.
+///
+/// # Errors
+/// The program does not start or does not end with 0.
 pub fn execute(command: &mut Command) -> Result<()> {
     let line = command_line(command);
     println!("$ {line}");
@@ -173,7 +179,27 @@ pub fn execute(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a program as [`execute`] does, and gives what it ended with.
+/// Runs a program as [`execute`] does and returns a copy of its standard output.
+pub fn execute_and_read(command: &mut Command) -> Result<String> {
+    let line = command_line(command);
+    println!("$ {line}");
+    let mut child =
+        command.stdout(Stdio::piped()).spawn().with_context(|| format!("cannot start `{line}`"))?;
+    let mut output = String::new();
+    for text in BufReader::new(child.stdout.take().context("no output")?).lines() {
+        let text = text.with_context(|| format!("cannot read the output of `{line}`"))?;
+        println!("{text}");
+        output += &text;
+        output.push('\n');
+    }
+    let status = child.wait()?;
+    if !status.success() {
+        bail!("`{line}` ended with {status}");
+    }
+    Ok(output)
+}
+
+/// Runs a program as [`execute`] does and returns its exit code.
 pub fn exit_code(command: &mut Command) -> Result<ExitCode> {
     let line = command_line(command);
     println!("$ {line}");

@@ -1,5 +1,5 @@
-//! Rules about the crates of the workspace and their files: one integration-test binary each, no files
-//! of other crates, and tests of code that is compiled only without a feature.
+//! Rules about the crates of the workspace and their files: one integration-test binary each, no
+//! files of other crates, and tests of code that is compiled only without a feature.
 
 use anyhow::{Context, Result};
 use serde_json::Value;
@@ -24,7 +24,8 @@ pub struct Crate {
     test_binaries: Vec<String>,
 }
 
-/// The members of the workspace, from `cargo metadata`, and the paths of their manifests from the root.
+/// The members of the workspace, from `cargo metadata`, and the paths of their manifests from the
+/// root.
 pub fn members(metadata: &Value, manifests: &[String]) -> Result<Vec<Crate>> {
     let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
     let member = |(package, manifest): (&Value, &String)| {
@@ -41,8 +42,8 @@ pub fn members(metadata: &Value, manifests: &[String]) -> Result<Vec<Crate>> {
     packages.iter().zip(manifests).map(member).collect()
 }
 
-/// Crates with more than one integration-test binary. Each is linked with all of its dependencies, which
-/// takes long.
+/// Crates with more than one integration-test binary. Each is linked with all of its dependencies,
+/// which takes long.
 pub fn one_test_binary(crates: &[Crate]) -> Vec<Finding> {
     let mut findings = Vec::new();
     for member in crates {

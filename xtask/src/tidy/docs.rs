@@ -1,21 +1,21 @@
-//! Rules about pages: the needed ones are there, links lead somewhere, named paths exist, every crate has its place on the
-//! page of the architecture, and examples are not switched off.
+//! Rules about pages: required pages exist, links and named paths exist, the page of the
+//! architecture names every crate, and no example is ignored.
 
 use super::Finding;
 use super::files::Files;
 use super::rules::is_ignored_fence;
 
-/// Endings by which a word in backticks is taken for a file of the repository.
+/// A word in backticks with one of these endings is a file of the repository.
 const FILE_ENDINGS: [&str; 6] = [".rs", ".md", ".toml", ".py", ".wgsl", ".sh"];
 
 /// The page that describes the workspace.
 pub const ARCHITECTURE: &str = "docs/ARCHITECTURE.md";
 
-/// Files without which the checkout is not complete.
+/// Files that every checkout must have.
 const REQUIRED: [&str; 6] =
     ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE-MIT", "LICENSE-APACHE", ARCHITECTURE];
 
-/// Required files that are missing.
+/// Finds required files that are missing.
 pub fn required(files: &Files) -> Vec<Finding> {
     REQUIRED
         .iter()
@@ -24,7 +24,7 @@ pub fn required(files: &Files) -> Vec<Finding> {
         .collect()
 }
 
-/// Crates of the workspace that the page does not name.
+/// Finds crates of the workspace that the page does not name.
 pub fn crates_named<'a>(page: &str, text: &str, names: impl Iterator<Item = &'a str>) -> Vec<Finding> {
     let in_name = |character: char| character.is_ascii_alphanumeric() || "-_".contains(character);
     let words: std::collections::BTreeSet<&str> = text.split(|character| !in_name(character)).collect();
@@ -34,7 +34,7 @@ pub fn crates_named<'a>(page: &str, text: &str, names: impl Iterator<Item = &'a 
         .collect()
 }
 
-/// Relative links and pictures of a page whose target does not exist.
+/// Finds relative links and pictures whose target does not exist.
 pub fn links(page: &str, text: &str, files: &Files) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (number, line) in prose(text) {
@@ -48,7 +48,7 @@ pub fn links(page: &str, text: &str, files: &Files) -> Vec<Finding> {
                 _ => findings.push(Finding::failure(
                     page,
                     number,
-                    format!("the link to `{target}` leads nowhere"),
+                    format!("the target of the link `{target}` does not exist"),
                 )),
             }
         }
@@ -56,7 +56,7 @@ pub fn links(page: &str, text: &str, files: &Files) -> Vec<Finding> {
     findings
 }
 
-/// Words in backticks that look like a path of the repository and are none.
+/// Finds words in backticks that look like a path of the repository but do not exist.
 pub fn named_paths(page: &str, text: &str, files: &Files) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (number, line) in prose(text) {
@@ -70,7 +70,7 @@ pub fn named_paths(page: &str, text: &str, files: &Files) -> Vec<Finding> {
     findings
 }
 
-/// Code blocks that doctests would leave out.
+/// Finds code blocks that doctests skip.
 pub fn ignored_examples(page: &str, text: &str) -> Vec<Finding> {
     let ignored = text.lines().enumerate().filter(|(_, line)| is_ignored_fence(line.trim_start()));
     ignored
@@ -88,7 +88,7 @@ fn prose(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// The line with what stands in backticks removed.
+/// The line without the text in backticks.
 fn without_code(line: &str) -> String {
     line.split('`').step_by(2).collect::<Vec<_>>().join("``")
 }
@@ -112,7 +112,7 @@ fn link_targets(line: &str) -> Vec<String> {
     targets
 }
 
-/// The path from the root that a link on `page` means; none if it leaves the repository.
+/// The path from the root of a link on `page`. `None` if it leaves the repository.
 fn resolve(page: &str, link: &str) -> Option<String> {
     let mut parts: Vec<&str> = page.split('/').collect();
     parts.pop();
@@ -128,7 +128,8 @@ fn resolve(page: &str, link: &str) -> Option<String> {
     Some(parts.join("/"))
 }
 
-/// `crates/cutis/src/lib.rs`, `docs/book/`, `deny.toml`; neither `f32/f64` nor `cutis run SCENE` nor `a::b`.
+/// True for `crates/cutis/src/lib.rs`, `docs/book/` and `deny.toml`. False for `f32/f64`,
+/// `cutis run SCENE` and `a::b`.
 fn looks_like_path(name: &str, files: &Files) -> bool {
     let plain = |character: char| character.is_ascii_alphanumeric() || "._-/".contains(character);
     if name.is_empty() || !name.chars().all(plain) || name.starts_with('/') {

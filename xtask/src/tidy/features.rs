@@ -1,4 +1,5 @@
-//! No test is left out for want of a feature: `cargo test --workspace` has every feature of every member on.
+//! `cargo test --workspace` must have every feature of every member on. Otherwise tests are
+//! missing.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +8,12 @@ use serde_json::Value;
 
 use super::Finding;
 
-/// Features for other systems than Linux, on which they change nothing.
+/// Features for other systems. They change nothing on Linux.
 const OTHER_SYSTEMS: [&str; 2] = ["metal", "dx12"];
 
-/// Features of members that are off when the whole workspace is built with default features, from `cargo metadata` with
-/// its dependencies resolved. What such a feature guards is neither linted nor tested, and nobody says so.
+/// Finds features of members that are off when cargo builds the whole workspace with default
+/// features. Code behind such a feature is neither linted nor tested, and no message says so.
+/// `metadata` must have resolved dependencies.
 pub fn switched_off(metadata: &Value) -> Result<Vec<Finding>> {
     let nodes = metadata["resolve"]["nodes"].as_array().context("cargo metadata resolves no dependencies")?;
     let on: BTreeMap<&str, &Value> =
@@ -27,8 +29,8 @@ pub fn switched_off(metadata: &Value) -> Result<Vec<Finding>> {
             if !is_on(name) {
                 let place = package["name"].as_str().unwrap_or(id);
                 let message = format!(
-                    "feature `{name}` is off in `cargo test --workspace`, so what it guards is not tested: \
-                     let `tests/Cargo.toml` or a default feature switch it on"
+                    "feature `{name}` is off in `cargo test --workspace`, so its code is not tested: \
+                     switch it on in `tests/Cargo.toml` or by a default feature"
                 );
                 findings.push(Finding::failure(place, 0, message));
             }
@@ -60,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn features_of_foreign_crates_are_theirs() {
+    fn features_of_other_crates_are_not_checked() {
         assert_eq!(count(json!("registry+https://example.org"), json!([])), 0);
     }
 

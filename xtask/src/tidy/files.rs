@@ -1,11 +1,11 @@
-//! The files of the checkout, by path from its root.
+//! The files of the checkout, by their path from its root.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-/// Every file but those of build and version-control folders; paths use `/`.
+/// All files except those of build and version-control folders. Paths use `/`.
 pub struct Files {
     root: PathBuf,
     files: BTreeSet<String>,
@@ -13,7 +13,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// Walks the checkout. Symbolic links count as files and are not followed.
+    /// Lists the checkout. Symbolic links count as files and are not followed.
     pub fn list(root: &Path) -> Result<Self> {
         let mut found = Self { root: root.to_path_buf(), files: BTreeSet::new(), folders: BTreeSet::new() };
         found.walk("")?;
@@ -36,7 +36,7 @@ impl Files {
         Ok(())
     }
 
-    /// Whether the path is a file or a folder; a trailing `/` asks for a folder.
+    /// Whether the path is a file or a folder. With a `/` at its end it must be a folder.
     pub fn exists(&self, path: &str) -> bool {
         match path.strip_suffix('/') {
             Some(folder) => self.folders.contains(folder),
@@ -44,7 +44,7 @@ impl Files {
         }
     }
 
-    /// Whether a file of this name lies anywhere.
+    /// Whether any folder has a file of this name.
     pub fn has_name(&self, name: &str) -> bool {
         self.files.iter().any(|path| path.rsplit('/').next() == Some(name))
     }

@@ -1,28 +1,28 @@
-//! One crate names wgpu: whatever else computes on a GPU does so through it.
+//! Only one crate names wgpu. All other crates use a GPU through it.
 
 use super::Finding;
 use super::rules::words;
 use super::source::Source;
 
-/// The folder of the crate that may.
+/// The folder of the crate that may name wgpu.
 const ONLY: &str = "crates/cutis-gpu/";
 
 /// The manifest that states versions for all members.
 const VERSIONS: &str = "Cargo.toml";
 
-/// Begins the names of wgpu and of the crates it consists of.
+/// The start of the names of wgpu and of its parts.
 const NAME: &str = "wgpu";
 
-const MESSAGE: &str = "names wgpu, which is for cutis-gpu alone: use what that offers, or add to it";
+const MESSAGE: &str = "names wgpu, which only cutis-gpu may do: use that crate, or extend it";
 
-/// Lines of code outside the crate that name wgpu.
+/// Finds lines of code outside the crate that name wgpu.
 pub fn in_source(source: &Source) -> Vec<Finding> {
     let lines = source.lines.iter().map(|line| line.code.as_str());
     named(&source.path, lines)
 }
 
-/// Lines of a manifest outside the crate that name wgpu: as a dependency, renamed, or as a feature of one. What the manifest
-/// says in words may name it.
+/// Finds lines of a manifest outside the crate that name wgpu: as a dependency, also under another
+/// name, or as a feature of one. Comments and descriptions may name it.
 pub fn in_manifest(path: &str, text: &str) -> Vec<Finding> {
     if path == VERSIONS {
         return Vec::new();

@@ -1,5 +1,5 @@
-//! One fact in one place: members take versions, lints and dependencies from the workspace manifest; what is published
-//! carries its licenses.
+//! Rules about manifests: members inherit versions, lints and dependencies from the workspace, and
+//! published crates carry their licenses.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use serde_json::Value;
 use super::Finding;
 use super::files::Files;
 
-/// What every published crate carries, as links to the files of the root.
+/// Files that every published crate has, as links to the files of the root.
 const LICENSES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 
-/// Keys of `[package]` that have their one value in the workspace manifest.
+/// Keys of `[package]` that only the workspace manifest sets.
 const INHERITED: [&str; 4] = ["version", "edition", "rust-version", "license"];
 
-/// Manifests of the members, by path from the root.
+/// The manifests of the members, as paths from the root.
 pub fn members(metadata: &Value, root: &Path) -> Result<Vec<String>> {
     let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
     packages
@@ -30,7 +30,7 @@ pub fn members(metadata: &Value, root: &Path) -> Result<Vec<String>> {
         .collect()
 }
 
-/// What a member's manifest says itself but should inherit.
+/// Finds values that the manifest of a member should inherit.
 pub fn check(path: &str, text: &str) -> Vec<Finding> {
     let table: toml::Table = match text.parse() {
         Ok(table) => table,
@@ -64,7 +64,7 @@ pub fn check(path: &str, text: &str) -> Vec<Finding> {
     findings
 }
 
-/// License files that are missing beside a member's manifest, unless it is never published.
+/// Finds missing license files next to the manifest of a member that is published.
 pub fn licenses(path: &str, text: &str, files: &Files) -> Vec<Finding> {
     let table: toml::Table = text.parse().unwrap_or_default();
     let publish =
@@ -76,7 +76,7 @@ pub fn licenses(path: &str, text: &str, files: &Files) -> Vec<Finding> {
     let missing = LICENSES.iter().filter(|name| !files.exists(&format!("{folder}{name}")));
     missing
         .map(|name| {
-            Finding::failure(path, 0, format!("needs `{name}` beside it: ln -s ../../{name} {folder}"))
+            Finding::failure(path, 0, format!("needs `{name}` next to it: ln -s ../../{name} {folder}"))
         })
         .collect()
 }

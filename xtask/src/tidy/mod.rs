@@ -1,5 +1,5 @@
-//! `cargo xtask tidy`: checks the rules of the workspace that a program can check. Each rule is a function
-//! from text to findings, with a test that shows what it catches.
+//! `cargo xtask tidy`: checks the rules of the workspace that a program can check. Each rule is a
+//! function from text to findings, with a test that shows what it catches.
 
 mod crates;
 mod docs;

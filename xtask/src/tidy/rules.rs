@@ -8,12 +8,12 @@ use crate::unsafe_files;
 pub const ALL: &[fn(&Source) -> Vec<Finding>] =
     &[begins_with_title, unsafe_is_listed_and_explained, no_leftovers, nothing_ignored, not_too_long];
 
-/// Beyond this many lines a file is listed.
+/// A longer file gives a warning.
 const LONG: usize = 400;
-/// Beyond this many lines a file fails.
+/// A longer file gives a failure.
 const TOO_LONG: usize = 600;
 
-/// A file says first, by `//!`, which one thing it does.
+/// The first line of a file says, after `//! `, what the file does.
 fn begins_with_title(source: &Source) -> Vec<Finding> {
     let first = source.lines.first();
     if first.is_some_and(|line| {
@@ -21,11 +21,15 @@ fn begins_with_title(source: &Source) -> Vec<Finding> {
     }) {
         return Vec::new();
     }
-    vec![Finding::failure(&source.path, 1, "a source begins with `//! ` and what it does")]
+    vec![Finding::failure(
+        &source.path,
+        1,
+        "the first line of a source is `//! ` and says what the file does",
+    )]
 }
 
-/// `unsafe` stands only in listed files, and above each block and each `impl` stands why it is sound; what an `unsafe fn`
-/// asks of its caller is clippy's to check.
+/// Only listed files have `unsafe`, and a comment above each block and each `impl` says why it is
+/// sound. Clippy checks the documentation of each `unsafe fn`.
 fn unsafe_is_listed_and_explained(source: &Source) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (index, line) in source.lines.iter().enumerate() {
@@ -51,7 +55,7 @@ fn unsafe_is_listed_and_explained(source: &Source) -> Vec<Finding> {
     findings
 }
 
-/// Whether the statement that the last line belongs to has a safety comment in it or directly above.
+/// Whether the statement of the last line has a safety comment in it or directly above it.
 fn explained(lines: &[Line]) -> bool {
     let Some((last, above)) = lines.split_last() else { return false };
     let explains = |line: &Line| line.comment.contains("SAFETY:");
@@ -63,7 +67,7 @@ fn explained(lines: &[Line]) -> bool {
     explains(last) || above.iter().rev().take_while(belongs).any(explains)
 }
 
-/// Nothing is left for later: no markers in comments, no placeholders and debug prints in code.
+/// No markers for later work in comments, and no placeholders or debug prints in code.
 pub fn no_leftovers(source: &Source) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (index, line) in source.lines.iter().enumerate() {
@@ -85,7 +89,7 @@ pub fn no_leftovers(source: &Source) -> Vec<Finding> {
     findings
 }
 
-/// No test and no example is switched off.
+/// No test and no example is ignored.
 fn nothing_ignored(source: &Source) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (index, line) in source.lines.iter().enumerate() {
@@ -108,13 +112,13 @@ fn nothing_ignored(source: &Source) -> Vec<Finding> {
     findings
 }
 
-/// Whether a line opens a code block that doctests leave out.
+/// Whether a line opens a code block that doctests skip.
 pub fn is_ignored_fence(line: &str) -> bool {
     line.strip_prefix("```")
         .is_some_and(|tags| tags.split([',', ' ', '{', '}']).any(|tag| tag.starts_with("ignore")))
 }
 
-/// One idea a file.
+/// Files that are too long for one idea.
 pub fn not_too_long(source: &Source) -> Vec<Finding> {
     let count = source.lines.len();
     if count > TOO_LONG {

@@ -1,4 +1,5 @@
-//! Rules about WGSL: a shader says what it is, and keeps to operations that give the same bits on a CPU.
+//! Rules about WGSL: a shader says what it does, and uses only operations with the same bits on a
+//! CPU.
 
 use super::Finding;
 use super::rules::{is_called, no_leftovers, not_too_long, words};
@@ -8,11 +9,11 @@ use super::source::Source;
 pub const ALL: &[fn(&Source) -> Vec<Finding>] =
     &[begins_with_title, no_leftovers, not_too_long, the_same_on_a_cpu];
 
-/// Where the shaders of the project lie; every one of them has a twin in Rust that gives the same bits.
+/// The shaders of the project. Each has a twin in Rust that gives the same bits.
 const FOLDER: &str = "shaders/wgsl/";
 
-/// Functions whose last bits an implementation is free to choose, or that contract a product with a sum; and by what they
-/// are replaced where there is something.
+/// Functions whose last bits an implementation may choose, or that contract a product with a sum,
+/// with their replacement if there is one.
 const INEXACT: &[(&str, &str)] = &[
     ("normalize", "write `v * (1.0 / length(v))`"),
     ("mix", "write the sum of two products"),
@@ -45,19 +46,23 @@ const INEXACT: &[(&str, &str)] = &[
     ("radians", "multiply"),
 ];
 
-/// Beginnings of the names of matrix types: the order of the sums in their products is open.
+/// Starts of the names of matrix types. The order of the sums in their products is not specified.
 const MATRICES: [&str; 3] = ["mat2x", "mat3x", "mat4x"];
 
-/// A shader says first, by `// `, what it does.
+/// The first line of a shader says, after `// `, what it does.
 fn begins_with_title(source: &Source) -> Vec<Finding> {
     let titled = |comment: &str| comment.strip_prefix("// ").is_some_and(|title| !title.trim().is_empty());
     match source.lines.first() {
         Some(line) if line.code.is_empty() && titled(&line.comment) => Vec::new(),
-        _ => vec![Finding::failure(&source.path, 1, "a shader begins with `// ` and what it does")],
+        _ => vec![Finding::failure(
+            &source.path,
+            1,
+            "the first line of a shader is `// ` and says what it does",
+        )],
     }
 }
 
-/// Nothing is used whose result differs between a GPU and the twin in Rust.
+/// Finds operations whose result may differ between a GPU and the twin in Rust.
 fn the_same_on_a_cpu(source: &Source) -> Vec<Finding> {
     if !source.path.starts_with(FOLDER) {
         return Vec::new();
@@ -65,7 +70,7 @@ fn the_same_on_a_cpu(source: &Source) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (index, line) in source.lines.iter().enumerate() {
         for (name, instead) in INEXACT.iter().filter(|(name, _)| is_called(&line.code, name)) {
-            let instead = if instead.is_empty() { "compute it before, on the CPU" } else { instead };
+            let instead = if instead.is_empty() { "compute it on the CPU" } else { instead };
             let message = format!("`{name}` may differ from the twin in Rust: {instead}");
             findings.push(Finding::failure(&source.path, index + 1, message));
         }
@@ -91,7 +96,7 @@ mod tests {
     #[test]
     fn a_missing_title_is_caught() {
         assert_eq!(lines(begins_with_title, SHADER, "// Projects a color.\n"), NONE);
-        for text in ["", "//\n", "//  \n", "\n// Late.\n", "const a = 1; // Beside.\n", "/* Block. */\n"] {
+        for text in ["", "//\n", "//  \n", "\n// Late.\n", "const a = 1; // Late.\n", "/* Block. */\n"] {
             assert_eq!(lines(begins_with_title, SHADER, text), [1], "{text:?}");
         }
     }

@@ -102,8 +102,8 @@ fn block_comment(text: &str) -> usize {
     text.len()
 }
 
-/// Length of the string or character literal at the start of `text`. A prefix such as `r#` counts only
-/// where no identifier ends just before it.
+/// Length of the string or character literal at the start of `text`. A prefix such as `r#` counts
+/// only where no identifier ends just before it.
 fn literal(text: &str, before: Option<char>) -> Option<usize> {
     let in_word = before.is_some_and(|character| character.is_alphanumeric() || character == '_');
     let prefixes: &[&str] = if in_word { &[] } else { &["br", "cr", "b", "c", "r"] };

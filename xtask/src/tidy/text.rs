@@ -1,4 +1,5 @@
-//! The parts of a file that people read as language: prose in comments, messages and pages, and names.
+//! The parts of a file that people read as language: prose in comments, messages and pages, and
+//! names.
 
 use super::source::Source;
 
@@ -25,7 +26,8 @@ pub struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Takes the language from the ending of the path. Other languages than Rust and WGSL count as prose.
+    /// Takes the language from the ending of the path. Other languages than Rust and WGSL count as
+    /// prose.
     pub fn parse(path: &'a str, text: &str) -> Self {
         let pieces = match path.rsplit('.').next() {
             Some("rs" | "wgsl") => of_source(&Source::parse(path, text)),
