@@ -37,16 +37,23 @@ impl fmt::Display for Checker {
 /// # Errors
 /// There is neither Miri nor Valgrind.
 pub fn require(workspace: &Workspace) -> Result<Checker> {
-    let starts = |program: &str, arguments: &[&str]| {
-        workspace.command(program).args(arguments).output().is_ok_and(|output| output.status.success())
+    let output = |program: &str, arguments: &[&str]| {
+        let output = workspace.command(program).args(arguments).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
     };
-    let toolchains = workspace.command("rustup").args(["toolchain", "list"]).output();
-    let toolchains = toolchains.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
+    let components = |toolchain: &str| {
+        output("rustup", &["component", "list", "--installed", "--toolchain", toolchain]).unwrap_or_default()
+    };
     choose(
-        &toolchains.unwrap_or_default(),
-        |toolchain| starts("rustup", &["run", toolchain, "cargo", "miri", "--version"]),
-        || starts("valgrind", &["--version"]),
+        &output("rustup", &["toolchain", "list"]).unwrap_or_default(),
+        |toolchain| has_miri(&components(toolchain)),
+        || output("valgrind", &["--version"]).is_some(),
     )
+}
+
+/// Whether the components of a toolchain include Miri and the sources that it compiles first.
+fn has_miri(components: &str) -> bool {
+    ["miri-", "rust-src"].iter().all(|name| components.lines().any(|line| line.starts_with(name)))
 }
 
 /// `toolchains` is the output of `rustup toolchain list`.
@@ -163,6 +170,12 @@ mod tests {
     fn without_a_checker_the_error_says_what_to_install() {
         let error = choose(TOOLCHAINS, |_| false, || false).unwrap_err().to_string();
         assert!(error.contains("--component miri") && error.contains("valgrind"), "{error}");
+    }
+
+    #[test]
+    fn miri_needs_the_sources_of_the_standard_library() {
+        assert!(has_miri("cargo-x\nmiri-x\nrust-src\n"));
+        assert!(!has_miri("miri-x\n") && !has_miri("rust-src\n") && !has_miri(""));
     }
 
     #[test]
