@@ -15,9 +15,12 @@ struct Package {
 const PACKAGES: &[Package] =
     &[Package { name: "cutis", subcommand: "test" }, Package { name: "cutis-cli", subcommand: "build" }];
 
-/// Tests or builds each package of the table.
+/// Lints and then tests or builds each package of the table.
 pub fn run(workspace: &Workspace) -> Result<()> {
     for package in PACKAGES {
+        let mut command = workspace.cargo("clippy");
+        command.args(["--package", package.name, "--no-default-features", "--all-targets", "--quiet"]);
+        execute(command.args(["--", "-D", "warnings"]))?;
         let mut command = workspace.cargo(package.subcommand);
         execute(command.args(["--package", package.name, "--no-default-features"]))?;
     }
