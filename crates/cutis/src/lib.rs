@@ -18,31 +18,14 @@
 
 mod backend;
 mod body;
-mod chain;
-mod checkpoint;
-mod clock;
-mod cost_report;
-mod demo;
-mod devices;
-mod dynamics;
+mod cost;
+mod ct;
 mod error;
-mod expense;
-mod files;
-mod find_skin;
-mod frames;
-mod html;
-mod inspect;
-mod motion;
+mod model;
 mod output;
-mod pictures;
-mod plan;
 mod progress;
-mod region;
-pub mod report;
 mod run;
 pub mod scene;
-mod source;
-mod system;
 pub mod tune;
 
 pub use cutis_chainmail as chainmail;
@@ -59,21 +42,19 @@ pub use cutis_solver_cpu as solver_cpu;
 pub use cutis_solver_gpu as solver_gpu;
 pub use cutis_volume as volume;
 
-pub use cost_report::{CostPart, CostReport};
-pub use demo::demo;
-pub use devices::{Device, DeviceLimits, Devices, devices};
+pub use backend::{Device, DeviceLimits, Devices, devices};
+pub use body::{SkinRequest, find_skin};
+pub use cost::{CostPart, CostReport, Plan, check};
+pub use ct::{Inspection, inspect};
 pub use error::Error;
-pub use files::RunFolder;
-pub use find_skin::{SkinRequest, find_skin};
-pub use inspect::{Inspection, inspect};
-pub use output::{ResampleRequest, resample_run};
-pub use plan::{Plan, check};
+pub use model::{SceneSystem, build_system};
+pub use output::{ResampleRequest, report, resample_run};
 pub use progress::{Progress, Silent};
+pub use run::files::RunFolder;
 #[cfg(feature = "gpu")]
 pub use run::run_on;
 pub use run::{RunOptions, run};
-pub use scene::{LoadedScene, Override, Scene};
-pub use system::{SceneSystem, build_system};
+pub use scene::{LoadedScene, Override, Scene, demo};
 pub use tune::{TuneOptions, Tuning, tune};
 
 #[cfg(doctest)]

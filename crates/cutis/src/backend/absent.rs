@@ -30,7 +30,7 @@ pub(super) fn auto(loaded: &LoadedScene, _: &Work) -> Result<Chosen, Error> {
     Ok(Chosen::cpu(loaded, "auto: this build has no GPU backend"))
 }
 
-pub(crate) fn devices() -> Devices {
+pub(super) fn devices() -> Devices {
     Devices {
         gpu_backend: false,
         devices: Vec::new(),

@@ -9,7 +9,7 @@ use cutis_solver_gpu::{GpuSolverError, SolverGpu};
 
 use super::auto::{self, Verdict, select};
 use super::{Chosen, Metered, Place, Running, Work};
-use crate::devices::{Device as Listed, DeviceLimits};
+use crate::backend::devices::{Device as Listed, DeviceLimits};
 use crate::report::{Backend, DeviceWork, MemoryPart};
 use crate::scene::LoadedScene;
 use crate::{Devices, Error};
@@ -54,7 +54,7 @@ pub(super) fn auto(loaded: &LoadedScene, work: &Work) -> Result<Chosen, Error> {
 }
 
 /// What there is; each adapter is opened once.
-pub(crate) fn devices() -> Devices {
+pub(super) fn devices() -> Devices {
     let all = adapters();
     let devices: Vec<Listed> = all.iter().map(listed).collect();
     let (auto, note) = taken_by_auto(&all, &devices);

@@ -6,6 +6,7 @@
 
 #[cfg(feature = "gpu")]
 mod auto;
+pub(crate) mod devices;
 #[cfg_attr(not(feature = "gpu"), path = "absent.rs")]
 mod gpu;
 mod stages;
@@ -19,7 +20,8 @@ use crate::report::{Backend, DeviceWork, MemoryPart};
 use crate::scene::{BackendChoice, LoadedScene};
 use gpu::Gpu;
 
-pub(crate) use gpu::{ABSENT, Relaxer, devices};
+pub use devices::{Device, DeviceLimits, Devices, devices};
+pub(crate) use gpu::{ABSENT, Relaxer};
 pub(crate) use stages::Stages;
 
 /// What a scene asks for, as far as it can be settled without a body.

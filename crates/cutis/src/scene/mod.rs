@@ -4,11 +4,13 @@
 //! file, applies overrides and checks every value; each section is a struct of this module.
 
 mod choice;
+mod demo;
 mod load;
 mod reference;
 mod sections;
 mod validate;
 
+pub use demo::demo;
 pub use load::{LoadedScene, Override, schema, template};
 pub use reference::reference;
 pub use sections::*;

@@ -19,13 +19,14 @@ use super::scratch::Scratch;
 use super::{Setting, WoundError};
 use crate::backend::{Chosen, Stages};
 use crate::body::Body;
-use crate::clock::Clock;
-use crate::dynamics::{self, Dynamics};
+use crate::body::region;
+use crate::ct::source::Source;
+use crate::model::constraints::system::{self as dynamics, Dynamics};
 use crate::output::{self, Outcome};
 use crate::report::{KindResidual, Stage};
+use crate::run::clock::Clock;
 use crate::scene::{LatticeSection, LoadedScene, RegionSection, Scene};
-use crate::source::Source;
-use crate::{Error, Progress, region};
+use crate::{Error, Progress};
 
 /// Factors by which coarser lattices are tried.
 const COARSER: [f64; 3] = [1.25, 1.5, 2.0];
@@ -302,8 +303,8 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::ct::source;
     use crate::scene::Override;
-    use crate::source;
 
     /// Coarsening also applies to the fine zone of a graded lattice, by the stated factor. The
     /// printed option has the same effect.

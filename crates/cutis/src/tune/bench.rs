@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use super::field::{Field, Movable};
 use super::setting::{CostModel, LinearCost, Setting};
 use crate::backend::Chosen;
-use crate::expense::Expense;
+use crate::cost::estimate::Expense;
 use crate::{CostReport, Error, Progress};
 
 /// Time limit for measuring a substep, s.

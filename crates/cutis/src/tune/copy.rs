@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use cutis_volume::PartialFile;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
 
+use crate::Error;
+use crate::run::files;
 use crate::scene::{LoadedScene, Scene};
-use crate::{Error, files};
 
 /// Destination of the copy, checked before the long work starts.
 pub(super) struct SceneCopy<'a> {

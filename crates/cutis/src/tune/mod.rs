@@ -29,12 +29,12 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use crate::backend::Request;
-use crate::clock::Clock;
-use crate::dynamics::{self, Dynamics};
-use crate::plan::{self, Prepared};
+use crate::cost::plan::{self, Prepared};
+use crate::model::constraints::system::{self as dynamics, Dynamics};
+use crate::model::needs_system;
 use crate::report::Machine;
+use crate::run::clock::Clock;
 use crate::scene::{FormulationChoice, LoadedScene};
-use crate::system::needs_system;
 use crate::{CostReport, Error, Progress};
 
 use ablation::Baseline;

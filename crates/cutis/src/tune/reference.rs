@@ -20,7 +20,7 @@ use super::bench::{Bench, Run};
 use super::field::Field;
 use super::setting::Setting;
 use crate::Error;
-use crate::clock::Clock;
+use crate::run::clock::Clock;
 
 /// Differences must shrink by this factor per level for a visible limit.
 const CONVERGES: f64 = 1.5;

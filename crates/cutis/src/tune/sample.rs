@@ -125,8 +125,8 @@ mod tests {
 
     use super::*;
     use crate::body::Body;
+    use crate::ct::source;
     use crate::scene::Scene;
-    use crate::source;
 
     fn body(lattice: &str) -> Body {
         let text = format!(

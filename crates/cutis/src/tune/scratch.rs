@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::Error;
-use crate::files::RunFolder;
+use crate::run::files::RunFolder;
 
 /// Numbers the folders of one process.
 static NUMBER: AtomicU32 = AtomicU32::new(0);

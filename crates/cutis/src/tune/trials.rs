@@ -9,7 +9,7 @@ use super::field::Field;
 use super::reference::Reference;
 use super::{Candidate, Demand, Setting, WoundError, setting};
 use crate::Error;
-use crate::clock::Clock;
+use crate::run::clock::Clock;
 use crate::scene::FormulationChoice;
 
 /// A candidate is abandoned if a cheaper one of its formulation had an error smaller by this factor

@@ -1,4 +1,4 @@
-//! The state in a checkpoint, as far as it is compared: its layout is described in `crates/cutis/src/checkpoint.rs`.
+//! The state in a checkpoint, as far as it is compared: its layout is described in `crates/cutis/src/run/checkpoint.rs`.
 
 use std::path::Path;
 

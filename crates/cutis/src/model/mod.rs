@@ -1,17 +1,20 @@
 //! What moves the body from frame to frame: one trait for all models.
 
-mod chained;
-mod stepped;
+pub(crate) mod chainmail;
+pub(crate) mod constraints;
+mod scene_system;
 
 use cutis_solver::StepProfile;
 use nalgebra::Point3;
 
 use crate::Error;
-use crate::checkpoint::Checkpoint;
 use crate::report::{ChainmailReport, KindResidual};
+use crate::run::checkpoint::Checkpoint;
 
-pub(crate) use chained::Chained;
-pub(crate) use stepped::Stepped;
+pub(crate) use chainmail::Chained;
+pub(crate) use constraints::Stepped;
+pub(crate) use scene_system::needs_system;
+pub use scene_system::{SceneSystem, build_system};
 
 /// A body in motion.
 pub(crate) trait Motion {

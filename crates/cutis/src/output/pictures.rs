@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::Error;
 use crate::backend::Stages;
-use crate::html::Figure;
 use crate::output::Outcome;
+use crate::output::html::Figure;
 use crate::scene::Scene;
 
 /// Pixels along each side of the skin pictures.

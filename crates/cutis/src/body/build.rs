@@ -6,8 +6,9 @@ use cutis_mesh::{
 };
 use cutis_volume::{TableKind, Volume};
 
+use crate::Error;
+use crate::body::region;
 use crate::scene::{IncisionSection, Keep, LoadedScene, PlaneSection, SkinChoice, StcSection};
-use crate::{Error, region};
 
 /// The cut body. Vertices keep their numbers through the cut; `mesh` and `skin` hold what the incisions left.
 pub(crate) struct Body {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::backend::Chosen;
-use crate::motion::Motion;
+use crate::model::Motion;
 use crate::report::MemoryPart;
 
 /// Time after which the measurement of a plan ends, s; one substep is always measured.

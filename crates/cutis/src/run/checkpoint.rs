@@ -10,7 +10,8 @@ use std::path::Path;
 use nalgebra::Point3;
 use sha2::{Digest, Sha256};
 
-use crate::{Error, Scene, files};
+use crate::run::files;
+use crate::{Error, Scene};
 
 const MAGIC: &[u8; 8] = b"CUTISCP2";
 const HEADER: usize = 8 + 32 + 4 + 8;

@@ -1,24 +1,24 @@
 //! What a scene will do, before it does it: sizes, colors, memory, what is left out, and which backend.
 
-mod costs;
-
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::backend::{self, Chosen, Request};
+use crate::body::region;
 use crate::body::{Body, needs_skin};
-use crate::chain::ChainBody;
-use crate::clock::Clock;
-use crate::dynamics::{self, Dynamics};
-use crate::motion::Chained;
+use crate::cost::cost_report;
+use crate::ct::source::{self, Source};
+use crate::model::Chained;
+use crate::model::chainmail::chain::ChainBody;
+use crate::model::constraints::system::{self as dynamics, Dynamics};
 use crate::report::{Backend, MemoryPart, Sizes, Stage};
+use crate::run::clock::Clock;
 use crate::scene::{LoadedScene, Model};
-use crate::source::{self, Source};
-use crate::{CostReport, Error, Progress, cost_report, region};
+use crate::{CostReport, Error, Progress};
 
-use costs::Costs;
+use crate::cost::model_costs::{self as costs, Costs};
 
 /// Why a plan has no times.
 const NO_DEVICE: &str = "not measured: no device is opened for a plan; `cutis tune` measures on the GPU";

@@ -6,13 +6,13 @@ use cutis_solver_cpu::CpuError;
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{End, Motion};
 use crate::Error;
 use crate::backend::Relaxer;
 use crate::body::Body;
-use crate::chain::{ChainBody, ChainHandle};
-use crate::checkpoint::Checkpoint;
+use crate::model::chainmail::chain::{ChainBody, ChainHandle};
+use crate::model::{End, Motion};
 use crate::report::ChainmailReport;
+use crate::run::checkpoint::Checkpoint;
 use crate::scene::LoadedScene;
 
 /// Parts of a frame, as the cost report names them.

@@ -1,22 +1,27 @@
 //! Running a scene: frames, measurements, checkpoints, then the outputs that the scene names.
 
+pub(crate) mod checkpoint;
+pub(crate) mod clock;
+pub(crate) mod files;
+pub(crate) mod frames;
+
 use std::path::PathBuf;
 
 use cutis_mesh::WoundGape;
 
 use crate::backend::{Chosen, Metered, Request, Stages};
 use crate::body::Body;
-use crate::checkpoint::{self, Checkpoint};
-use crate::clock::Clock;
-use crate::dynamics::Dynamics;
-use crate::files::RunFolder;
-use crate::frames::{Course, Finish, Timing, earlier_frames, frame_times, frames_csv};
-use crate::motion::{Chained, Motion, Stepped};
+use crate::cost::plan::{self, Matter, Prepared};
+use crate::model::constraints::system::Dynamics;
+use crate::model::{Chained, Motion, Stepped};
 use crate::output::{self, Outcome};
-use crate::plan::{self, Matter, Prepared};
 use crate::report::{Machine, Report, SCHEMA, Wound};
+use crate::run::clock::Clock;
+use crate::run::files::RunFolder;
+use crate::run::frames::{Course, Finish, Timing, earlier_frames, frame_times, frames_csv};
 use crate::scene::LoadedScene;
-use crate::{Error, Progress, files};
+use crate::{Error, Progress};
+use checkpoint::Checkpoint;
 
 /// How to run a scene.
 #[derive(Clone, Debug)]

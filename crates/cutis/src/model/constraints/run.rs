@@ -3,10 +3,10 @@
 use cutis_solver::{Solver, StepProfile};
 use nalgebra::{Point3, Vector3};
 
-use super::{End, Motion};
 use crate::Error;
-use crate::checkpoint::Checkpoint;
+use crate::model::{End, Motion};
 use crate::report::KindResidual;
+use crate::run::checkpoint::Checkpoint;
 
 /// The value over rest size from which on a constraint that cannot act is told of.
 const VIOLATED: f64 = 0.01;

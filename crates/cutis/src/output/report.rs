@@ -5,7 +5,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CostReport, Error, Scene, files};
+use crate::run::files;
+use crate::{CostReport, Error, Scene};
 
 /// Version of the report's layout; the number grows when a key changes its meaning or goes.
 pub const SCHEMA: &str = "cutis-report/1";

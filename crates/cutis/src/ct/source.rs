@@ -6,9 +6,10 @@ use cutis_volume::phantom::Phantom;
 use cutis_volume::sample::LatticeSize;
 use cutis_volume::{Table, TableKind, Volume, nifti};
 
+use crate::Error;
 use crate::report::Input;
+use crate::run::files;
 use crate::scene::{LatticeSection, LoadedScene, PhantomSection, SplitChoice, TableChoice, VolumeSection};
-use crate::{Error, files};
 
 /// The CT and where it came from.
 pub(crate) struct Source {

@@ -246,7 +246,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::source;
+    use crate::ct::source;
 
     #[test]
     fn the_share_that_a_region_would_hold_is_what_it_holds() {

@@ -7,9 +7,9 @@ use cutis_solver::StepProfile;
 use crate::Error;
 use crate::backend::{Chosen, Request};
 use crate::body::Body;
-use crate::chain::ChainBody;
-use crate::dynamics::Dynamics;
-use crate::expense::Expense;
+use crate::cost::estimate::Expense;
+use crate::model::chainmail::chain::ChainBody;
+use crate::model::constraints::system::Dynamics;
 use crate::report::{MemoryPart, Sizes};
 use crate::scene::LoadedScene;
 

@@ -7,9 +7,9 @@ use std::time::Instant;
 use cutis_mesh::{Gape, WoundGape};
 use cutis_solver::{SolverError, StepProfile};
 
-use crate::files::{self, RunFolder};
-use crate::motion::{End, Motion};
+use crate::model::{End, Motion};
 use crate::report::Frames;
+use crate::run::files::{self, RunFolder};
 use crate::scene::RunSection;
 use crate::{CostReport, Error, Progress};
 

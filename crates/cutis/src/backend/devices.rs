@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::backend;
+use super::gpu;
 
 /// The GPUs of this machine.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -56,5 +56,5 @@ pub struct DeviceLimits {
 
 /// Looks for GPUs and opens each of them once, to see whether it can be used.
 pub fn devices() -> Devices {
-    backend::devices()
+    gpu::devices()
 }

@@ -3,9 +3,11 @@
 use cutis_mesh::Gape;
 use cutis_solver::{Settings, System};
 
+use crate::Error;
 use crate::body::Body;
+use crate::ct::source;
+use crate::model::constraints::system as dynamics;
 use crate::scene::{LoadedScene, Model};
-use crate::{Error, dynamics, source};
 
 /// What a run of a scene steps, before its first frame.
 pub struct SceneSystem {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::{Error, LoadedScene, Override, Scene};
 
-const SCENE: &str = include_str!("scene/demo.toml");
+const SCENE: &str = include_str!("demo.toml");
 
 /// The demo's scene, with overrides applied.
 ///

@@ -1,5 +1,9 @@
 //! What a run leaves behind: the deformed CT, surfaces, pictures. Nothing is computed for an output that is not named.
 
+pub(crate) mod html;
+pub(crate) mod pictures;
+pub mod report;
+
 use std::path::{Path, PathBuf};
 
 use cutis_mesh::Shell;
@@ -11,16 +15,16 @@ use nalgebra::Point3;
 
 use crate::backend::{Request, Stages};
 use crate::body::Body;
-use crate::checkpoint::{self, Checkpoint};
-use crate::clock::Clock;
-use crate::files::RunFolder;
-use crate::frames::FrameRow;
-use crate::html::{self, Figure};
-use crate::pictures;
+use crate::ct::source::{self, Source};
 use crate::report::{Report, Resample};
+use crate::run::checkpoint::{self, Checkpoint};
+use crate::run::clock::Clock;
+use crate::run::files;
+use crate::run::files::RunFolder;
+use crate::run::frames::FrameRow;
 use crate::scene::LoadedScene;
-use crate::source::{self, Source};
-use crate::{Error, Progress, files};
+use crate::{Error, Progress};
+use html::Figure;
 
 /// The end of a simulation.
 pub(crate) struct Outcome<'a> {
