@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
-use cutis::scene::Override;
+use cutis::scene::{Override, constraint_kinds};
 use cutis::volume::sample::LatticeSize;
 
 /// Cut a CT scan and watch skin tension open the wound.
@@ -217,15 +218,8 @@ pub(crate) struct Change {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) set: Vec<Override>,
     /// Remove a constraint kind from the scene
-    #[arg(long, value_enum, value_name = "KIND")]
-    pub(crate) without: Vec<ConstraintKind>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum ConstraintKind {
-    Distance,
-    Volume,
-    Stc,
+    #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(constraint_kinds()))]
+    pub(crate) without: Vec<String>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

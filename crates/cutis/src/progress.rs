@@ -1,6 +1,6 @@
-//! How a run tells what it is doing, without knowing whether anybody looks.
+//! Reports the progress of a run to the caller.
 
-/// Receives the progress of long work. All methods may be called from worker threads.
+/// Receives the progress of long work. Worker threads may call all methods.
 pub trait Progress: Sync {
     /// A stage begins; it will report up to `total` units (0: unknown).
     fn begin(&self, stage: &str, total: u64);
@@ -8,11 +8,11 @@ pub trait Progress: Sync {
     fn advance(&self, done: u64);
     /// The current stage is finished.
     fn end(&self);
-    /// Something that the user should know, said once.
+    /// A note to the user, given once.
     fn note(&self, message: &str);
 }
 
-/// Says nothing.
+/// Ignores all progress.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use cutis::report::ChainmailReport;
-use cutis::scene::{DistanceSection, Model};
+use cutis::scene::{DistanceSection, ModelChoice};
 use cutis::volume::nifti;
 use cutis::{LoadedScene, SceneSystem};
 use nalgebra::{Point3, Vector3};
@@ -96,7 +96,7 @@ struct Twin {
 impl Twin {
     fn of(loaded: &LoadedScene) -> Self {
         let mut other = loaded.clone();
-        other.scene.model = Model::Pbd;
+        other.scene.model = ModelChoice::Pbd;
         other.scene.constraints.distance = Some(DistanceSection { youngs_modulus_pa: 1e4, stiffness: 1.0 });
         let SceneSystem { system, .. } = cutis::build_system(&other).unwrap();
         let rest = system.positions();

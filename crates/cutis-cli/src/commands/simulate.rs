@@ -7,7 +7,7 @@ use cutis::volume::sample::LatticeSize;
 use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOptions, Scene};
 
 use super::pretty;
-use crate::args::{Change, ConstraintKind};
+use crate::args::Change;
 use crate::terminal::{Terminal, print};
 
 pub(crate) fn demo(out: &Path, change: &Change, json: bool) -> Result<(), Error> {
@@ -52,15 +52,7 @@ fn summary(report: &Report, out: &Path) -> String {
             report.frames.ms_mean
         ),
     ];
-    lines.extend(report.chainmail.iter().map(|chainmail| {
-        format!(
-            "chainmail: {} elements moved, {} links beyond their limits, {} sweeps of relaxation{}",
-            chainmail.moved,
-            chainmail.violated_links,
-            chainmail.relax_sweeps,
-            if chainmail.settled { " (settled)" } else { "" }
-        )
-    }));
+    lines.extend(report.model_summary());
     lines.extend(report.wounds.iter().map(|w| {
         format!("wound: {:.2} mm -> {:.2} mm ({:.2} mm in the middle)", w.initial_mm, w.final_mm, w.mid_mm)
     }));
@@ -189,13 +181,8 @@ impl Change {
 
     /// Removes the constraint kinds that `--without` names.
     pub(super) fn applied(&self, mut loaded: LoadedScene) -> LoadedScene {
-        let constraints = &mut loaded.scene.constraints;
         for kind in &self.without {
-            match kind {
-                ConstraintKind::Distance => constraints.distance = None,
-                ConstraintKind::Volume => constraints.volume = None,
-                ConstraintKind::Stc => constraints.stc = None,
-            }
+            loaded.scene.constraints.remove(kind);
         }
         loaded
     }

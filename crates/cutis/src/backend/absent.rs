@@ -1,33 +1,42 @@
-//! A build without the feature `gpu`: a GPU is refused by name, and `auto` takes the CPU and says why.
+//! A build without the feature `gpu`: a scene that names a GPU is refused, and `auto` takes the CPU and
+//! says why.
 
-use cutis_chainmail::{Chain, ChainError, Relaxation};
 use cutis_render::{Image, RenderError, View};
 use cutis_resample::{ResampleError, ResampleReport, Warp};
-use cutis_solver::{Settings, System};
 use cutis_volume::Volume;
+use nalgebra::Point3;
 
-use super::{Chosen, Metered, Running, Work};
-use crate::report::{DeviceWork, MemoryPart};
-use crate::scene::LoadedScene;
+use super::{Chosen, Work};
+use crate::output::report::DeviceWork;
+use crate::scene::{SceneFile, SolverSection};
 use crate::{Devices, Error};
 
 /// Why there is no GPU.
 pub(crate) const ABSENT: Option<&str> = Some("this build has no GPU backend");
 
-/// No device: there is none to be had.
+/// An open GPU; there is no value of this type.
 #[derive(Clone)]
 pub(crate) enum Gpu {}
 
-/// No adapter: there is none to be had.
+/// A GPU to be used; there is no value of this type.
 pub(super) enum Device {}
 
-pub(super) fn asked_for(loaded: &LoadedScene, _: &str) -> Result<Chosen, Error> {
-    let why = "this build has no GPU backend; use \"cpu\" or \"auto\"".into();
-    Err(loaded.blame("solver.backend")(Error::Backend { backend: "gpu".into(), why }))
+/// Positions on a GPU; there is no value of this type.
+pub(crate) enum DevicePositions {}
+
+impl DevicePositions {
+    pub(crate) fn with(&self, _: &Gpu, _: &[Point3<f32>]) -> Result<Self, Error> {
+        match *self {}
+    }
 }
 
-pub(super) fn auto(loaded: &LoadedScene, _: &Work) -> Result<Chosen, Error> {
-    Ok(Chosen::cpu(loaded, "auto: this build has no GPU backend"))
+pub(super) fn named_by_scene(file: SceneFile<'_>, _: &SolverSection, _: &str) -> Result<Chosen, Error> {
+    let why = "this build has no GPU backend; use \"cpu\" or \"auto\"".into();
+    Err(file.blame("solver.backend")(Error::Backend { backend: "gpu".into(), why }))
+}
+
+pub(super) fn auto(_: SceneFile<'_>, solver: &SolverSection, _: &Work) -> Result<Chosen, Error> {
+    Ok(Chosen::cpu(solver, "auto: this build has no GPU backend"))
 }
 
 pub(super) fn devices() -> Devices {
@@ -39,10 +48,6 @@ pub(super) fn devices() -> Devices {
     }
 }
 
-pub(super) fn memory(device: &Device, _: &System<f32>, _: &Settings) -> Vec<MemoryPart> {
-    match *device {}
-}
-
 pub(super) fn kept_open(device: Device) -> Result<Device, Error> {
     match device {}
 }
@@ -51,31 +56,11 @@ pub(super) fn open(device: &Device) -> Result<Gpu, Error> {
     match *device {}
 }
 
-pub(super) fn start(device: &Device, _: System<f32>, _: Settings) -> Result<Running, Error> {
-    match *device {}
-}
-
-/// Relaxation on no device.
-pub(crate) enum Relaxer {}
-
-impl Relaxer {
-    pub(crate) fn relax(&mut self, _: &mut Chain, _: u32, _: &[u32]) -> Result<Relaxation, ChainError> {
-        match *self {}
-    }
-}
-
-pub(super) fn start_chain(device: &Device, _: &Chain) -> Result<(Relaxer, Metered), Error> {
-    match *device {}
-}
-
-pub(super) fn chain_memory(device: &Device, _: &Chain) -> Vec<MemoryPart> {
-    match *device {}
-}
-
 pub(super) fn resample(
     gpu: &Gpu,
     _: &Volume,
     _: &Warp<'_>,
+    _: Option<&DevicePositions>,
     _: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<(Volume, ResampleReport), ResampleError> {
     match *gpu {}
@@ -87,6 +72,10 @@ pub(super) fn raymarch(gpu: &Gpu, _: &Volume, _: &View<'_>) -> Result<Image, Ren
 
 pub(super) fn lacks_device(_: &Error) -> bool {
     false
+}
+
+pub(super) fn has_timestamps(gpu: &Gpu) -> bool {
+    match *gpu {}
 }
 
 pub(super) fn work(gpu: &Gpu) -> DeviceWork {

@@ -1,36 +1,39 @@
-//! When `auto` takes a GPU: by the size of the work and the kind of device, and only then by looking what there is.
+//! Decides when `auto` takes a GPU: first by the amount of work, then by the adapters of the machine.
 
 use cutis_gpu::{Adapter, AdapterKind, GpuError, Select};
 use cutis_solver::Vertex;
 
 use super::Work;
 
-/// Constraints of a color, on average, or vertices in vertex block descent, from which `auto` takes a GPU of its own memory.
+/// Mean number of constraints of a color (of vertices in vertex block descent) above which `auto` takes a
+/// GPU with memory of its own.
 ///
-/// A color is one dispatch, and colors run one after the other. What a dispatch costs before it computes anything (launch,
-/// and the barrier to the one before) is of the order of 10 µs on a GPU; the CPU backend projects about 40 constraints per
-/// microsecond and core (the demo on two cores: 57 million projections in 0.7 s). With fewer constraints than
-/// 40 × 10 µs × cores, several thousand on a common machine, the CPU is done before a GPU has begun; and a large GPU needs
-/// some ten thousand threads at once to be busy. This is an estimate: no hardware GPU was at hand to measure it.
-/// A vertex has several ten constraints to evaluate, so that the CPU would be done later; a GPU needs as many threads to be busy.
+/// A color is one dispatch, and colors run one after the other. The launch of a dispatch and the barrier
+/// before it take about 10 µs on a GPU. The CPU backend projects about 40 constraints per microsecond and
+/// core (the demo on two cores: 57 million projections in 0.7 s). With fewer constraints than
+/// 40 × 10 µs × cores, several thousand on a common machine, the CPU ends before a GPU has begun. A large
+/// GPU also needs some ten thousand threads at once to be busy. A vertex has several tens of constraints,
+/// so the CPU would take longer, but a GPU needs as many threads. All this is an estimate: no hardware
+/// GPU was available to measure it.
 const MIN_PER_SWEEP: u64 = 16_384;
 
-/// Constraints that a run evaluates from which `auto` takes a GPU, one in each projection: a second or two on the CPU backend with two cores. Opening a device,
-/// compiling kernels and uploading the body costs a part of a second, which a shorter run never earns back. An estimate too.
+/// Number of constraint evaluations of a run above which `auto` takes a GPU: one or two seconds on the CPU
+/// backend with two cores. A GPU takes part of a second to open, to compile kernels and to upload the
+/// body, which a shorter run never earns back. This is an estimate too.
 const MIN_EVALUATIONS: u64 = 100_000_000;
 
-/// How many times as many constraints `auto` asks for before it takes a GPU that shares the memory of the CPU: projections
-/// wait for memory rather than for arithmetic, and there both wait for the same. An estimate too.
+/// Factor on [`MIN_PER_SWEEP`] for a GPU that shares the memory of the CPU. Projections wait for memory
+/// rather than for arithmetic, and there both wait for the same memory. This is an estimate too.
 const SHARED_MEMORY_FACTOR: u64 = 4;
 
-/// What `auto` decides, and why.
+/// The decision of `auto`, with its reason.
 #[derive(Debug, PartialEq)]
 pub(super) enum Verdict {
     Cpu(String),
     Gpu(Adapter, String),
 }
 
-/// Decides for `auto`; `adapters` is called only if the work is large enough for any of them.
+/// Decides for `auto`. `adapters` is called only if the work is large enough for a GPU.
 pub(super) fn weigh(
     work: &Work,
     adapter: Option<&str>,
@@ -69,7 +72,7 @@ pub(super) fn weigh(
     Ok(Verdict::Cpu(first_objection.unwrap_or_else(|| "there is no GPU adapter".into())))
 }
 
-/// Why `auto` does not take an adapter, whatever the scene.
+/// Why `auto` never takes this adapter; none if it may take it.
 pub(super) fn objection(adapter: &Adapter) -> Option<String> {
     if let Some(lacking) = &adapter.lacking {
         return Some(format!("{} cannot be opened: {lacking}", adapter.name));
@@ -85,7 +88,7 @@ pub(super) fn objection(adapter: &Adapter) -> Option<String> {
     }
 }
 
-/// Why `auto` does not take an adapter for this scene.
+/// Why `auto` does not take an adapter for this amount of work.
 fn too_small_for(adapter: &Adapter, work: &Work, per_sweep: u64) -> Option<String> {
     let pays_from = MIN_PER_SWEEP * SHARED_MEMORY_FACTOR;
     if adapter.kind == AdapterKind::Integrated && per_sweep < pays_from {
@@ -104,7 +107,7 @@ fn too_small_for(adapter: &Adapter, work: &Work, per_sweep: u64) -> Option<Strin
     })
 }
 
-/// The adapter that a scene names; the best one if it names none.
+/// Selects the adapter that a scene names, or the best one.
 pub(super) fn select(adapter: Option<&str>) -> Select {
     adapter.map_or(Select::First, |text| text.parse().unwrap_or_else(|never| match never {}))
 }
@@ -144,7 +147,7 @@ mod tests {
         }
     }
 
-    /// The index of the adapter that is taken, or why it is the CPU.
+    /// The index of the adapter that `auto` takes, or the reason for the CPU.
     fn verdict(work: Work, asked: Option<&str>, all: &[Adapter]) -> Result<usize, String> {
         match weigh(&work, asked, || all.to_vec()).unwrap() {
             Verdict::Gpu(adapter, _) => Ok(adapter.index),
@@ -153,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_takes_the_first_hardware_that_a_large_scene_can_fill() {
+    fn auto_takes_the_first_hardware_adapter_that_a_large_scene_can_fill() {
         use AdapterKind::*;
         let card = adapter(0, "Card", Discrete);
         let chip = adapter(1, "Chip", Integrated);
@@ -162,7 +165,7 @@ mod tests {
         assert_eq!(verdict(LARGE, Some("chip"), &[card.clone(), chip.clone()]), Ok(1));
         assert_eq!(verdict(LARGE, None, std::slice::from_ref(&lent)), Ok(0));
 
-        // A scene that keeps a card busy, but not a chip that shares the memory of the CPU.
+        // This scene keeps a card busy, but not a chip that shares the memory of the CPU.
         let middle = Work { elements: 20_000 * 50, ..LARGE };
         assert_eq!(verdict(middle, None, &[card, chip.clone()]), Ok(0));
         let why = verdict(middle, Some("1"), &[lent, chip]).unwrap_err();
@@ -170,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_never_takes_software_nor_what_it_does_not_know() {
+    fn auto_never_takes_a_software_or_an_unknown_adapter() {
         let software = adapter(1, "llvmpipe", AdapterKind::Software);
         let unknown = adapter(0, "mystery", AdapterKind::Unknown);
         for (all, asked, word) in [
@@ -186,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_passes_by_what_cannot_be_opened() {
+    fn auto_skips_adapters_that_cannot_be_opened() {
         let lacking = Some("WebGPU's baseline limit max_bind_groups: 4 needed, 2 offered".to_owned());
         let old = Adapter { lacking, ..adapter(0, "Old", AdapterKind::Discrete) };
         let chip = adapter(1, "Chip", AdapterKind::Integrated);

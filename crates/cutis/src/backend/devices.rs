@@ -1,4 +1,4 @@
-//! `cutis devices`: the GPUs of this machine, which of them can be used, and which one `auto` takes.
+//! `cutis devices`: the GPUs of this machine, whether they can be used, and the one that `auto` takes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,22 +8,22 @@ use super::gpu;
 /// The GPUs of this machine.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Devices {
-    /// Whether this build has a GPU backend; without it nobody looks for devices.
+    /// Whether this build has a GPU backend. A build without one looks for no devices.
     pub gpu_backend: bool,
     /// Best hardware first, software last.
     pub devices: Vec<Device>,
-    /// Index of the one that `backend = "auto"` takes for a scene that is large enough; none: it takes the CPU backend.
+    /// Index of the GPU that `backend = "auto"` takes for a large scene; none if it takes the CPU backend.
     pub auto: Option<usize>,
-    /// What `auto` does, in words, or what to install.
+    /// What `auto` takes and why, or what to install.
     pub note: String,
 }
 
 /// One adapter.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Device {
-    /// What `--adapter` takes, beside a part of the name.
+    /// Index, which `--adapter` accepts. It accepts a part of the name as well.
     pub index: usize,
-    /// The driver's name of it.
+    /// Name that the driver gives it.
     pub name: String,
     /// `discrete`, `integrated`, `virtual`, `unknown` or `software`.
     pub kind: String,
@@ -31,11 +31,11 @@ pub struct Device {
     pub api: String,
     /// Name and version of the driver.
     pub driver: String,
-    /// What it offers.
+    /// Limits of the adapter.
     pub limits: DeviceLimits,
-    /// Whether it was opened just now.
+    /// Whether it could be opened.
     pub usable: bool,
-    /// Why not.
+    /// Why it could not be opened.
     pub why: Option<String>,
 }
 
@@ -54,7 +54,7 @@ pub struct DeviceLimits {
     pub storage_buffers_per_stage: u32,
 }
 
-/// Looks for GPUs and opens each of them once, to see whether it can be used.
+/// Lists the GPUs of this machine. Opens each of them once to see whether it can be used.
 pub fn devices() -> Devices {
     gpu::devices()
 }

@@ -1,59 +1,60 @@
-//! GPUs: which adapter a scene means, which there are, and opening one.
+//! GPUs: the adapter that a scene means, the adapters of this machine, and opening one.
 
-use cutis_chainmail::{Chain, ChainError};
-use cutis_gpu::{Adapter, AdapterKind, GpuError, GpuOptions, Select, adapters};
+use cutis_gpu::{Adapter, AdapterKind, Buffer, GpuError, GpuOptions, Select, adapters};
 use cutis_render::RenderError;
-use cutis_resample::ResampleError;
-use cutis_solver::{Settings, System};
-use cutis_solver_gpu::{GpuSolverError, SolverGpu};
+use cutis_resample::{ResampleError, ResampleReport, ResamplerGpu, ResamplerOptions, Warp, resample_gpu};
+use cutis_volume::Volume;
+use nalgebra::Point3;
 
 use super::auto::{self, Verdict, select};
-use super::{Chosen, Metered, Place, Running, Work};
-use crate::backend::devices::{Device as Listed, DeviceLimits};
-use crate::report::{Backend, DeviceWork, MemoryPart};
-use crate::scene::LoadedScene;
+use super::devices::{Device as Listed, DeviceLimits};
+use super::{Chosen, Place, Work};
+use crate::output::report::{Backend, DeviceWork};
+use crate::scene::{SceneFile, SolverSection};
 use crate::{Devices, Error};
 
-pub(crate) use cutis_chainmail::RelaxGpu as Relaxer;
 pub(crate) use cutis_gpu::Gpu;
 pub(super) use cutis_render::raymarch_gpu as raymarch;
-pub(super) use cutis_resample::resample_gpu as resample;
 
 /// Why there is no GPU: this build has the backend.
 pub(crate) const ABSENT: Option<&str> = None;
 
-/// Which device to use.
+/// The GPU to use.
 pub(super) enum Device {
-    /// To be opened: its index in [`adapters`].
+    /// Index in [`adapters`] of a GPU that is not open yet.
     Adapter(usize),
-    /// Opened by the caller.
+    /// A GPU that is open.
     Opened(Gpu),
 }
 
-/// The GPU that a scene asks for by `backend = "gpu"`.
-pub(super) fn asked_for(loaded: &LoadedScene, reason: &str) -> Result<Chosen, Error> {
+/// The GPU that a scene names by `backend = "gpu"`.
+pub(super) fn named_by_scene(
+    file: SceneFile<'_>,
+    solver: &SolverSection,
+    reason: &str,
+) -> Result<Chosen, Error> {
     let all = adapters();
-    let adapter = wanted(loaded).among(&all).map_err(|e| refused(loaded, e))?;
+    let adapter = select(solver.adapter.as_deref()).among(&all).map_err(|e| refused(file, e))?;
     Ok(chosen(adapter, Device::Adapter(adapter.index), reason))
 }
 
-/// A device that the caller opened.
+/// A GPU that the caller opened.
 pub(super) fn opened(gpu: &Gpu) -> Chosen {
     chosen(gpu.adapter(), Device::Opened(gpu.clone()), "the caller opened it")
 }
 
-/// What `auto` takes.
-pub(super) fn auto(loaded: &LoadedScene, work: &Work) -> Result<Chosen, Error> {
-    let verdict = auto::weigh(work, loaded.scene.solver.adapter.as_deref(), adapters);
-    Ok(match verdict.map_err(|e| refused(loaded, e))? {
-        Verdict::Cpu(reason) => Chosen::cpu(loaded, &format!("auto: {reason}")),
+/// The backend that `auto` takes.
+pub(super) fn auto(file: SceneFile<'_>, solver: &SolverSection, work: &Work) -> Result<Chosen, Error> {
+    let verdict = auto::weigh(work, solver.adapter.as_deref(), adapters);
+    Ok(match verdict.map_err(|e| refused(file, e))? {
+        Verdict::Cpu(reason) => Chosen::cpu(solver, &format!("auto: {reason}")),
         Verdict::Gpu(adapter, reason) => {
             chosen(&adapter, Device::Adapter(adapter.index), &format!("auto: {reason}"))
         }
     })
 }
 
-/// What there is; each adapter is opened once.
+/// The GPUs of this machine; each is opened once.
 pub(super) fn devices() -> Devices {
     let all = adapters();
     let devices: Vec<Listed> = all.iter().map(listed).collect();
@@ -61,7 +62,7 @@ pub(super) fn devices() -> Devices {
     Devices { gpu_backend: true, auto, note, devices }
 }
 
-/// The adapter that `auto` takes for a scene that is large enough, marked only if it was opened, and what to say of it.
+/// Index of the adapter that `auto` takes for a large scene, if it can be opened, and a note about it.
 fn taken_by_auto(all: &[Adapter], listed: &[Listed]) -> (Option<usize>, String) {
     let Some(first) = all.first() else {
         return (None, format!("\"auto\" takes the CPU backend: {}", GpuError::NoAdapter));
@@ -108,16 +109,12 @@ fn listed(adapter: &Adapter) -> Listed {
     }
 }
 
-fn wanted(loaded: &LoadedScene) -> Select {
-    select(loaded.scene.solver.adapter.as_deref())
-}
-
-fn refused(loaded: &LoadedScene, error: GpuError) -> Error {
+fn refused(file: SceneFile<'_>, error: GpuError) -> Error {
     let (key, why) = match &error {
         GpuError::NoAdapter => ("solver.backend", format!("{error}; or use \"cpu\" or \"auto\"")),
-        _ => ("solver.adapter", format!("{error}; `cutis devices` tells more about them")),
+        _ => ("solver.adapter", format!("{error}; `cutis devices` describes them")),
     };
-    loaded.blame(key)(Error::Backend { backend: "gpu".into(), why })
+    file.blame(key)(Error::Backend { backend: "gpu".into(), why })
 }
 
 fn chosen(adapter: &Adapter, device: Device, reason: &str) -> Chosen {
@@ -139,53 +136,72 @@ fn chosen(adapter: &Adapter, device: Device, reason: &str) -> Chosen {
     }
 }
 
-pub(super) fn memory(_: &Device, system: &System<f32>, settings: &Settings) -> Vec<MemoryPart> {
-    cutis_solver_gpu::device_bytes(system, settings).iter().map(MemoryPart::from).collect()
-}
-
-/// The same, opened.
+/// The same GPU, open.
 pub(super) fn kept_open(device: Device) -> Result<Device, Error> {
     open(&device).map(Device::Opened)
 }
 
-/// Opens the device.
+/// Opens the GPU, with timestamps if it has them, for the times of the cost report.
 pub(super) fn open(device: &Device) -> Result<Gpu, Error> {
     Ok(match device {
         Device::Opened(gpu) => gpu.clone(),
-        Device::Adapter(index) => {
-            Gpu::open(&GpuOptions { select: Select::Index(*index), ..GpuOptions::default() })?
-        }
+        Device::Adapter(index) => Gpu::open(&GpuOptions {
+            select: Select::Index(*index),
+            timestamps: true,
+            ..GpuOptions::default()
+        })?,
     })
 }
 
-/// Opens the device, uploads the body and compiles the kernels that it needs.
-pub(super) fn start(device: &Device, system: System<f32>, settings: Settings) -> Result<Running, Error> {
-    let gpu = open(device)?;
-    let before = work(&gpu);
-    let solver = SolverGpu::new(&gpu, system, settings).map_err(|e| match e {
-        GpuSolverError::Solver(e) => Error::Solver(e),
-        GpuSolverError::Gpu(e) => Error::Gpu(e),
-        other => Error::Backend { backend: "gpu".into(), why: other.to_string() },
-    })?;
-    Ok(Running { solver: Box::new(solver), device: Some(Metered { gpu, before }) })
+/// Positions of vertices that stay on a GPU: x, y, z in local meters.
+pub(crate) struct DevicePositions(Buffer<[f32; 4]>);
+
+impl DevicePositions {
+    /// Copies positions on the GPU and uploads further ones after them.
+    ///
+    /// # Errors
+    /// [`GpuError`] if the GPU has no room or is lost.
+    pub(crate) fn copy(
+        gpu: &Gpu,
+        positions: &Buffer<[f32; 4]>,
+        further: &[Point3<f32>],
+    ) -> Result<Self, GpuError> {
+        let count = positions.len();
+        let all = gpu.zeroed("positions after the run", count + further.len())?;
+        let further: Vec<[f32; 4]> = further.iter().map(|p| [p.x, p.y, p.z, 0.0]).collect();
+        gpu.write(&all, count, &further)?;
+        let mut pass = gpu.pass("copy positions");
+        pass.copy(positions, 0..count, &all, 0);
+        pass.submit()?;
+        Ok(Self(all))
+    }
+
+    /// The same positions, with further ones uploaded after them.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if the GPU has no room or is lost.
+    pub(crate) fn with(&self, gpu: &Gpu, further: &[Point3<f32>]) -> Result<Self, Error> {
+        Ok(Self::copy(gpu, &self.0, further)?)
+    }
 }
 
-/// Opens the device and makes room for a chain.
-pub(super) fn start_chain(device: &Device, chain: &Chain) -> Result<(Relaxer, Metered), Error> {
-    let gpu = open(device)?;
-    let before = work(&gpu);
-    let relaxer = Relaxer::new(&gpu, chain).map_err(|error| match error {
-        ChainError::Gpu(error) => Error::Gpu(error),
-        other => Error::Chain(other),
-    })?;
-    Ok((relaxer, Metered { gpu, before }))
+/// Resamples on a GPU. With `positions` the deformed positions of the warp are not uploaded.
+pub(super) fn resample(
+    gpu: &Gpu,
+    volume: &Volume,
+    warp: &Warp<'_>,
+    positions: Option<&DevicePositions>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<(Volume, ResampleReport), ResampleError> {
+    let Some(DevicePositions(positions)) = positions else {
+        return resample_gpu(gpu, volume, warp, progress);
+    };
+    let mut resampler = ResamplerGpu::new(gpu, volume, warp, &ResamplerOptions::default())?;
+    resampler.resample_device(positions)?;
+    Ok((resampler.volume(progress)?, resampler.report()?))
 }
 
-pub(super) fn chain_memory(_: &Device, chain: &Chain) -> Vec<MemoryPart> {
-    vec![MemoryPart { part: "relaxation".into(), bytes: Relaxer::BYTES_PER_PLACE * chain.places() }]
-}
-
-/// Whether a stage failed for want of room or of the device, as against a fault of a kernel.
+/// Whether a stage failed for lack of memory or because the GPU is gone, and not by a faulty kernel.
 pub(super) fn lacks_device(error: &Error) -> bool {
     match error {
         Error::Resample(ResampleError::TooLarge { .. }) => true,
@@ -201,6 +217,11 @@ pub(super) fn lacks_device(error: &Error) -> bool {
         }
         _ => false,
     }
+}
+
+/// Whether the last pass has timestamps.
+pub(super) fn has_timestamps(gpu: &Gpu) -> bool {
+    gpu.last_pass_ns().is_ok_and(|ns| ns.is_some())
 }
 
 pub(super) fn work(gpu: &Gpu) -> DeviceWork {
@@ -219,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_does_not_fit_is_the_scene_s_fault_and_what_fails_the_device_s() {
+    fn a_body_that_does_not_fit_is_bad_input_and_a_failing_device_is_not() {
         let adapter = || "Card".to_owned();
         let memory = GpuError::OutOfMemory { what: "vertices".into(), bytes: 1 << 40 };
         let limit = GpuError::Limit { what: "vertices".into(), needed: 2, available: 1, adapter: adapter() };
@@ -236,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_does_without_a_device_that_fails_and_not_without_a_kernel_that_is_wrong() {
+    fn a_stage_moves_to_the_cpu_for_a_failing_device_and_not_for_a_faulty_kernel() {
         let wait = GpuError::Wait { adapter: "Card".into(), reason: "time out".into() };
         let read = GpuError::Readback { what: "buffer 'image'".into(), reason: "unmapped".into() };
         for error in [wait, read] {

@@ -1,50 +1,47 @@
-//! Where a scene runs, and why: the one place that chooses between the backends.
+//! The choice of the backend that runs a scene, and why it was chosen.
 //!
-//! What a scene asks for by name is settled before any work is done ([`Request::of`]): a backend or an adapter that is not
-//! there is refused, never replaced. `auto` waits until the size of the work is known ([`Request::settle`]), so that nobody
-//! looks for a GPU for a scene that is too small for one. No device is opened before [`Chosen::start`].
+//! A backend or adapter that the scene names is settled before any work is done ([`Request::of`]); if it
+//! does not exist, the scene is refused. `auto` is settled when the size of the work is known
+//! ([`Request::settle`]), so that a small scene never looks for a GPU. No device is opened before
+//! [`Chosen::open`].
 
 #[cfg(feature = "gpu")]
 mod auto;
-pub(crate) mod devices;
+mod devices;
 #[cfg_attr(not(feature = "gpu"), path = "absent.rs")]
 mod gpu;
 mod stages;
 
-use cutis_chainmail::Chain;
-use cutis_solver::{Settings, Solver, SolverReference, System};
-use cutis_solver_cpu::SolverCpu;
-
 use crate::Error;
-use crate::report::{Backend, DeviceWork, MemoryPart};
-use crate::scene::{BackendChoice, LoadedScene};
-use gpu::Gpu;
+use crate::output::report::{Backend, DeviceWork};
+use crate::scene::{BackendChoice, LoadedScene, SceneFile, SolverSection};
 
 pub use devices::{Device, DeviceLimits, Devices, devices};
-pub(crate) use gpu::{ABSENT, Relaxer};
+pub(crate) use gpu::{ABSENT, DevicePositions, Gpu};
 pub(crate) use stages::Stages;
 
-/// What a scene asks for, as far as it can be settled without a body.
+/// The backend that a scene asks for, as far as it can be settled without a body.
 pub(crate) enum Request {
     Settled(Chosen),
-    /// The best one for the size of the work.
+    /// The best backend for the size of the work.
     Auto,
 }
 
-/// How much there is to do, as far as it matters to the choice.
+/// The amount of work, as far as it matters to the choice.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only a build with GPUs has a choice"))]
 pub(crate) struct Work {
     pub(crate) vertices: u64,
-    /// What is done at once: constraints, or vertices in vertex block descent.
+    /// What a thread handles: constraints, or vertices in vertex block descent.
     pub(crate) element: &'static str,
-    /// Of these, all that an iteration goes through.
+    /// Elements of an iteration.
     pub(crate) elements: u64,
     /// Colors that an iteration executes one after the other.
     pub(crate) sweeps: u64,
     /// Projections of the whole run, or steps of a vertex.
     pub(crate) projections: u64,
-    /// Constraints that are evaluated in the whole run: once in a projection, and in the step of a vertex as many as it is in.
+    /// Evaluations of a constraint in the whole run: one per projection, and one for each constraint of
+    /// a vertex in the step of that vertex.
     pub(crate) evaluations: u64,
 }
 
@@ -52,53 +49,46 @@ pub(crate) struct Work {
 pub(crate) struct Chosen {
     pub(crate) report: Backend,
     place: Place,
-    /// What the user should know about it.
+    /// A note for the user about this backend.
     pub(crate) note: Option<String>,
 }
 
 enum Place {
     Cpu,
     Reference,
-    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "there is none to be had"))]
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "a build without GPUs never makes one"))]
     Gpu(gpu::Device),
 }
 
-/// A backend with a body in it.
-pub(crate) struct Running {
-    pub(crate) solver: Box<dyn Solver<f32>>,
-    /// The device that it runs on; the stages after the simulation use it too.
-    device: Option<Metered>,
-}
-
-/// A device, and what it had done before this run.
-pub(crate) struct Metered {
+/// An open GPU, and the work that it had done before this run.
+pub(crate) struct DeviceMeter {
     gpu: Gpu,
     before: DeviceWork,
 }
 
 impl Request {
-    /// Settles what the scene names.
+    /// Settles the backend that the scene names.
     ///
     /// # Errors
     /// [`Error::Backend`] if this build or this machine does not have it.
     pub(crate) fn of(loaded: &LoadedScene) -> Result<Self, Error> {
-        let reason = "the scene asks for it";
-        Ok(match loaded.scene.solver.backend {
+        let (solver, reason) = (&loaded.scene.solver, "the scene asks for it");
+        Ok(match solver.backend {
             BackendChoice::Auto => Self::Auto,
-            BackendChoice::Cpu => Self::Settled(Chosen::cpu(loaded, reason)),
+            BackendChoice::Cpu => Self::Settled(Chosen::cpu(solver, reason)),
             BackendChoice::Reference => {
                 let report = Backend::on_host("reference", 1, reason);
                 Self::Settled(Chosen { report, place: Place::Reference, note: None })
             }
-            BackendChoice::Gpu => Self::Settled(gpu::asked_for(loaded, reason)?),
+            BackendChoice::Gpu => Self::Settled(gpu::named_by_scene(loaded.file(), solver, reason)?),
         })
     }
 
-    /// Opens the GPU that is asked for by name; none for any other backend, and for `auto`, which weighs the size of a
-    /// simulation.
+    /// Opens the GPU that the scene names. None for any other backend, and for `auto`, which decides by
+    /// the size of a simulation.
     ///
     /// # Errors
-    /// As the device gives them.
+    /// As the GPU gives them.
     pub(crate) fn open(&self) -> Result<Option<Gpu>, Error> {
         match self {
             Self::Settled(chosen) => chosen.device(),
@@ -106,78 +96,63 @@ impl Request {
         }
     }
 
-    /// A device that the caller opened.
+    /// A GPU that the caller opened.
     #[cfg(feature = "gpu")]
     pub(crate) fn opened(gpu: &Gpu) -> Self {
         Self::Settled(gpu::opened(gpu))
     }
 
-    /// Settles `auto`.
+    /// Settles `auto` by the amount of work.
     ///
     /// # Errors
-    /// [`Error::Backend`] if the scene names an adapter that is not there.
-    pub(crate) fn settle(self, loaded: &LoadedScene, work: &Work) -> Result<Chosen, Error> {
+    /// [`Error::Backend`] if the scene names an adapter that does not exist.
+    pub(crate) fn settle(
+        self,
+        file: SceneFile<'_>,
+        solver: &SolverSection,
+        work: &Work,
+    ) -> Result<Chosen, Error> {
         match self {
             Self::Settled(chosen) => Ok(chosen),
-            Self::Auto => gpu::auto(loaded, work),
+            Self::Auto => gpu::auto(file, solver, work),
         }
     }
-}
 
-impl Request {
-    /// Settles what ChainMail relaxes on; it propagates on the CPU.
-    pub(crate) fn settle_chain(self, loaded: &LoadedScene) -> Chosen {
+    /// Settles `auto` on the CPU, for this reason.
+    pub(crate) fn settle_on_cpu(self, solver: &SolverSection, reason: &str) -> Chosen {
         match self {
             Self::Settled(chosen) => chosen,
-            Self::Auto => {
-                let why = "auto: ChainMail propagates on the CPU, and on no GPU was it measured that relaxation there pays";
-                Chosen::cpu(loaded, why)
-            }
+            Self::Auto => Chosen::cpu(solver, reason),
         }
     }
 }
 
 impl Chosen {
-    /// Threads of ChainMail on the host; none for one queue on one thread.
-    pub(crate) fn chain_threads(&self) -> Option<usize> {
-        (!matches!(self.place, Place::Reference)).then(|| self.host_threads())
-    }
-
-    /// Opens the device that a chain relaxes on, if there is one.
-    ///
-    /// # Errors
-    /// As the device gives them.
-    pub(crate) fn start_chain(&self, chain: &Chain) -> Result<Option<(Relaxer, Metered)>, Error> {
-        match &self.place {
-            Place::Gpu(device) => gpu::start_chain(device, chain).map(Some),
-            Place::Cpu | Place::Reference => Ok(None),
-        }
-    }
-
-    /// Memory that a chain takes on the device, by part; nothing on the host's backends.
-    pub(crate) fn chain_memory(&self, chain: &Chain) -> Vec<MemoryPart> {
-        match &self.place {
-            Place::Gpu(device) => gpu::chain_memory(device, chain),
-            Place::Cpu | Place::Reference => Vec::new(),
-        }
-    }
-
     /// The CPU backend.
-    fn cpu(loaded: &LoadedScene, reason: &str) -> Self {
-        let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let threads = Some(loaded.scene.solver.threads).filter(|&n| n > 0).unwrap_or(cores);
+    fn cpu(solver: &SolverSection, reason: &str) -> Self {
+        let threads = Some(solver.threads).filter(|&n| n > 0).unwrap_or_else(cores);
         Self { report: Backend::on_host("cpu", threads, reason), place: Place::Cpu, note: None }
     }
 
-    /// True if it will open a device.
+    /// Whether it is a GPU.
     pub(crate) fn on_gpu(&self) -> bool {
         matches!(self.place, Place::Gpu(_))
     }
 
-    /// The same with the device open, if there is one, so that every start uses it.
+    /// Whether it is the reference solver on one thread.
+    pub(crate) fn is_reference(&self) -> bool {
+        matches!(self.place, Place::Reference)
+    }
+
+    /// `gpu` or `cpu`, as the stages of a report name the place of their work.
+    pub(crate) fn place(&self) -> &'static str {
+        if self.on_gpu() { "gpu" } else { "cpu" }
+    }
+
+    /// The same backend with its GPU open, if it is one, so that every start uses the same GPU.
     ///
     /// # Errors
-    /// As the device gives them.
+    /// As the GPU gives them.
     pub(crate) fn kept_open(self) -> Result<Self, Error> {
         Ok(match self.place {
             Place::Gpu(device) => Self { place: Place::Gpu(gpu::kept_open(device)?), ..self },
@@ -185,10 +160,10 @@ impl Chosen {
         })
     }
 
-    /// The device, if there is one.
+    /// Opens the GPU, if it is one.
     ///
     /// # Errors
-    /// As the device gives them.
+    /// As the GPU gives them.
     pub(crate) fn device(&self) -> Result<Option<Gpu>, Error> {
         match &self.place {
             Place::Gpu(device) => gpu::open(device).map(Some),
@@ -196,53 +171,35 @@ impl Chosen {
         }
     }
 
-    /// Threads of the host for work that runs beside the backend.
+    /// Opens the GPU, if it is one, and counts its work from now on.
+    ///
+    /// # Errors
+    /// As the GPU gives them.
+    pub(crate) fn open(&self) -> Result<Option<DeviceMeter>, Error> {
+        let meter = |gpu| DeviceMeter { before: gpu::work(&gpu), gpu };
+        Ok(self.device()?.map(meter))
+    }
+
+    /// Threads of the host for work next to the backend.
     pub(crate) fn host_threads(&self) -> usize {
         match self.place {
             Place::Cpu => self.report.threads,
-            Place::Reference | Place::Gpu(_) => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            Place::Reference | Place::Gpu(_) => cores(),
         }
-    }
-
-    /// Memory that it takes on a device, by part; nothing on the host's backends.
-    pub(crate) fn device_memory(&self, system: &System<f32>, settings: &Settings) -> Vec<MemoryPart> {
-        match &self.place {
-            Place::Gpu(device) => gpu::memory(device, system, settings),
-            Place::Cpu | Place::Reference => Vec::new(),
-        }
-    }
-
-    /// Opens the device, if there is one to open, and puts the body into the backend.
-    ///
-    /// # Errors
-    /// As the backend gives them.
-    pub(crate) fn start(&self, system: System<f32>, settings: Settings) -> Result<Running, Error> {
-        Ok(match &self.place {
-            Place::Reference => {
-                Running { solver: Box::new(SolverReference::new(system, settings)?), device: None }
-            }
-            Place::Cpu => {
-                let solver = SolverCpu::new(system, settings, Some(self.report.threads))?;
-                Running { solver: Box::new(solver), device: None }
-            }
-            Place::Gpu(device) => gpu::start(device, system, settings)?,
-        })
     }
 }
 
-impl Running {
-    /// Body and device.
-    pub(crate) fn into_parts(self) -> (Box<dyn Solver<f32>>, Option<Metered>) {
-        (self.solver, self.device)
-    }
-}
-
-impl Metered {
-    pub(crate) fn gpu(&self) -> Gpu {
-        self.gpu.clone()
+impl DeviceMeter {
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
     }
 
-    /// What the device did for this run so far.
+    /// Whether the last pass of the GPU has timestamps.
+    pub(crate) fn has_timestamps(&self) -> bool {
+        gpu::has_timestamps(&self.gpu)
+    }
+
+    /// The work that the GPU has done for this run so far.
     pub(crate) fn work(&self) -> DeviceWork {
         let now = gpu::work(&self.gpu);
         DeviceWork {
@@ -266,4 +223,8 @@ impl Backend {
             reason: reason.into(),
         }
     }
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
 }

@@ -3,14 +3,16 @@
 use cutis_render::{Image, View};
 use cutis_resample::{ResampleReport, Warp};
 use cutis_volume::Volume;
+use nalgebra::Point3;
 
 use super::gpu::{self, Gpu};
 use crate::Error;
+use crate::backend::DevicePositions;
 
-/// What resampling and pictures run on.
+/// The GPU of the stages after the simulation, if they have one.
 pub(crate) struct Stages {
     gpu: Option<Gpu>,
-    /// What the device could not take, and was done by the CPU.
+    /// Stages that the GPU could not run, and that the CPU ran instead.
     pub(crate) notes: Vec<String>,
 }
 
@@ -24,21 +26,32 @@ impl Stages {
         if self.gpu.is_some() { "gpu" } else { "cpu" }
     }
 
-    /// As [`cutis_resample::resample`].
+    /// Appends uploaded positions to those on the GPU. None if the GPU is not used or has no room.
+    pub(crate) fn append(
+        &self,
+        positions: &DevicePositions,
+        further: &[Point3<f32>],
+    ) -> Option<DevicePositions> {
+        positions.with(self.gpu.as_ref()?, further).ok()
+    }
+
+    /// Resamples as [`cutis_resample::resample`]. `positions` are the deformed positions of the warp, if
+    /// they are on the GPU.
     pub(crate) fn resample(
         &mut self,
         volume: &Volume,
         warp: &Warp<'_>,
+        positions: Option<&DevicePositions>,
         progress: &(dyn Fn(usize, usize) + Sync),
     ) -> Result<(Volume, ResampleReport), Error> {
         self.first_on_gpu(
             "resampling",
-            |gpu| Ok(gpu::resample(gpu, volume, warp, progress)?),
+            |gpu| Ok(gpu::resample(gpu, volume, warp, positions, progress)?),
             || Ok(cutis_resample::resample(volume, warp, progress)?),
         )
     }
 
-    /// As [`cutis_render::raymarch`].
+    /// Renders as [`cutis_render::raymarch`].
     pub(crate) fn raymarch(&mut self, volume: &Volume, view: &View<'_>) -> Result<Image, Error> {
         self.first_on_gpu(
             "ray marching",
@@ -47,8 +60,8 @@ impl Stages {
         )
     }
 
-    /// Tries the GPU. Too little room on it, or its loss, is no reason to lose a finished simulation: the CPU does the stage
-    /// and all that follows, and the report says so.
+    /// Tries the GPU. If it lacks memory or is lost, the CPU runs this stage and all later ones, so that a
+    /// finished simulation is not lost; the report says so.
     fn first_on_gpu<T>(
         &mut self,
         what: &str,

@@ -1,27 +1,28 @@
-//! `cutis skin`: the skin of a volume, without a scene.
+//! `cutis skin`: finds the skin of a volume without a scene.
 
 use std::path::Path;
 
 use cutis_mesh::vtk::{self, Cells, Piece, Space};
 use cutis_mesh::{Frame, Lattice, Skin, SkinMode, SkinOptions, SkinReport, Split, skin};
 use cutis_volume::sample::LatticeSize;
-use cutis_volume::{Table, TableKind, nifti, sample};
+use cutis_volume::{nifti, sample};
 use nalgebra::Point3;
 
+use super::{AIR_BELOW_HU, air};
 use crate::{Error, Progress};
 
-/// What to look for, and on which lattice.
+/// The rule by which the skin is found, and the lattice.
 #[derive(Clone, Copy, Debug)]
 pub struct SkinRequest {
     /// Lattice over the volume.
     pub lattice: LatticeSize,
-    /// How a cell is split.
+    /// How a cell is split into tetrahedra.
     pub split: Split,
-    /// Detection rule.
+    /// Rule by which skin triangles are chosen.
     pub mode: SkinMode,
 }
 
-/// Detects the skin of a volume file and, if `out` is given, writes its triangles (`.vtu` or `.vtp`).
+/// Finds the skin of a volume file. If `out` is given, writes its triangles (`.vtu` or `.vtp`).
 ///
 /// # Errors
 /// [`Error`] for a volume that cannot be read, a lattice that does not fit, or a file that cannot be written.
@@ -39,9 +40,7 @@ pub fn find_skin(
     progress.end();
     progress.begin("detect the skin", 0);
     let lattice = Lattice::new(sample::lattice_grid(volume.grid(), request.lattice)?, request.split)?;
-    let alpha = Table::preset(TableKind::Alpha, "paper")?;
-    let hu = sample::to_grid(&volume, lattice.grid())?;
-    let air: Vec<bool> = hu.iter().map(|&hu| alpha.is_air(hu)).collect();
+    let air = air(&sample::to_grid(&volume, lattice.grid()), AIR_BELOW_HU);
     let found = skin::detect(&lattice, &air, request.mode, &SkinOptions::default())?;
     progress.end();
     if let Some(path) = out {
@@ -60,7 +59,7 @@ fn check_extension(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// Numbers the points in use and writes them.
+/// Renumbers the points that triangles use, and writes points and triangles.
 fn write(path: &Path, lattice: &Lattice, skin: &Skin) -> Result<(), Error> {
     let grid = lattice.grid();
     let frame = Frame::center_of(grid);
@@ -79,4 +78,19 @@ fn write(path: &Path, lattice: &Lattice, skin: &Skin) -> Result<(), Error> {
         vtk::write_vtu(path, Space::default(), &piece)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use cutis_volume::{Table, TableKind};
+
+    use super::*;
+
+    /// The paper's table of opacity and the default of a scene agree on air, so there is one definition.
+    #[test]
+    fn air_is_below_the_foot_of_the_opacity_ramp() {
+        let opacity = Table::preset(TableKind::Alpha, "paper").unwrap();
+        let hu = [-3024.0, -1000.0, -449.1, -449.0, -448.9, 0.0, 3000.0];
+        assert_eq!(air(&hu, AIR_BELOW_HU), hu.map(|hu| opacity.is_air(hu)));
+    }
 }

@@ -1,44 +1,39 @@
 //! The cost report: bytes and time of the solver, part by part.
 
-use std::time::Instant;
-
-use cutis_solver::{Settings, StepProfile, System};
+use cutis_solver::StepProfile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
-use crate::backend::Chosen;
-use crate::model::Motion;
-use crate::report::MemoryPart;
+use crate::model::constraints::kinds::report_name;
+use crate::output::report::MemoryPart;
 
-/// Time after which the measurement of a plan ends, s; one substep is always measured.
-const LONG_ENOUGH_S: f64 = 0.1;
-
-/// What the solver costs, part by part.
+/// The cost of the solver, part by part.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct CostReport {
-    /// The parts that store something, then those that only take time. What the scene leaves out has no part.
+    /// Parts that store something, then parts that only take time. A part that the scene leaves out is
+    /// not listed.
     pub parts: Vec<CostPart>,
     /// How the times were measured, or why they were not.
     pub time: String,
 }
 
-/// What one part of the solver costs.
+/// The cost of one part of the solver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CostPart {
-    /// `vertices`, a constraint kind, `handles`, `multipliers`, `check` (whether all positions are finite), …
+    /// `vertices`, a constraint kind, `handles`, `multipliers`, `check` (whether all positions are
+    /// finite), …
     pub part: String,
     /// Bytes on the host.
     pub host_bytes: usize,
     /// Bytes on the GPU; 0 on a CPU backend.
     pub device_bytes: usize,
-    /// Wall time of a frame that is spent in it, ms; none if it was not measured.
+    /// Time of a frame spent in this part, ms; none if it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ms_per_frame: Option<f64>,
 }
 
 impl CostReport {
-    /// Bytes without times. `why` there are none.
+    /// A report of bytes without times. `why` says why there are no times.
     pub(crate) fn of_memory(host: &[MemoryPart], device: &[MemoryPart], why: &str) -> Self {
         let mut report = Self { parts: Vec::new(), time: why.into() };
         for MemoryPart { part, bytes } in host {
@@ -50,10 +45,11 @@ impl CostReport {
         report
     }
 
-    /// The same with the times of `frames` frames. `how` they were measured.
+    /// Adds the times of `frames` frames. `how` says how they were measured.
     pub(crate) fn with_times(mut self, times: &StepProfile, frames: f64, how: &str) -> Self {
         for time in times.parts() {
-            *self.part(time.name).ms_per_frame.get_or_insert(0.0) += time.seconds * 1e3 / frames;
+            let part = self.part(report_name(time.name));
+            *part.ms_per_frame.get_or_insert(0.0) += time.seconds * 1e3 / frames;
         }
         self.time = how.into();
         self
@@ -75,56 +71,6 @@ impl CostReport {
     }
 }
 
-/// Iterations of a substep that are measured; the time of further ones is taken to be the same.
-const MOST_ITERATIONS: u32 = 4;
-
-/// Measures a substep of a system that is no longer needed, on a backend of the host: a first one to touch all memory, then as
-/// many as fit into a tenth of a second.
-///
-/// # Errors
-/// As the backend gives them; numbers that explode are an error of the run, and not of its plan.
-pub(crate) fn of_substeps(
-    backend: &Chosen,
-    system: System<f32>,
-    settings: Settings,
-    bytes: CostReport,
-) -> Result<CostReport, Error> {
-    let iterations = settings.iterations.min(MOST_ITERATIONS);
-    let substep = Settings { dt_s: settings.substep_s(), substeps: 1, iterations, ..settings };
-    let mut solver = backend.start(system, substep)?.solver;
-    let (mut times, mut done) = (StepProfile::default(), 0.0);
-    if let Err(error) = solver.step(1) {
-        return Ok(CostReport { time: format!("not measured: {error}"), ..bytes });
-    }
-    let start = Instant::now();
-    while done == 0.0 || start.elapsed().as_secs_f64() < LONG_ENOUGH_S {
-        if solver.step_timed(1, &mut times).is_err() {
-            break;
-        }
-        done += 1.0;
-    }
-    let mut whole = StepProfile::default();
-    for part in times.parts() {
-        let once =
-            [StepProfile::VERTICES, StepProfile::HANDLES, StepProfile::MULTIPLIERS, StepProfile::CHECK]
-                .contains(&part.name);
-        let times = if once { 1.0 } else { f64::from(settings.iterations) / f64::from(iterations) };
-        whole.add(part.name, part.seconds * times);
-    }
-    let how = format!("{done} substeps of the body at rest, on this machine as busy as it is now");
-    Ok(bytes.with_times(&whole, f64::max(done, 1.0) / f64::from(settings.substeps), &how))
-}
-
-/// Measures the first frame of a body that is no longer needed.
-///
-/// # Errors
-/// As the frame gives them.
-pub(crate) fn of_first_frame(motion: &mut dyn Motion, bytes: CostReport) -> Result<CostReport, Error> {
-    let mut times = StepProfile::default();
-    motion.step_timed(&mut times)?;
-    Ok(bytes.with_times(&times, 1.0, "the first frame, on this machine as busy as it is now"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,27 +79,30 @@ mod tests {
         MemoryPart { part: part.into(), bytes }
     }
 
+    /// The solver calls the paper's form of skin tension `stc_paper`; its time belongs to the kind `stc`.
     #[test]
-    fn bytes_and_times_meet_by_name() {
+    fn bytes_and_times_of_a_part_are_joined_by_its_name() {
         let (host, device) = ([bytes("vertices", 40), bytes("stc", 12)], [bytes("vertices", 48)]);
         let without = CostReport::of_memory(&host, &device, "no device");
         assert_eq!((without.ms_per_frame(), without.time.as_str()), (None, "no device"));
-        let mut times = StepProfile::default();
-        times.add("stc", 0.5);
-        times.add("check", 0.25);
-        let with = without.with_times(&times, 2.0, "by hand");
-        let part = |part: &str, host_bytes, device_bytes, ms_per_frame| CostPart {
-            part: part.into(),
-            host_bytes,
-            device_bytes,
-            ms_per_frame,
-        };
-        let expected = [
-            part("vertices", 40, 48, None),
-            part("stc", 12, 0, Some(250.0)),
-            part("check", 0, 0, Some(125.0)),
-        ];
-        assert_eq!(with.parts, expected);
-        assert_eq!((with.ms_per_frame(), with.time.as_str()), (Some(375.0), "by hand"));
+        for solver_name in ["stc", "stc_paper"] {
+            let mut times = StepProfile::default();
+            times.add(solver_name, 0.5);
+            times.add("check", 0.25);
+            let with = without.clone().with_times(&times, 2.0, "by hand");
+            let part = |part: &str, host_bytes, device_bytes, ms_per_frame| CostPart {
+                part: part.into(),
+                host_bytes,
+                device_bytes,
+                ms_per_frame,
+            };
+            let expected = [
+                part("vertices", 40, 48, None),
+                part("stc", 12, 0, Some(250.0)),
+                part("check", 0, 0, Some(125.0)),
+            ];
+            assert_eq!(with.parts, expected);
+            assert_eq!((with.ms_per_frame(), with.time.as_str()), (Some(375.0), "by hand"));
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What is in a volume file, for people and for machines.
+//! `cutis inspect`: the header and the HU range of a volume file.
 
 use std::path::Path;
 
@@ -7,32 +7,32 @@ use serde::Serialize;
 
 use crate::Error;
 
-/// What `cutis inspect` prints.
+/// Facts about a volume file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inspection {
     /// Voxels per axis.
     pub shape: [usize; 3],
     /// Voxel size, mm.
     pub spacing_mm: [f64; 3],
-    /// Index → RAS+ mm, four rows.
+    /// Affine map from voxel index to RAS+ mm, four rows.
     pub affine: [[f64; 4]; 4],
-    /// World directions to which the index axes run, for example `RAS`.
+    /// World directions of the index axes, for example `RAS`.
     pub orientation: String,
-    /// Type of the voxels in the file, by numpy's name.
+    /// Type of the voxels in the file, as numpy names it.
     pub dtype: String,
     /// Lowest HU; `null` if there is none.
     pub hu_min: f64,
     /// Highest HU; `null` if there is none.
     pub hu_max: f64,
-    /// Sum of all HU but NaN.
+    /// Sum of all HU except NaN.
     pub hu_sum: f64,
-    /// Voxels that are not a number.
+    /// Number of voxels that are NaN.
     pub nan_count: u64,
-    /// What was unusual about the file, and how it was taken.
+    /// Unusual properties of the file, and how they were read.
     pub warnings: Vec<String>,
 }
 
-/// Reads a volume file and tells what is in it.
+/// Reads a volume file and reports its shape, placement and HU range.
 ///
 /// # Errors
 /// [`Error::Volume`] if the file is not a CT volume that can be read.

@@ -1,82 +1,62 @@
 //! The CT of a scene: read from its file, or made by the phantom.
 
-use std::path::Path;
-
 use cutis_volume::phantom::Phantom;
-use cutis_volume::sample::LatticeSize;
 use cutis_volume::{Table, TableKind, Volume, nifti};
+use sha2::{Digest, Sha256};
 
 use crate::Error;
-use crate::report::Input;
+use crate::output::report::Input;
 use crate::run::files;
-use crate::scene::{LatticeSection, LoadedScene, PhantomSection, SplitChoice, TableChoice, VolumeSection};
+use crate::scene::{LoadedScene, PhantomSection, SceneFile, TableChoice, VolumeSection};
 
-/// The CT and where it came from.
+/// The CT and its origin.
 pub(crate) struct Source {
     pub(crate) volume: Volume,
-    /// Identifies the volume: hash of the file, or of the phantom's voxels.
+    /// SHA-256 that identifies the volume: of the file's bytes, or of the phantom's voxels.
     pub(crate) sha256: String,
+    /// The scene file and the CT, for the report.
     pub(crate) inputs: Vec<Input>,
     pub(crate) warnings: Vec<String>,
 }
 
 /// Reads or makes the CT.
+///
+/// # Errors
+/// [`Error::Volume`] for a file that cannot be read, [`Error`] for a phantom that cannot be made.
 pub(crate) fn load(loaded: &LoadedScene) -> Result<Source, Error> {
     let scene_input =
         Input { path: loaded.file.display().to_string(), sha256: files::sha256_of(loaded.text.as_bytes()) };
     match &loaded.scene.volume {
         VolumeSection { path: Some(path), .. } => {
-            let read = nifti::read(path)?;
-            let sha256 = files::sha256(path)?;
+            let mut hash = Sha256::new();
+            let read = nifti::read_observed(path, |file, bytes| {
+                if file == path {
+                    hash.update(bytes);
+                }
+            })?;
+            let sha256 = files::hex(&hash.finalize());
             let input = Input { path: path.display().to_string(), sha256: sha256.clone() };
-            Ok(Source {
-                volume: read.volume,
-                sha256,
-                inputs: vec![scene_input, input],
-                warnings: read.warnings,
-            })
+            let inputs = vec![scene_input, input];
+            Ok(Source { volume: read.volume, sha256, inputs, warnings: read.warnings })
         }
         VolumeSection { phantom: Some(PhantomSection { size, seed }), path: None } => {
             let volume = Phantom::new(*size, *seed)
-                .and_then(|p| p.volume())
-                .map_err(loaded.blame("volume.phantom"))?;
+                .and_then(|phantom| phantom.volume())
+                .map_err(loaded.file().blame("volume.phantom"))?;
             let sha256 = files::sha256_of_voxels(volume.voxels());
             let path = format!("phantom {size:?} seed {seed}");
             let inputs = vec![scene_input, Input { path, sha256: sha256.clone() }];
             Ok(Source { volume, sha256, inputs, warnings: Vec::new() })
         }
-        VolumeSection { path: None, phantom: None } => Err(missing_volume(&loaded.file)),
-    }
-}
-
-fn missing_volume(file: &Path) -> Error {
-    let why = "must have exactly one of `path` and `phantom`".into();
-    Error::SceneKey { file: file.into(), key: "volume".into(), value: String::new(), why }
-}
-
-impl LatticeSection {
-    /// In the terms of `cutis-volume`.
-    pub(crate) fn size(&self) -> LatticeSize {
-        match (self.vertices, self.spacing_mm) {
-            (Some(vertices), _) => LatticeSize::Vertices(vertices),
-            (None, Some(spacing)) => LatticeSize::SpacingMm(spacing),
-            (None, None) => LatticeSize::Native,
-        }
-    }
-}
-
-impl From<SplitChoice> for cutis_mesh::Split {
-    fn from(choice: SplitChoice) -> Self {
-        match choice {
-            SplitChoice::Kuhn6 => Self::Kuhn6,
-            SplitChoice::Five => Self::Five,
+        VolumeSection { path: None, phantom: None } => {
+            Err(loaded.file().bad_key("volume", "", "must have exactly one of `path` and `phantom`"))
         }
     }
 }
 
 impl TableChoice {
-    /// The table that is meant; `key` is what an error names.
-    pub(crate) fn table(&self, kind: TableKind, file: &Path, key: &str) -> Result<Table, Error> {
+    /// The table. An error names `key`.
+    pub(crate) fn table(&self, kind: TableKind, file: SceneFile<'_>, key: &str) -> Result<Table, Error> {
         let table = match self {
             Self::Preset(name) => Table::preset(kind, name),
             Self::Points(points) => {
@@ -84,12 +64,12 @@ impl TableChoice {
                 Table::new("scene", &points)
             }
         };
-        table.map_err(|e| {
+        table.map_err(|error| {
             let value = match self {
                 Self::Preset(name) => format!("\"{name}\""),
                 Self::Points(points) => format!("{points:?}"),
             };
-            Error::SceneKey { file: file.into(), key: key.into(), value, why: e.to_string() }
+            file.bad_key(key, &value, &error.to_string())
         })
     }
 }

@@ -1,54 +1,121 @@
-//! What moves the body from frame to frame: one trait for all models.
+//! Deformation models: what moves the body from frame to frame.
+//!
+//! A model is a type that is a [`Model`], in a folder of its own. [`build`] makes the model that the
+//! scene names; nothing after it needs to know which one it is. A started model is a [`Simulation`],
+//! which the stage `run` steps.
 
 pub(crate) mod chainmail;
+mod choice;
 pub(crate) mod constraints;
+mod costs;
 mod scene_system;
 
 use cutis_solver::StepProfile;
 use nalgebra::Point3;
 
-use crate::Error;
-use crate::report::{ChainmailReport, KindResidual};
+use crate::backend::{Chosen, DeviceMeter, DevicePositions, Request};
+use crate::body::Body;
+use crate::output::report::{ChainmailReport, KindResidual};
 use crate::run::checkpoint::Checkpoint;
+use crate::run::clock::Clock;
+use crate::scene::{Scene, SceneFile};
+use crate::{CostReport, Error};
 
-pub(crate) use chainmail::Chained;
-pub(crate) use constraints::Stepped;
+pub use choice::ModelChoice;
+pub(crate) use choice::{build, fill_defaults, validate};
+pub(crate) use costs::ModelCosts;
 pub(crate) use scene_system::needs_system;
 pub use scene_system::{SceneSystem, build_system};
 
-/// A body in motion.
-pub(crate) trait Motion {
-    /// Goes on from a saved state.
+/// What a model is built and run from.
+#[derive(Clone, Copy)]
+pub(crate) struct ModelInput<'a> {
+    pub(crate) file: SceneFile<'a>,
+    pub(crate) scene: &'a Scene,
+    pub(crate) body: &'a Body,
+}
+
+/// A deformation model of a body, ready to be started.
+pub(crate) trait Model {
+    /// Counts memory and work, chooses the backend, and says what the scene leaves out.
+    ///
+    /// # Errors
+    /// [`Error`] if the scene names a backend or an adapter that does not exist.
+    fn costs(&self, input: &ModelInput<'_>, request: Request) -> Result<ModelCosts, Error>;
+
+    /// Measures the time of a frame on a backend of the host, and adds it to the cost report.
+    ///
+    /// # Errors
+    /// As the backend gives them.
+    fn measure(
+        self: Box<Self>,
+        input: &ModelInput<'_>,
+        backend: &Chosen,
+        costs: CostReport,
+        clock: &mut Clock<'_>,
+    ) -> Result<CostReport, Error>;
+
+    /// Puts the body into the backend.
+    ///
+    /// # Errors
+    /// As the backend gives them.
+    fn start<'a>(
+        self: Box<Self>,
+        input: &ModelInput<'a>,
+        backend: &Chosen,
+        clock: &mut Clock<'_>,
+    ) -> Result<Started<'a>, Error>;
+}
+
+/// A started model.
+pub(crate) struct Started<'a> {
+    pub(crate) simulation: Box<dyn Simulation + 'a>,
+    /// The GPU that it runs on, if it runs on one. Later stages use the same GPU.
+    pub(crate) device: Option<DeviceMeter>,
+}
+
+/// A body that moves.
+pub(crate) trait Simulation {
+    /// Restores the state of a checkpoint.
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error>;
 
-    /// Runs a frame.
+    /// Computes a frame.
     fn step(&mut self) -> Result<(), Error>;
 
-    /// As [`step`](Self::step), with the same bits, and enters how long each part took.
+    /// Computes a frame with the same result as [`step`](Self::step), and adds the time of each part to
+    /// the profile.
     fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error>;
 
-    /// Whether each part of a frame is over before the next one begins, so that to time them costs nothing.
-    fn waits(&self) -> bool;
+    /// Whether each part of a frame ends before the next one begins, so that timing the parts does not
+    /// slow the frame.
+    fn parts_are_sequential(&self) -> bool;
 
     /// Time since the start of the first frame, s.
     fn time_s(&self) -> f64;
 
-    /// Where chosen vertices are, in local meters.
+    /// Positions of chosen vertices, local meters.
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error>;
 
-    /// The state after so many frames.
+    /// The state after `frame` frames.
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error>;
 
-    /// What is told of a finished run.
-    fn end(&mut self) -> Result<End, Error>;
+    /// The state and the measurements at the end of a run.
+    fn end(&mut self) -> Result<SimulationEnd, Error>;
+
+    /// A copy of the present positions that stays on the GPU; none if they are not on a GPU.
+    fn positions_on_device(&self) -> Option<DevicePositions> {
+        None
+    }
 }
 
-/// The end of a run.
+/// The end of a simulation.
 #[derive(Default)]
-pub(crate) struct End {
-    /// Local meters, one per vertex.
+pub(crate) struct SimulationEnd {
+    /// Positions of the vertices, local meters.
     pub(crate) positions: Vec<Point3<f32>>,
+    /// Constraint errors; none for a model without constraints.
     pub(crate) residuals: Vec<KindResidual>,
+    /// Measurements of ChainMail; none for other models.
     pub(crate) chainmail: Option<ChainmailReport>,
     pub(crate) warnings: Vec<String>,
 }

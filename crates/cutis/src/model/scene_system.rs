@@ -1,26 +1,28 @@
-//! The system of a scene, without a run around it: for whoever steps it, measures it or solves it otherwise.
+//! The system of a scene without a run around it, for programs that step, measure or solve it
+//! themselves.
 
 use cutis_mesh::Gape;
 use cutis_solver::{Settings, System};
 
+use super::constraints::ConstraintModel;
+use super::{ModelChoice, ModelInput};
 use crate::Error;
-use crate::body::Body;
+use crate::body::{Body, BodySections};
 use crate::ct::source;
-use crate::model::constraints::system as dynamics;
-use crate::scene::{LoadedScene, Model};
+use crate::scene::LoadedScene;
 
-/// What a run of a scene steps, before its first frame.
+/// The system that a run of a scene steps, before the first frame.
 pub struct SceneSystem {
     /// The body at rest: positions in local meters, constraints, handles.
     pub system: System<f32>,
     /// The scene's section `solver`.
     pub settings: Settings,
-    /// One for each incision of the scene, in order; they measure [`System::positions`].
+    /// One per incision of the scene, in the same order; they measure [`System::positions`].
     pub gapes: Vec<Gape>,
 }
 
-/// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and what the scene names of constraints and
-/// handles. No device is opened, no step is made and nothing is written.
+/// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and adds the constraints
+/// and handles that the scene names. Opens no device, makes no step and writes nothing.
 ///
 /// ```no_run
 /// use cutis::Scene;
@@ -35,24 +37,23 @@ pub struct SceneSystem {
 /// ```
 ///
 /// # Errors
-/// [`Error`] as a run of the scene would give it before its first frame; [`Error::SceneKey`] for a model without a system.
+/// [`Error`] as a run of the scene would give it before its first frame; [`Error::SceneKey`] for a model
+/// without a system.
 pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
     needs_system(loaded)?;
     let source = source::load(loaded)?;
-    let body = Body::build(loaded, &source.volume)?;
-    let dynamics = dynamics::build(loaded, &body)?;
-    Ok(SceneSystem { system: dynamics.system, settings: dynamics.settings, gapes: body.cut.gapes })
+    let body = Body::build(&BodySections::of(loaded), &source.volume)?;
+    let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body: &body };
+    let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?;
+    Ok(SceneSystem { system, settings, gapes: body.cut.gapes })
 }
 
 /// Refuses a model that has no system of constraints.
 pub(crate) fn needs_system(loaded: &LoadedScene) -> Result<(), Error> {
-    if loaded.scene.model == Model::Pbd {
+    if loaded.scene.model == ModelChoice::Pbd {
         return Ok(());
     }
-    Err(Error::SceneKey {
-        file: loaded.file.clone(),
-        key: "model".into(),
-        value: "\"chainmail\"".into(),
-        why: "has no constraints, substeps or iterations; this is for model = \"pbd\"".into(),
-    })
+    let name = toml::Value::try_from(loaded.scene.model).map(|name| name.to_string()).unwrap_or_default();
+    let why = "has no constraints, substeps or iterations; this is for model = \"pbd\"";
+    Err(loaded.file().bad_key("model", &name, why))
 }

@@ -1,11 +1,15 @@
-//! `report.html`: the report for people; one file, pictures and plots inside.
+//! `report.html`: the report for people, one file with pictures and plots inside.
 
 use std::fmt::Write as _;
 
 use base64::Engine;
 
-use crate::CostReport;
-use crate::report::{ChainmailReport, Report, Wound};
+use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
+
+use super::report::{Report, Wound};
+use crate::run::files::{self, RunFolder};
+use crate::run::frames::FrameRow;
+use crate::{CostReport, Error};
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
 h1{font-size:1.6rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:collapse}\
@@ -13,16 +17,52 @@ td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top;border-bott
 td.n{text-align:right;font-variant-numeric:tabular-nums}figure{margin:1rem 0}.pair{display:grid;grid-template-columns:1fr 1fr;gap:0 1rem}.pair .wide{grid-column:1/-1}\
 img{max-width:100%;height:auto}figcaption{color:#555}.warn{background:#fff4d6;padding:.5rem 1rem}pre{background:#f5f5f5;padding:1rem;overflow:auto}";
 
-/// A picture for the page: caption and PNG bytes.
+/// A picture of the page.
 pub(crate) struct Figure {
     pub(crate) caption: &'static str,
-    /// Takes the whole width of the page instead of half of it.
+    /// Whether it takes the whole width of the page instead of half.
     pub(crate) wide: bool,
+    /// The picture as a PNG file.
     pub(crate) png: Vec<u8>,
 }
 
-/// The page.
-pub(crate) fn page(report: &Report, figures: &[Figure], plots: &[String], scene_toml: &str) -> String {
+/// Writes `report.html`.
+///
+/// # Errors
+/// [`Error::File`] if it cannot be written.
+pub(crate) fn write(
+    report: &Report,
+    rows: &[FrameRow],
+    figures: &[Figure],
+    folder: &RunFolder,
+) -> Result<(), Error> {
+    let plots: Vec<String> = opening_plot(rows).into_iter().collect();
+    let scene = toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string());
+    files::write(&folder.html(), page(report, figures, &plots, &scene).as_bytes())
+}
+
+/// A plot of the openings over time; none without a wound or without frames.
+fn opening_plot(rows: &[FrameRow]) -> Option<String> {
+    let wounds = rows.first().map_or(0, |row| row.gapes.len());
+    if wounds == 0 || rows.len() < 2 {
+        return None;
+    }
+    let curves: Vec<(String, Vec<[f64; 2]>)> = (0..wounds)
+        .flat_map(|n| {
+            let name = |what: &str| if wounds == 1 { what.into() } else { format!("wound {} {what}", n + 1) };
+            let mean = rows.iter().map(|row| [row.time_s, row.gapes[n].mean_mm]).collect();
+            let middle = rows.iter().map(|row| [row.time_s, row.gapes[n].mid_mm]).collect();
+            [(name("mean"), mean), (name("in the middle"), middle)]
+        })
+        .collect();
+    let series: Vec<Series<'_>> =
+        curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Line }).collect();
+    let axis = |label| Axis { label, scale: Scale::Linear };
+    Some(line_chart("Opening of the wound", axis("time / s"), axis("distance of the lips / mm"), &series))
+}
+
+/// The page as HTML.
+fn page(report: &Report, figures: &[Figure], plots: &[String], scene_toml: &str) -> String {
     let mut out = String::new();
     let mut put = |text: &str| out.push_str(text);
     put("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Cutis run</title><style>");
@@ -93,7 +133,7 @@ fn tables(report: &Report) -> String {
         );
     }
     out.push_str("</table>");
-    out.push_str(&report.chainmail.as_ref().map_or_else(|| constraints(report), chainmail));
+    out.push_str(&report.model_table().map_or_else(|| constraints(report), facts));
     out.push_str(&cost_table(&report.costs));
     if let Some(r) = &report.resample {
         let _ = write!(
@@ -123,19 +163,11 @@ fn constraints(report: &Report) -> String {
     out
 }
 
-fn chainmail(told: &ChainmailReport) -> String {
-    let rows = [
-        ("elements that moved", told.moved.to_string()),
-        ("links beyond their limits", told.violated_links.to_string()),
-        ("links cut", told.cut_links.to_string()),
-        ("system energy after the last drag", format!("{:.4e} mm²", told.energy_before)),
-        ("system energy at the end", format!("{:.4e} mm²", told.energy_after)),
-        ("sweeps of relaxation", told.relax_sweeps.to_string()),
-        ("relaxed to the end", if told.settled { "yes" } else { "no" }.into()),
-    ];
+/// A table of names and values.
+fn facts((title, rows): (&str, Vec<(&str, String)>)) -> String {
     let row =
         |(what, value): &(&str, String)| format!("<tr><td>{what}</td><td class=\"n\">{value}</td></tr>");
-    format!("<h2>ChainMail</h2><table>{}</table>", rows.iter().map(row).collect::<String>())
+    format!("<h2>{title}</h2><table>{}</table>", rows.iter().map(row).collect::<String>())
 }
 
 /// The cost report.

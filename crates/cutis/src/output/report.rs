@@ -1,14 +1,15 @@
-//! `report.json`: what ran, on what, how long it took and what came out. Versioned, with a schema.
+//! `report.json`: inputs, machine, times and results of a run. It has a version and a schema.
 
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::model::constraints::kinds::report_name;
 use crate::run::files;
 use crate::{CostReport, Error, Scene};
 
-/// Version of the report's layout; the number grows when a key changes its meaning or goes.
+/// Version of the report's layout. The number grows when a key changes its meaning or is removed.
 pub const SCHEMA: &str = "cutis-report/1";
 
 /// The whole report.
@@ -18,64 +19,65 @@ pub struct Report {
     pub schema: String,
     /// Version of this program.
     pub cutis_version: String,
-    /// Machine that it ran on.
+    /// Machine that ran the scene.
     pub machine: Machine,
-    /// Files that went in.
+    /// Files that the run read.
     pub inputs: Vec<Input>,
-    /// The scene as it ran, overrides applied and defaults filled in.
+    /// The scene with overrides applied and defaults filled in.
     pub scene: Scene,
-    /// What the solver ran on.
+    /// Backend of the solver.
     pub backend: Backend,
     /// Element counts.
     pub sizes: Sizes,
-    /// Quality of the detected skin, if something needed it.
+    /// Quality of the detected skin, if the scene needs the skin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinQuality>,
-    /// Colors (groups without shared vertices) per constraint kind; absent kinds were left out. In vertex block descent those of
-    /// the vertices, as `descent`, and no others.
+    /// Colors (groups without shared vertices) per constraint kind; a kind that the scene does not name is
+    /// absent. In vertex block descent only the colors of the vertices, as `descent`.
     pub colors: std::collections::BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
     /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend.
     pub device_memory: Vec<MemoryPart>,
-    /// Bytes and time of the solver by part; a run without a report measures no times.
+    /// Bytes and time of the solver by part. A run without a report measures no times.
     #[serde(rename = "ledger")]
     pub costs: CostReport,
-    /// What the GPU did; none on a CPU backend.
+    /// Work of the GPU; none on a CPU backend.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<DeviceWork>,
     /// Time per stage.
     pub stages: Vec<Stage>,
     /// Time per frame.
     pub frames: Frames,
-    /// Opening of each incision; with one that is made later than at the start, `initial` is the body at rest.
+    /// Opening of each incision. `initial` is the body at rest, also for an incision that is made later.
     pub wounds: Vec<Wound>,
     /// Opening of the first incision, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wound: Option<Wound>,
-    /// The resampled CT, if it was asked for.
+    /// The resampled CT, if an output needed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resample: Option<Resample>,
-    /// What ChainMail did, where it is the model.
+    /// Results of the model `chainmail`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chainmail: Option<ChainmailReport>,
     /// Constraint errors at the end; none with the model `chainmail`.
     pub residuals: Vec<KindResidual>,
     /// Largest distance that a vertex moved, mm.
     pub max_displacement_mm: f64,
-    /// Largest distance that a vertex moved next to where the region ends, mm; none without a region that leaves something out.
+    /// Largest distance that a vertex at the border of the region of interest moved, mm. None without a
+    /// region that leaves something out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub border_displacement_mm: Option<f64>,
-    /// What the scene left out, and therefore cost nothing.
+    /// Parts that the scene leaves out, which therefore cost nothing.
     pub left_out: Vec<String>,
-    /// What the user should know.
+    /// Warnings to the user.
     pub warnings: Vec<String>,
 }
 
-/// The machine.
+/// The machine that ran a scene.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Machine {
-    /// Processor, as the system names it.
+    /// Name of the processor.
     pub cpu: String,
     /// Logical cores.
     pub cores: usize,
@@ -83,16 +85,16 @@ pub struct Machine {
     pub system: String,
 }
 
-/// A file that went in.
+/// A file that a run read.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Input {
-    /// As the scene names it.
+    /// Path as the scene names it.
     pub path: String,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
 }
 
-/// What the solver ran on.
+/// The backend of the solver.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Backend {
     /// `cpu`, `reference` or `gpu`.
@@ -105,7 +107,7 @@ pub struct Backend {
     pub driver: Option<String>,
     /// Threads of the solver on the host.
     pub threads: usize,
-    /// Why this backend.
+    /// Why this backend was chosen.
     pub reason: String,
 }
 
@@ -122,14 +124,14 @@ pub struct Sizes {
     pub tets: usize,
     /// Skin triangles.
     pub skin_triangles: usize,
-    /// Vertices that the incisions took out of all constraints.
+    /// Vertices that the incisions removed from all constraints.
     pub removed_vertices: usize,
     /// Vertices that do not move.
     pub fixed_vertices: usize,
-    /// Vertices of the body beyond the region: they are in none of the other counts.
+    /// Vertices of the body outside the region of interest; the other counts do not include them.
     #[serde(default)]
     pub frozen_vertices: usize,
-    /// Tetrahedra of the body beyond the region.
+    /// Tetrahedra of the body outside the region of interest.
     #[serde(default)]
     pub frozen_tets: usize,
 }
@@ -139,7 +141,7 @@ pub struct Sizes {
 pub struct SkinQuality {
     /// Triangles.
     pub triangles: usize,
-    /// Edges of one triangle only, where the scan does not end.
+    /// Edges of only one triangle, except where the scan ends.
     pub open_edges: usize,
     /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
@@ -147,7 +149,7 @@ pub struct SkinQuality {
     pub components: usize,
     /// Share of the tissue's boundary that is not outer skin (lungs, bowel, table).
     pub enclosed_share: f64,
-    /// Share of the iso-surface that has skin on it.
+    /// Share of the iso-surface that skin covers.
     pub coverage: f64,
 }
 
@@ -175,40 +177,40 @@ pub struct MemoryPart {
 
 impl From<&cutis_solver::MemoryPart> for MemoryPart {
     fn from(part: &cutis_solver::MemoryPart) -> Self {
-        Self { part: part.name.into(), bytes: part.bytes }
+        Self { part: report_name(part.name).into(), bytes: part.bytes }
     }
 }
 
-/// What a device did for a run, from its first frame to the last output.
+/// Work of a GPU for a run, from the first frame to the last output.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct DeviceWork {
     /// Kernels compiled.
     pub kernels: u64,
-    /// Passes submitted.
+    /// Submitted passes.
     pub submits: u64,
-    /// Dispatches in them.
+    /// Dispatches of these passes.
     pub dispatches: u64,
-    /// Reads from the device.
+    /// Reads from the GPU.
     pub readbacks: u64,
-    /// Bytes that they returned.
+    /// Bytes of these reads.
     pub readback_bytes: u64,
 }
 
 /// Time of one stage.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Stage {
-    /// Name.
+    /// Name of the stage.
     pub name: String,
     /// Wall time, ms.
     pub ms: f64,
-    /// What did its heavy part: `cpu` or `gpu`.
+    /// Where its heavy part ran: `cpu` or `gpu`.
     pub on: String,
 }
 
 /// Time per frame.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Frames {
-    /// Frames that this run computed.
+    /// Number of frames that this run computed.
     pub count: u32,
     /// Mean wall time, ms; 0 without frames.
     pub ms_mean: f64,
@@ -219,13 +221,13 @@ pub struct Frames {
 /// Opening of an incision, mm: distance between its lips.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Wound {
-    /// Mean before the first frame.
+    /// Mean opening before the first frame.
     pub initial_mm: f64,
-    /// Mean after the last one.
+    /// Mean opening after the last frame.
     pub final_mm: f64,
-    /// In the middle of the slit, after the last frame.
+    /// Opening in the middle of the slit, after the last frame.
     pub mid_mm: f64,
-    /// In the middle of the slit, before the first frame.
+    /// Opening in the middle of the slit, before the first frame.
     pub initial_mid_mm: f64,
 }
 
@@ -236,33 +238,48 @@ pub struct Resample {
     pub covered_voxels: u64,
     /// Voxels inside two or more deformed tetrahedra: the body overlaps itself there.
     pub folds: u64,
-    /// Voxels that the body left or the incision took, now air.
+    /// Voxels that became air because the body moved away or an incision removed it.
     pub vacated_voxels: u64,
 }
 
-/// What ChainMail did. What its parts took is in the cost report.
+/// Results of the model `chainmail`. The times of its parts are in the cost report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ChainmailReport {
-    /// Elements (vertices of the cut body) that are not where they rest.
+    /// Elements (vertices of the cut body) that have left their rest positions.
     pub moved: usize,
-    /// Links beyond their limits; 0 unless what must not move was pulled apart.
+    /// Links beyond their limits; 0 unless drags pull on elements that cannot follow.
     pub violated_links: usize,
-    /// Links that the incisions have cut, those before the checkpoint that the run goes on from included.
+    /// Links that the incisions have cut, including those before a resumed checkpoint.
     pub cut_links: usize,
-    /// System energy after the last drag, before the relaxation that followed, mm²: half the sum of the squared differences of links
-    /// from rest.
+    /// System energy after the last drag and before the relaxation that followed, mm²: half the sum of the
+    /// squared differences of links from rest.
     pub energy_before: f64,
-    /// The same at the end, mm².
+    /// System energy at the end, mm².
     pub energy_after: f64,
     /// Sweeps of relaxation in this run.
     pub relax_sweeps: u64,
-    /// Times that relaxation changed a coordinate of an element.
+    /// How often relaxation changed a coordinate of an element.
     pub relax_moves: u64,
-    /// Whether relaxation has come to its end.
+    /// Whether relaxation has ended.
     pub settled: bool,
 }
 
-/// Error of one constraint kind.
+impl ChainmailReport {
+    /// Names and values for the report for people.
+    fn table(&self) -> Vec<(&'static str, String)> {
+        vec![
+            ("elements that moved", self.moved.to_string()),
+            ("links beyond their limits", self.violated_links.to_string()),
+            ("links cut", self.cut_links.to_string()),
+            ("system energy after the last drag", format!("{:.4e} mm²", self.energy_before)),
+            ("system energy at the end", format!("{:.4e} mm²", self.energy_after)),
+            ("sweeps of relaxation", self.relax_sweeps.to_string()),
+            ("relaxed to the end", if self.settled { "yes" } else { "no" }.into()),
+        ]
+    }
+}
+
+/// Relative errors of one constraint kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KindResidual {
     /// Constraint kind.
@@ -275,11 +292,28 @@ pub struct KindResidual {
 
 impl From<&cutis_solver::Residual> for KindResidual {
     fn from(residual: &cutis_solver::Residual) -> Self {
-        Self { kind: residual.name.into(), rms: residual.rms, max: residual.max }
+        Self { kind: report_name(residual.name).into(), rms: residual.rms, max: residual.max }
     }
 }
 
 impl Report {
+    /// Title and facts of a model that has results of its own; none for other models.
+    pub(crate) fn model_table(&self) -> Option<(&'static str, Vec<(&'static str, String)>)> {
+        Some(("ChainMail", self.chainmail.as_ref()?.table()))
+    }
+
+    /// One line about the results of a model that has results of its own; none for other models.
+    pub fn model_summary(&self) -> Option<String> {
+        let chainmail = self.chainmail.as_ref()?;
+        Some(format!(
+            "chainmail: {} elements moved, {} links beyond their limits, {} sweeps of relaxation{}",
+            chainmail.moved,
+            chainmail.violated_links,
+            chainmail.relax_sweeps,
+            if chainmail.settled { " (settled)" } else { "" }
+        ))
+    }
+
     /// Writes `report.json`.
     ///
     /// # Errors
@@ -293,14 +327,14 @@ impl Report {
         files::write(path, text.as_bytes())
     }
 
-    /// JSON schema of the report.
+    /// Returns the JSON schema of the report.
     pub fn json_schema() -> serde_json::Value {
         schemars::schema_for!(Report).to_value()
     }
 }
 
 impl Machine {
-    /// This machine.
+    /// Describes this machine.
     pub fn here() -> Self {
         let cpu = std::fs::read_to_string("/proc/cpuinfo")
             .ok()

@@ -1,9 +1,10 @@
-//! Checkpoints: the state from which `--resume` goes on, bit for bit.
+//! Checkpoints: the exact state from which `--resume` continues.
 //!
-//! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32), vertex count (u64),
-//! positions (3 × f32 per vertex, m, local frame), three words of 32 bits per vertex, more words, SHA-256 of all that (32). The words
-//! are velocities (f32, m/s) and no more with the model `pbd`; with `chainmail` coordinates (i32, units of the chain), then the energy after
-//! the last drag (f64, mm², two words), then the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) names.
+//! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32), vertex count
+//! (u64), positions (3 × f32 per vertex, m, local frame), three words of 32 bits per vertex, further words,
+//! SHA-256 of all that (32). With the model `pbd` the words are velocities (f32, m/s). With `chainmail`
+//! they are coordinates (i32, units of the chain), the energy after the last drag (f64, mm², two words),
+//! and the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
 
 use std::path::Path;
 
@@ -20,16 +21,16 @@ const SEAL: usize = 32;
 /// State after a whole number of frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    /// Frames done.
+    /// Number of frames computed.
     pub frame: u32,
-    /// Local meters.
+    /// Positions of the vertices, local meters.
     pub positions: Vec<Point3<f32>>,
-    /// What the state consists of beside or instead of the positions; three for each vertex at the least.
+    /// The rest of the state, as the model defines it; at least three words per vertex.
     pub words: Vec<u32>,
 }
 
-/// Identifies scene and volume, without what may change between two runs that continue each other (number of frames,
-/// outputs, threads, backend).
+/// Identifies scene and volume. It ignores the keys that a resumed run may change: number of frames,
+/// outputs, threads, backend.
 pub(crate) fn fingerprint(scene: &Scene, volume_sha256: &str) -> [u8; 32] {
     let mut scene = scene.clone();
     scene.run = crate::scene::RunSection::default();
@@ -51,7 +52,7 @@ pub(crate) fn fingerprint(scene: &Scene, volume_sha256: &str) -> [u8; 32] {
 }
 
 impl Checkpoint {
-    /// Writes the checkpoint.
+    /// Writes the checkpoint as a file.
     ///
     /// # Errors
     /// [`Error::File`] if the file cannot be written.

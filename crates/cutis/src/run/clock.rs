@@ -1,11 +1,11 @@
-//! The stages of a run: timed for the report, and told to whoever watches.
+//! Times the stages of a run for the report, and announces them to the user.
 
 use std::time::Instant;
 
-use crate::report::Stage;
+use crate::output::report::Stage;
 use crate::{Error, Progress};
 
-/// Times the stages of a run and tells the user about them.
+/// Times the stages of a run and announces them to the user.
 pub(crate) struct Clock<'a> {
     pub(crate) progress: &'a dyn Progress,
     pub(crate) stages: Vec<Stage>,
@@ -26,7 +26,7 @@ impl<'a> Clock<'a> {
         self.stage_on("cpu", name, total, work)
     }
 
-    /// Runs one stage of `total` units (0: unknown), on what it is said to run on.
+    /// Runs one stage of `total` units (0: unknown) on `on`, which is `cpu` or `gpu`.
     pub(crate) fn stage_on<T>(
         &mut self,
         on: &'static str,
@@ -37,7 +37,7 @@ impl<'a> Clock<'a> {
         self.stage_placed(name, total, |progress| Ok((work(progress)?, on)))
     }
 
-    /// Runs one stage of `total` units (0: unknown), which tells what it ran on.
+    /// Runs one stage of `total` units (0: unknown). The stage returns where it ran.
     pub(crate) fn stage_placed<T>(
         &mut self,
         name: &str,

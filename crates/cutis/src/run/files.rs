@@ -1,7 +1,8 @@
-//! Files of the run folder: written beside and renamed, so that none is ever half there.
+//! The files of a run folder. A file is written under a temporary name and renamed, so that a run folder
+//! never holds a partial file.
 
 use std::fs;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use cutis_volume::PartialFile;
@@ -10,7 +11,7 @@ use sha2::{Digest, Sha256};
 use crate::Error;
 use crate::scene::OutputSection;
 
-/// Writes a whole file under a temporary name in the same folder and renames it.
+/// Writes a whole file under a temporary name in the same folder, then renames it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let mut file = PartialFile::create(path)?;
     file.write_all(bytes).map_err(|e| Error::File {
@@ -26,7 +27,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Error> {
     fs::read(path).map_err(|e| Error::File { path: path.into(), action: "read", why: e.to_string() })
 }
 
-/// Makes a folder and its parents.
+/// Creates a folder and its parents.
 pub(crate) fn create_folder(path: &Path) -> Result<(), Error> {
     fs::create_dir_all(path).map_err(|e| Error::File {
         path: path.into(),
@@ -35,26 +36,12 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), Error> {
     })
 }
 
-/// SHA-256 of a file, hexadecimal, in constant memory.
-pub(crate) fn sha256(path: &Path) -> Result<String, Error> {
-    let error = |e: std::io::Error| Error::File { path: path.into(), action: "read", why: e.to_string() };
-    let mut file = fs::File::open(path).map_err(error)?;
-    let mut hash = Sha256::new();
-    let mut buffer = vec![0; 1 << 16];
-    loop {
-        match file.read(&mut buffer).map_err(error)? {
-            0 => return Ok(hex(&hash.finalize())),
-            n => hash.update(&buffer[..n]),
-        }
-    }
-}
-
-/// SHA-256 of bytes, hexadecimal.
+/// SHA-256 of bytes, in hexadecimal digits.
 pub(crate) fn sha256_of(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// SHA-256 of voxels as little-endian int16, hexadecimal, in constant memory.
+/// SHA-256 of voxels as little-endian int16, in hexadecimal digits. Takes constant memory.
 pub(crate) fn sha256_of_voxels(voxels: &[i16]) -> String {
     let mut hash = Sha256::new();
     let mut buffer = Vec::with_capacity(1 << 16);
@@ -66,7 +53,8 @@ pub(crate) fn sha256_of_voxels(voxels: &[i16]) -> String {
     hex(&hash.finalize())
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// Bytes as hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
@@ -82,9 +70,9 @@ macro_rules! paths {
 paths! {
     /// Versions, sizes, timings, results.
     report = "report.json";
-    /// The same for people, with pictures and plots.
+    /// The report for people, with pictures and plots.
     html = "report.html";
-    /// The CT, carried along by the body.
+    /// The deformed CT.
     volume = "deformed.nii.gz";
     /// The deformed skin.
     skin = "skin.vtu";
@@ -98,13 +86,13 @@ paths! {
     after = "after.png";
     /// A slice through the wound.
     slice = "slice.png";
-    /// State from which a run goes on.
+    /// State from which a run resumes.
     checkpoint = "checkpoint.bin";
 }
 
 impl RunFolder {
-    /// Names of files that are there although a run with these outputs does not write them.
-    pub(crate) fn left_from_before(&self, output: &OutputSection) -> Vec<String> {
+    /// Names of existing files that a run with these outputs does not write.
+    pub(crate) fn stale_files(&self, output: &OutputSection) -> Vec<String> {
         let files = [
             (output.report, self.report()),
             (output.report, self.html()),

@@ -1,4 +1,5 @@
-//! A value that may be written in two ways. The message of the way that was tried comes through, with its place.
+//! A value that may be written in two ways: by itself, or as a list. An error inside a list names its
+//! place in the list.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -6,15 +7,15 @@ use std::marker::PhantomData;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, IntoDeserializer, SeqAccess, Unexpected, Visitor};
 
-/// One of something, or a list.
-pub(super) enum OneOr<One, List> {
+/// One value, or a list of values.
+pub(crate) enum OneOr<One, List> {
     One(One),
     List(List),
 }
 
-/// What may stand by itself in place of a list.
-pub(super) trait One<'de>: Deserialize<'de> {
-    /// Both ways, for people.
+/// A value that may be written in place of a list.
+pub(crate) trait One<'de>: Deserialize<'de> {
+    /// Both ways to write the value, for error messages.
     const EITHER: &'static str;
 }
 

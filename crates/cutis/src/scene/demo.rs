@@ -6,7 +6,7 @@ use crate::{Error, LoadedScene, Override, Scene};
 
 const SCENE: &str = include_str!("demo.toml");
 
-/// The demo's scene, with overrides applied.
+/// Returns the demo's scene, with overrides applied.
 ///
 /// # Errors
 /// As [`Scene::load`], for an override that cannot be used.

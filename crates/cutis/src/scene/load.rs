@@ -1,4 +1,5 @@
-//! Reading a scene: file, overrides, checks; and the schema and template that `cutis scene` prints.
+//! Reading a scene: file, overrides and checks. Also the schema and the template that `cutis scene`
+//! prints.
 
 use std::fs::File;
 use std::io::Read;
@@ -6,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Scene};
 
-/// Longest scene file that is read, bytes. A scene is a page of text; anything longer is a mistake.
+/// Longest scene file that is read, bytes. A scene is a page of text, so a longer file is a mistake.
 const MAX_SCENE_BYTES: u64 = 1 << 20;
-/// Most parts of an override's dotted key. The deepest key of a scene has four.
+/// Most parts of an override's dotted key. The deepest key of a scene has four parts.
 const MAX_KEY_PARTS: usize = 16;
 
 /// One `--set key=value`.
@@ -16,7 +17,7 @@ const MAX_KEY_PARTS: usize = 16;
 pub struct Override {
     /// Dotted key, for example `solver.substeps`.
     pub key: String,
-    /// A TOML value; what does not parse as one is taken as a string.
+    /// A TOML value. Text that is not a TOML value is taken as a string.
     pub value: String,
 }
 
@@ -32,7 +33,7 @@ impl std::str::FromStr for Override {
     }
 }
 
-/// A scene with the places that its relative paths and messages need.
+/// A checked scene, with the file that it came from.
 #[derive(Clone, Debug)]
 pub struct LoadedScene {
     /// The checked scene.
@@ -44,25 +45,42 @@ pub struct LoadedScene {
 }
 
 impl LoadedScene {
-    /// Says which section asked for what could not be done, unless the error names its key already.
-    pub(crate) fn blame<E: Into<Error>>(&self, section: &str) -> impl FnOnce(E) -> Error {
+    /// The file, for errors about the scene.
+    pub(crate) fn file(&self) -> SceneFile<'_> {
+        SceneFile(&self.file)
+    }
+}
+
+/// The file of a scene, which errors about the scene name.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SceneFile<'a>(pub(crate) &'a Path);
+
+impl SceneFile<'_> {
+    /// Turns an error into one that names the section of the scene which asked for the impossible. An
+    /// error that names a key already stays as it is.
+    pub(crate) fn blame<E: Into<Error>>(self, section: &str) -> impl FnOnce(E) -> Error {
         move |error| match error.into() {
             named @ Error::SceneKey { .. } => named,
-            source => Error::SceneSection {
-                file: self.file.clone(),
-                section: section.into(),
-                source: Box::new(source),
-            },
+            source => {
+                Error::SceneSection { file: self.0.into(), section: section.into(), source: Box::new(source) }
+            }
         }
+    }
+
+    /// The error for a key whose value cannot be used. `value` is the value found, or empty if there is
+    /// none to show; `why` says what would be right.
+    pub(crate) fn bad_key(self, key: &str, value: &str, why: &str) -> Error {
+        Error::SceneKey { file: self.0.into(), key: key.into(), value: value.into(), why: why.into() }
     }
 }
 
 impl Scene {
-    /// Reads a scene file, applies `overrides` in order, resolves the volume's path and checks every value.
+    /// Reads a scene file, applies `overrides` in order, resolves the volume's path and checks every
+    /// value.
     ///
     /// # Errors
-    /// [`Error::SceneFile`] if it cannot be read, [`Error::SceneSyntax`] if it is no TOML, [`Error::SceneKey`] for an
-    /// unknown key, a wrong type or a value out of range.
+    /// [`Error::SceneFile`] if the file cannot be read, [`Error::SceneSyntax`] if it is not TOML,
+    /// [`Error::SceneKey`] for an unknown key, a wrong type or a value out of range.
     pub fn load(file: &Path, overrides: &[Override]) -> Result<LoadedScene, Error> {
         let read = |why: std::io::Error| Error::SceneFile { file: file.into(), why: why.to_string() };
         let mut bytes = Vec::new();
@@ -77,7 +95,8 @@ impl Scene {
         Self::parse(&text, file, directory, overrides)
     }
 
-    /// As [`Scene::load`], from text. `file` is what messages name, `directory` what a relative path starts from.
+    /// Does the same as [`Scene::load`] with a scene given as text. Messages name `file`; a relative path
+    /// of the volume starts from `directory`.
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -88,13 +107,13 @@ impl Scene {
         overrides: &[Override],
     ) -> Result<LoadedScene, Error> {
         let table: toml::Table = toml::from_str(text).map_err(|e| {
-            // The message quotes the line, which in a file that is no scene may be the whole file.
+            // The message quotes the line, which may be the whole file if the file is not a scene.
             let lines: Vec<String> = e.to_string().trim_end().lines().map(shorten).collect();
             Error::SceneSyntax { file: file.into(), why: lines.join("\n") }
         })?;
         let mut value = toml::Value::Table(table);
         for Override { key, value: new } in overrides {
-            // An override changes what the scene would do: it starts from the outputs that hold without the section.
+            // A scene without the section has default outputs, and an override changes one of them.
             if key.starts_with("output.") && value.get("output").is_none() {
                 let defaults = toml::Value::try_from(super::OutputSection::default());
                 if let (toml::Value::Table(table), Ok(defaults)) = (&mut value, defaults) {
@@ -118,10 +137,8 @@ impl Scene {
                 why: e.inner().to_string().trim().replace('\n', " "),
             }
         })?;
-        if scene.model == super::Model::Chainmail {
-            scene.chainmail.get_or_insert_default();
-        }
-        scene.validate(file)?;
+        crate::model::fill_defaults(&mut scene);
+        scene.validate(SceneFile(file))?;
         let overridden = overrides.iter().any(|o| o.key == "volume.path");
         if let Some(path) = scene.volume.path.as_mut()
             && path.is_relative()
@@ -133,9 +150,9 @@ impl Scene {
     }
 }
 
-/// Sets the value under a dotted key, making the tables on the way. Entries of lists are addressed by number.
+/// Sets the value of a dotted key and creates missing tables. Entries of lists are addressed by number.
 fn set(mut at: &mut toml::Value, key: &str, new: toml::Value) -> Result<(), String> {
-    // As messages write it (`incision[0].depth_mm`) or with dots alone.
+    // A key may have the form of messages (`incision[0].depth_mm`), or dots alone.
     let key = &key.replace('[', ".").replace(']', "");
     let parts = key.split('.').count();
     if parts > MAX_KEY_PARTS {
@@ -162,7 +179,7 @@ fn set(mut at: &mut toml::Value, key: &str, new: toml::Value) -> Result<(), Stri
     Ok(())
 }
 
-/// A TOML value; what does not parse as one is a string.
+/// A TOML value. Text that is not a TOML value is a string.
 fn parse_value(text: &str) -> toml::Value {
     toml::from_str::<toml::Table>(&format!("value = {text}"))
         .ok()
@@ -179,7 +196,7 @@ fn lookup<'a>(value: &'a toml::Value, path: &str) -> Option<&'a toml::Value> {
     })
 }
 
-/// At most 120 characters of a text.
+/// The first 120 characters of a text.
 fn shorten(text: &str) -> String {
     match text.char_indices().nth(120) {
         Some((end, _)) => format!("{}…", &text[..end]),

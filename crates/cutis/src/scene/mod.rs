@@ -1,19 +1,30 @@
-//! The scene file: everything that a run depends on, as plain data with units in the key names.
+//! The scene file: all inputs of a run as plain data, with units in the key names.
 //!
-//! Positions are world millimeters in the volume's RAS+ frame. Unknown keys are refused. [`Scene::load`] reads a
-//! file, applies overrides and checks every value; each section is a struct of this module.
+//! Positions are world millimeters in the volume's RAS+ frame. Unknown keys are refused.
+//! [`Scene::load`] reads a file, applies overrides and checks every value. Each section is a struct of
+//! this module. The sections of constraint kinds and of models are defined next to the code that
+//! builds them, in the stage `model`.
 
 mod choice;
 mod demo;
 mod load;
 mod reference;
 mod sections;
-mod validate;
+pub(crate) mod validate;
 
+pub(crate) use choice::OneOr;
 pub use demo::demo;
+pub(crate) use load::SceneFile;
 pub use load::{LoadedScene, Override, schema, template};
 pub use reference::reference;
 pub use sections::*;
+
+pub use crate::model::ModelChoice;
+pub use crate::model::chainmail::section::*;
+pub use crate::model::constraints::kinds::{
+    ConstraintsSection, DistanceSection, NearIncisionSection, StcForm, StcSection, VolumeConstraintSection,
+    constraint_kinds,
+};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,13 +35,13 @@ use serde::{Deserialize, Serialize};
 pub struct Scene {
     /// Deformation model: position-based dynamics, or ChainMail.
     #[serde(default)]
-    pub model: Model,
+    pub model: ModelChoice,
     /// Where the CT comes from.
     pub volume: VolumeSection,
     /// The tetrahedral lattice laid over the volume. Left out: one vertex on every voxel center.
     #[serde(default)]
     pub lattice: LatticeSection,
-    /// What is tissue, and what it weighs.
+    /// Which voxels are tissue, and their density.
     #[serde(default)]
     pub tissue: TissueSection,
     /// Which triangles are skin.
@@ -39,13 +50,13 @@ pub struct Scene {
     /// The constraint kinds; a kind that is left out costs nothing.
     #[serde(default)]
     pub constraints: ConstraintsSection,
-    /// ChainMail, where it is the model. Left out: its defaults.
+    /// Settings of the model `chainmail`. Left out: its defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chainmail: Option<ChainmailSection>,
-    /// What does not move.
+    /// The vertices that do not move.
     #[serde(default)]
     pub fixed: FixedSection,
-    /// Cuts.
+    /// Incisions, which cut the body.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incision: Vec<IncisionSection>,
     /// Spheres of tissue that are dragged along.
@@ -57,7 +68,7 @@ pub struct Scene {
     /// How long to run.
     #[serde(default)]
     pub run: RunSection,
-    /// What to write. Left out: everything but the tissue mesh.
+    /// The files to write. Left out: everything but the tissue mesh.
     #[serde(default)]
     pub output: OutputSection,
 }

@@ -17,12 +17,13 @@ use super::field::Field;
 use super::sample::Sampler;
 use super::scratch::Scratch;
 use super::{Setting, WoundError};
-use crate::backend::{Chosen, Stages};
-use crate::body::Body;
-use crate::body::region;
+use crate::backend::Stages;
+use crate::body::{Body, BodySections, even_shape};
+
 use crate::ct::source::Source;
-use crate::model::constraints::system::{self as dynamics, Dynamics};
-use crate::output::{self, Outcome};
+use crate::model::ModelInput;
+use crate::model::constraints::ConstraintModel;
+use crate::output::{self, DeformedBody};
 use crate::report::{KindResidual, Stage};
 use crate::run::clock::Clock;
 use crate::scene::{LatticeSection, LoadedScene, RegionSection, Scene};
@@ -108,17 +109,11 @@ impl Baseline<'_> {
             change(&mut scene);
             list.push(Variant { what, how, body, scene });
         };
-        let present = &scene.constraints;
-        if present.distance.is_some() {
-            add("distance".into(), "--without distance".into(), Reuse::Same, &|s| {
-                s.constraints.distance = None
+        for (row, _) in scene.constraints.named() {
+            let how = format!("--without {}", row.key);
+            add(row.key.into(), how, Reuse::Same, &|s| {
+                s.constraints.remove(row.key);
             });
-        }
-        if present.volume.is_some() {
-            add("volume".into(), "--without volume".into(), Reuse::Same, &|s| s.constraints.volume = None);
-        }
-        if present.stc.is_some() {
-            add("stc".into(), "--without stc".into(), Reuse::Same, &|s| s.constraints.stc = None);
         }
         for factor in COARSER {
             let (lattice, how) = coarser(&scene.lattice, &self.body.mesh.lattice, factor);
@@ -131,7 +126,7 @@ impl Baseline<'_> {
                 let region = RegionSection { around_mm: Some(around), min_mm: None, max_mm: None };
                 let what = format!("tissue more than {around} mm from the action");
                 let how = format!("--set lattice.region.around_mm={around}");
-                let body = Reuse::Another { share: region::share_around(scene, self.body, around) };
+                let body = Reuse::Another { share: self.body.share_around(&scene.handle, around) };
                 add(what, how, body, &|s| s.lattice.region = Some(region.clone()));
             }
         }
@@ -154,10 +149,11 @@ impl Baseline<'_> {
         let loaded = LoadedScene { scene: variant.scene.clone(), ..self.loaded.clone() };
         let other = match variant.body {
             Reuse::Same => None,
-            Reuse::Another { .. } => Some(Body::build(&loaded, self.volume())?),
+            Reuse::Another { .. } => Some(Body::build(&BodySections::of(&loaded), self.volume())?),
         };
         let body = other.as_ref().unwrap_or(self.body);
-        let Dynamics { system, settings, .. } = dynamics::build(&loaded, body)?;
+        let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body };
+        let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?;
         let bench = Bench::new(&system, settings, &body.cut.gapes, self.bench.backend, self.bench.frames);
         let run = bench.run(self.setting, progress, |_| std::ops::ControlFlow::Continue(()))?;
         let field = match &other {
@@ -196,16 +192,16 @@ impl Baseline<'_> {
             return Ok(Vec::new());
         }
         let scratch = Scratch::new(&std::env::temp_dir())?;
-        let outcome = Outcome {
-            loaded: self.loaded,
-            source: self.source,
+        let deformed = DeformedBody {
             body: self.body,
-            deformed: &self.run.positions,
-            folder: &scratch.0,
+            positions: &self.run.positions,
+            on_device: None,
+            ct: self.volume(),
+            air_below_hu: self.loaded.scene.tissue.air_below_hu,
         };
         let mut stages = Stages::on(self.bench.backend.device()?);
         let before = clock.stages.len();
-        output::write(&outcome, &mut stages, clock)?;
+        output::write(&deformed, output, &scratch.0, &mut stages, clock)?;
         let ms = |names: &[&str]| -> f64 {
             let named = |stage: &&Stage| names.contains(&stage.name.as_str());
             clock.stages[before..].iter().filter(named).map(|stage| stage.ms).sum()
@@ -279,22 +275,11 @@ fn coarser(section: &LatticeSection, built: &Lattice, factor: f64) -> (LatticeSe
         }
         None => {
             let steps = |n: usize| ((n - 1) as f64 / factor).round().max(1.0) as usize;
-            let vertices @ [nx, ny, nz] = region::even_shape(built).map(|n| steps(n) + 1);
+            let vertices @ [nx, ny, nz] = even_shape(built).map(|n| steps(n) + 1);
             // No blanks and quoted brackets, so that it works in any shell.
             let how = format!("--set \"lattice.vertices=[{nx},{ny},{nz}]\"");
             (LatticeSection { vertices: Some(vertices), ..section.clone() }, how)
         }
-    }
-}
-
-impl Chosen {
-    /// Memory of a body on the device, bytes.
-    pub(super) fn device_bytes(
-        &self,
-        system: &cutis_solver::System<f32>,
-        settings: &cutis_solver::Settings,
-    ) -> usize {
-        self.device_memory(system, settings).iter().map(|part| part.bytes).sum()
     }
 }
 
@@ -303,6 +288,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::body::lattice;
     use crate::ct::source;
     use crate::scene::Override;
 
@@ -314,7 +300,8 @@ mod tests {
                     grading = { min_mm = [20, 80, -20], max_mm = [50, 110, 20], growth = 1.5, coarsest = 4.0 }";
         let built = |set: &[Override]| {
             let loaded = Scene::parse(text, Path::new("test"), Path::new(""), set).unwrap();
-            let lattice = region::lattice(&loaded, &source::load(&loaded).unwrap().volume).unwrap();
+            let volume = source::load(&loaded).unwrap().volume;
+            let lattice = lattice(&BodySections::of(&loaded), &volume).unwrap();
             (loaded.scene.lattice, lattice)
         };
         let (section, lattice) = built(&[]);

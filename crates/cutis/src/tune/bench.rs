@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use super::field::{Field, Movable};
 use super::setting::{CostModel, LinearCost, Setting};
 use crate::backend::Chosen;
-use crate::cost::estimate::Expense;
+use crate::model::constraints::{self, CostEstimate};
 use crate::{CostReport, Error, Progress};
 
 /// Time limit for measuring a substep, s.
@@ -84,10 +84,11 @@ impl<'a> Bench<'a> {
         go_on: impl FnMut(&Run) -> ControlFlow<()>,
     ) -> Result<Run, Error> {
         let settings = setting.settings(&self.settings);
-        let on_device = self.backend.device_bytes(self.system, &settings);
-        let mut running = self.backend.start(self.system.clone(), settings)?;
-        let mut run = self.follow(&mut *running.solver, progress, go_on)?;
-        run.bytes = on_device + running.solver.bytes().iter().map(|part| part.bytes).sum::<usize>();
+        let device = constraints::device_memory(self.backend, self.system, &settings);
+        let on_device: usize = device.iter().map(|part| part.bytes).sum();
+        let (mut started, _device) = constraints::start(self.backend, self.system.clone(), settings)?;
+        let mut run = self.follow(started.solver(), progress, go_on)?;
+        run.bytes = on_device + started.solver().bytes().iter().map(|part| part.bytes).sum::<usize>();
         Ok(run)
     }
 
@@ -154,7 +155,8 @@ impl<'a> Bench<'a> {
         let mut ms = [0.0; 2];
         for (iterations, ms) in [1, 2].into_iter().zip(&mut ms) {
             let settings = self.one_substep(formulation, iterations);
-            *ms = substep_ms(&mut *self.backend.start(self.system.clone(), settings)?.solver)?;
+            let (mut started, _device) = constraints::start(self.backend, self.system.clone(), settings)?;
+            *ms = substep_ms(started.solver())?;
         }
         let iteration_ms = f64::max(ms[1] - ms[0], 0.1 * ms[0]);
         Ok(LinearCost { substep_ms: f64::max(ms[0] - iteration_ms, 0.0), iteration_ms })
@@ -169,18 +171,19 @@ impl<'a> Bench<'a> {
 
     /// Profile of one frame, after one frame that touches all memory.
     pub(super) fn profile(&self, setting: Setting) -> Result<StepProfile, Error> {
-        let mut running = self.backend.start(self.system.clone(), setting.settings(&self.settings))?;
+        let settings = setting.settings(&self.settings);
+        let (mut started, _device) = constraints::start(self.backend, self.system.clone(), settings)?;
         let mut profile = StepProfile::default();
-        running.solver.step(1)?;
-        running.solver.step_timed(1, &mut profile)?;
+        started.solver().step(1)?;
+        started.solver().step_timed(1, &mut profile)?;
         Ok(profile)
     }
 
     /// Memory of a setting by part.
     pub(super) fn bytes(&self, setting: Setting) -> Result<CostReport, Error> {
         let settings = setting.settings(&self.settings);
-        let Expense { memory, .. } = Expense::of(self.system, &settings)?;
-        let on_device = self.backend.device_memory(self.system, &settings);
+        let CostEstimate { memory, .. } = CostEstimate::of(self.system, &settings)?;
+        let on_device = constraints::device_memory(self.backend, self.system, &settings);
         Ok(CostReport::of_memory(&memory, &on_device, "not measured"))
     }
 

@@ -29,11 +29,12 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use crate::backend::Request;
-use crate::cost::plan::{self, Prepared};
-use crate::model::constraints::system::{self as dynamics, Dynamics};
+use crate::model::ModelInput;
+use crate::model::constraints::ConstraintModel;
 use crate::model::needs_system;
 use crate::report::Machine;
 use crate::run::clock::Clock;
+use crate::run::prepare::{Prepared, prepare};
 use crate::scene::{FormulationChoice, LoadedScene};
 use crate::{CostReport, Error, Progress};
 
@@ -82,14 +83,14 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
     check(loaded, options)?;
     let copy = SceneCopy::to(&options.out, options.overwrite, loaded)?;
     let mut clock = Clock::new(progress);
-    let Prepared { source, body, backend, plan, .. } =
-        plan::prepare(loaded, Request::of(loaded)?, &mut clock)?;
+    let Prepared { source, body, backend, plan, .. } = prepare(loaded, Request::of(loaded)?, &mut clock)?;
     // Vertex block descent also needs vertex colors; the other formulations ignore them.
-    let Dynamics { system, settings, .. } = clock.stage("constraints of all formulations", 0, |_| {
-        let mut all = loaded.clone();
-        all.scene.solver.formulation = FormulationChoice::Vbd;
-        dynamics::build(&all, &body)
-    })?;
+    let ConstraintModel { system, settings, .. } =
+        clock.stage("constraints of all formulations", 0, |_| {
+            let mut all = loaded.clone();
+            all.scene.solver.formulation = FormulationChoice::Vbd;
+            ConstraintModel::build(&ModelInput { file: all.file(), scene: &all.scene, body: &body })
+        })?;
     let backend = backend.kept_open()?;
     plan.warnings.iter().for_each(|warning| progress.note(warning));
     let bench = Bench::new(&system, settings, &body.cut.gapes, &backend, loaded.scene.run.frames);
@@ -97,7 +98,7 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
     let limit_s = 60.0 * options.minutes;
     let reference =
         reference::run(&bench, own, options.demand.reference_error(), REFERENCE_SHARE * limit_s, &mut clock)
-            .map_err(loaded.blame("run"))?;
+            .map_err(loaded.file().blame("run"))?;
     let mut trials =
         Trials { bench: &bench, reference: &reference, demand: options.demand, done: Vec::new() };
     trials.run(own, limit_s - reference.report.seconds, &mut clock)?;

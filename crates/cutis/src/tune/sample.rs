@@ -124,7 +124,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::body::Body;
+    use crate::body::{Body, BodySections};
     use crate::ct::source;
     use crate::scene::Scene;
 
@@ -133,7 +133,7 @@ mod tests {
             "volume = {{ phantom = {{ size = [32, 32, 24], seed = 1 }} }}\nlattice = {{ {lattice} }}"
         );
         let loaded = Scene::parse(&text, Path::new("test"), Path::new(""), &[]).unwrap();
-        Body::build(&loaded, &source::load(&loaded).unwrap().volume).unwrap()
+        Body::build(&BodySections::of(&loaded), &source::load(&loaded).unwrap().volume).unwrap()
     }
 
     /// A linear displacement field is reproduced on any other lattice. Points far away do not move.

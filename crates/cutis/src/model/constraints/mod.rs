@@ -1,6 +1,120 @@
 //! The model `pbd`: constraints over the lattice, which a solver projects.
 
-mod run;
-pub(crate) mod system;
+mod build;
+mod estimate;
+pub(crate) mod kinds;
+mod measure;
+mod solver_run;
+mod start;
 
-pub(crate) use run::Stepped;
+use std::collections::BTreeMap;
+
+use cutis_solver::{Settings, StepProfile, System};
+
+use super::costs::{lines_that_hold, sizes, unfinished_handles};
+use super::{Model, ModelCosts, ModelInput, Started};
+use crate::backend::{Chosen, Request};
+use crate::run::clock::Clock;
+use crate::scene::Scene;
+use crate::scene::validate::Check;
+use crate::{CostReport, Error, Progress};
+
+pub(crate) use estimate::CostEstimate;
+use solver_run::SolverRun;
+pub(crate) use start::{device_memory, start};
+
+/// A system of constraints and the settings to step it with.
+pub(crate) struct ConstraintModel {
+    pub(crate) system: System<f32>,
+    pub(crate) settings: Settings,
+    /// Colors by constraint kind.
+    pub(crate) colors: BTreeMap<String, usize>,
+    /// Warnings of the constraint kinds.
+    warnings: Vec<String>,
+}
+
+/// Checks the sections of the constraint kinds.
+pub(super) fn validate(scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
+    scene.constraints.named().try_for_each(|(_, kind)| kind.validate(scene, check))
+}
+
+impl Model for ConstraintModel {
+    fn costs(&self, input: &ModelInput<'_>, request: Request) -> Result<ModelCosts, Error> {
+        let (system, settings, scene) = (&self.system, &self.settings, input.scene);
+        let estimate =
+            CostEstimate::of(system, settings).map_err(|e| input.file.blame("solver")(Error::Solver(e)))?;
+        let work = estimate.work(system, settings, scene.run.frames);
+        let backend = request.settle(input.file, &scene.solver, &work)?;
+        let colors = match estimate.vertex_colors() {
+            Some(number) => BTreeMap::from([(StepProfile::DESCENT.to_owned(), number)]),
+            None => self.colors.clone(),
+        };
+        let motionless = system.vertices().iter().filter(|v| v.inverse_mass() == 0.0).count();
+        let mut warnings = scene_warnings(scene);
+        warnings.extend(self.warnings.iter().cloned());
+        warnings.extend(unfinished_handles(scene));
+        Ok(ModelCosts {
+            device_memory: device_memory(&backend, system, settings),
+            backend,
+            sizes: sizes(input.body, motionless - input.body.removed_vertices()),
+            colors,
+            memory: estimate.memory,
+            projections: work.projections,
+            left_out: left_out(scene),
+            warnings,
+        })
+    }
+
+    fn measure(
+        self: Box<Self>,
+        input: &ModelInput<'_>,
+        backend: &Chosen,
+        costs: CostReport,
+        clock: &mut Clock<'_>,
+    ) -> Result<CostReport, Error> {
+        let measure = |_: &dyn Progress| measure::substeps(backend, self.system, self.settings, costs);
+        clock.stage("time a substep", 0, measure).map_err(input.file.blame("solver"))
+    }
+
+    fn start<'a>(
+        self: Box<Self>,
+        input: &ModelInput<'a>,
+        backend: &Chosen,
+        clock: &mut Clock<'_>,
+    ) -> Result<Started<'a>, Error> {
+        let Self { system, settings, .. } = *self;
+        let (solver, device) = if backend.on_gpu() {
+            let start = |_: &dyn Progress| start(backend, system, settings);
+            clock.stage_on("gpu", "start the GPU", 0, start).map_err(input.file.blame("solver.backend"))?
+        } else {
+            start(backend, system, settings).map_err(input.file.blame("solver"))?
+        };
+        Ok(Started { simulation: Box::new(SolverRun { solver }), device })
+    }
+}
+
+/// What the scene does not name, and what is therefore not stored or computed.
+fn left_out(scene: &Scene) -> Vec<String> {
+    let absent = kinds::KINDS.iter().filter(|row| (row.section)(&scene.constraints).is_none());
+    let mut lines: Vec<String> = absent
+        .map(|row| format!("{}: no {} constraints are stored or projected", row.key, row.facts.element))
+        .collect();
+    if scene.solver.iterations == 1 {
+        lines.push("multipliers: one iteration per substep needs none stored".to_owned());
+    }
+    lines
+}
+
+/// Warnings about parts of the scene that will not act as they look.
+fn scene_warnings(scene: &Scene) -> Vec<String> {
+    let gravity = scene.solver.gravity_m_s2 != [0.0; 3];
+    let nothing_fixed = scene.fixed == Default::default();
+    lines_that_hold(&[
+        (scene.chainmail.is_some(), "chainmail has no effect with model = \"pbd\""),
+        (
+            scene.constraints == Default::default(),
+            "no constraint kind is named: nothing holds the tissue together",
+        ),
+        (nothing_fixed && gravity, "gravity acts and nothing is fixed: the body will fall"),
+    ])
+}

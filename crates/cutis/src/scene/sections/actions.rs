@@ -1,9 +1,9 @@
-//! What is done to the body: held, cut, dragged.
+//! The sections that act on the body: fixed vertices, incisions, handles.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What does not move.
+/// The vertices that do not move.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FixedSection {
@@ -16,7 +16,8 @@ pub struct FixedSection {
     /// Vertices on the side of these planes to which the normal points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub planes: Vec<PlaneSection>,
-    /// Vertices in the first and last layer of the lattice along these axes (`"i"`, `"j"`, `"k"`), where the scan ends.
+    /// Vertices in the first and last layer of the lattice along these axes (`"i"`, `"j"`, `"k"`), where
+    /// the scan ends.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub end_layers: Vec<AxisChoice>,
 }
@@ -34,7 +35,7 @@ pub enum AxisChoice {
 }
 
 impl AxisChoice {
-    /// 0, 1 or 2.
+    /// The number of the axis: 0, 1 or 2.
     pub fn index(self) -> usize {
         self as usize
     }
@@ -60,7 +61,8 @@ pub struct PlaneSection {
     pub normal: [f64; 3],
 }
 
-/// An incision: the paper's, with a mid-surface that always parts the lips. It is placed on the body at rest.
+/// An incision as in the paper, with a mid-surface that always separates the lips. It is placed on the body
+/// at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IncisionSection {
@@ -72,12 +74,12 @@ pub struct IncisionSection {
     pub depth_mm: f64,
     /// Width of the removed strip, mm.
     pub width_mm: f64,
-    /// Time from which on it is there, s; later than 0 with the model `chainmail` only.
+    /// Time at which the incision is made, s; later than 0 with the model `chainmail` only.
     #[serde(default)]
     pub at_s: f64,
 }
 
-/// Tissue that is dragged along a straight line.
+/// A sphere of tissue that is dragged along a straight line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandleSection {
@@ -85,9 +87,15 @@ pub struct HandleSection {
     pub at_mm: [f64; 3],
     /// Radius of the sphere, mm.
     pub radius_mm: f64,
-    /// Where it ends up, relative to where it was, mm.
+    /// Displacement at the end of the movement, mm.
     pub move_mm: [f64; 3],
     /// Duration of the movement, s.
-    #[serde(default = "super::constraints::one")]
+    #[serde(default = "HandleSection::default_over_s")]
     pub over_s: f64,
+}
+
+impl HandleSection {
+    fn default_over_s() -> f64 {
+        1.0
+    }
 }

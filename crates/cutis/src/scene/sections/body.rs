@@ -1,4 +1,4 @@
-//! What is simulated: the CT, the lattice over it, what is tissue and what is skin.
+//! The sections of the body: the CT, the lattice over it, tissue and skin.
 
 use std::path::PathBuf;
 
@@ -6,27 +6,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::PlaneSection;
+use crate::body::AIR_BELOW_HU;
 use crate::scene::choice::OneOr;
 
-/// Deformation model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Model {
-    /// Position-based dynamics over a tetrahedral lattice.
-    #[default]
-    Pbd,
-    /// ChainMail: links between the points of the lattice, which give way up to a limit.
-    Chainmail,
-}
-
-/// Where the CT comes from: exactly one of `path` and `phantom`.
+/// The CT: exactly one of `path` and `phantom`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeSection {
     /// A NIfTI file (`.nii`, `.nii.gz`, `.hdr`), relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
-    /// The built-in synthetic torso instead of a file.
+    /// The built-in synthetic torso, used instead of a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phantom: Option<PhantomSection>,
 }
@@ -37,7 +27,7 @@ pub struct VolumeSection {
 pub struct PhantomSection {
     /// Voxels per axis, 1 to 4096.
     pub size: [usize; 3],
-    /// Anatomy and noise vary with it.
+    /// Seed of the random anatomy and noise.
     #[serde(default)]
     pub seed: u64,
 }
@@ -55,12 +45,14 @@ pub struct LatticeSection {
     /// How a cell is split into tetrahedra.
     #[serde(default)]
     pub split: SplitChoice,
-    /// The part of the body that is simulated: `around_mm`, or a box. What lies beyond stays where it is and takes neither time
-    /// nor memory of the solver. Skin and largest part are found on the whole body before. Left out: the whole body.
+    /// The part of the body that is simulated: `around_mm`, or a box. Tissue outside it does not move and
+    /// takes neither time nor memory of the solver. Skin and largest part are found on the whole body
+    /// first. Left out: the whole body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<RegionSection>,
-    /// A fine zone, `around_mm` or a box, in which the lattice is as it would be without this section. Beside it the planes of
-    /// vertices lie further and further apart along each axis. Left out: all cells have the same size.
+    /// A fine zone, `around_mm` or a box, in which the lattice has the spacing that it would have without
+    /// this section. Outside it the distance between planes of vertices grows along each axis. Left out:
+    /// all cells have the same size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grading: Option<GradingSection>,
 }
@@ -80,12 +72,12 @@ pub struct RegionSection {
     pub max_mm: Option<[f64; 3]>,
 }
 
-/// A fine zone, `around_mm` or a box, and how the lattice gets coarser beside it.
+/// A fine zone, `around_mm` or a box, and the growth of the lattice steps outside it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GradingSection {
-    /// The box, along the axes of the lattice, around everything within this distance of an incision (straight down to its
-    /// depth) or a handle, mm.
+    /// The fine zone is the box, along the axes of the lattice, around everything within this distance of
+    /// an incision (straight down to its depth) or a handle, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub around_mm: Option<f64>,
     /// Lowest corner of the box, mm.
@@ -112,7 +104,7 @@ impl GradingSection {
     }
 }
 
-/// A part of space that a scene names.
+/// A zone that a scene names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Zone {
     /// Within this distance of an incision or a handle, mm.
@@ -122,7 +114,7 @@ pub(crate) enum Zone {
 }
 
 impl Zone {
-    /// Exactly one of the two, or none.
+    /// The zone, if exactly one of the two is given.
     fn of(around_mm: Option<f64>, min_mm: Option<[f64; 3]>, max_mm: Option<[f64; 3]>) -> Option<Self> {
         match (around_mm, min_mm, max_mm) {
             (Some(around), None, None) => Some(Self::Around(around)),
@@ -155,7 +147,7 @@ pub enum SplitChoice {
     Five,
 }
 
-/// What is tissue, and what it weighs.
+/// Which voxels are tissue, and their density.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TissueSection {
@@ -163,7 +155,7 @@ pub struct TissueSection {
     pub air_below_hu: f32,
     /// Which connected parts are simulated.
     pub keep: Keep,
-    /// Half-spaces that are dropped before anything else, for example a scanner table in contact with the body.
+    /// Half-spaces that are removed first, for example a scanner table in contact with the body.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cut_planes: Vec<PlaneSection>,
     /// HU → density, kg/m³: preset `schneider2000` or `water`, or points.
@@ -173,7 +165,7 @@ pub struct TissueSection {
 impl Default for TissueSection {
     fn default() -> Self {
         Self {
-            air_below_hu: -449.0,
+            air_below_hu: AIR_BELOW_HU,
             keep: Keep::default(),
             cut_planes: Vec::new(),
             density: TableChoice::Preset("schneider2000".into()),
@@ -185,10 +177,10 @@ impl Default for TissueSection {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
-    /// The largest one: the scanner table and other objects beside the body are left out.
+    /// The largest part: the scanner table and other objects next to the body are left out.
     #[default]
     Largest,
-    /// All of them.
+    /// All parts.
     All,
 }
 
@@ -196,7 +188,7 @@ pub enum Keep {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum TableChoice {
-    /// A preset by name.
+    /// The name of a preset.
     Preset(String),
     /// Points `[hu, value]`, HU strictly increasing.
     Points(Vec<[f32; 2]>),
@@ -215,7 +207,8 @@ impl<'de> Deserialize<'de> for TableChoice {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SkinSection {
-    /// Detection rule: the outer skin of the body, all faces between tissue and the rest, or the paper's rule literally.
+    /// Rule by which skin triangles are chosen: the outer skin of the body, all faces between tissue and the
+    /// rest, or the paper's rule, taken literally.
     #[serde(default)]
     pub mode: SkinChoice,
 }

@@ -1,4 +1,4 @@
-//! How it is stepped, for how long, and what is written.
+//! The sections of a run: time steps, number of frames, outputs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSection {
-    /// Where it runs: all CPU cores, the scalar reference solver, a GPU, or what suits the size of the scene. A build
-    /// without the feature `gpu` refuses `"gpu"`.
+    /// Backend of the solver: all CPU cores, the scalar reference solver, a GPU, or the best one for the size
+    /// of the scene. A build without the feature `gpu` refuses `"gpu"`.
     pub backend: BackendChoice,
-    /// Which GPU, where one is used: a part of its name, or its index in `cutis devices`. Left out: the best one.
+    /// The GPU to use: a part of its name, or its index in `cutis devices`. Left out: the best one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adapter: Option<String>,
-    /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent: the same materials as `xpbd`, in equilibrium
-    /// where it comes to rest, whatever the substeps.
+    /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent. `vbd` has the
+    /// materials of `xpbd`, and its state of rest is an equilibrium for any number of substeps.
     pub formulation: FormulationChoice,
     /// Duration of a frame, s.
     pub dt_s: f64,
@@ -26,10 +26,10 @@ pub struct SolverSection {
     pub gravity_m_s2: [f64; 3],
     /// Velocities decay as exp(−damping·t), 1/s; 0 or more.
     pub damping_per_s: f64,
-    /// Over-relaxation of `vbd`, above 0 and below 2; 1 with the other formulations. About 1.3 helps where there are several
-    /// iterations.
+    /// Over-relaxation of `vbd`, above 0 and below 2; 1 with the other formulations. About 1.3 helps with
+    /// several iterations.
     pub relaxation: f64,
-    /// Worker threads; 0 takes all cores. The result does not depend on it.
+    /// Worker threads; 0 takes all cores. The result does not depend on their number.
     pub threads: usize,
 }
 
@@ -50,11 +50,11 @@ impl Default for SolverSection {
     }
 }
 
-/// Where the solver runs.
+/// The backend of the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum BackendChoice {
-    /// The best one that this build and machine have; the report says which and why.
+    /// The best backend for the scene on this machine; the report names it and says why.
     #[default]
     Auto,
     /// All CPU cores.
@@ -74,8 +74,8 @@ pub enum FormulationChoice {
     /// Compliance in physical units.
     #[default]
     Xpbd,
-    /// The same materials, solved vertex by vertex (vertex block descent): what comes to rest is in equilibrium, whatever the
-    /// substeps and iterations.
+    /// The materials of `xpbd`, solved vertex by vertex (vertex block descent). The state of rest is an
+    /// equilibrium for any number of substeps and iterations.
     Vbd,
 }
 
@@ -85,7 +85,7 @@ pub enum FormulationChoice {
 pub struct RunSection {
     /// Number of frames.
     pub frames: u32,
-    /// Frames between checkpoints, from which `--resume` goes on; 0 writes none.
+    /// Frames between checkpoints, from which `--resume` continues; 0 writes none.
     pub checkpoint_every: u32,
 }
 
@@ -95,11 +95,12 @@ impl Default for RunSection {
     }
 }
 
-/// What to write. In a scene that has this section, what it does not name is neither computed nor written.
+/// The files to write. In a scene with this section, an output that the section does not name is neither
+/// computed nor written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputSection {
-    /// `deformed.nii.gz`: the CT, carried along by the body.
+    /// `deformed.nii.gz`: the deformed CT.
     #[serde(default)]
     pub volume: bool,
     /// `skin.vtu`: the deformed skin.

@@ -1,4 +1,4 @@
-//! A body that follows as a chain.
+//! A simulation by ChainMail: cuts, propagation of drags, relaxation.
 
 use cutis_chainmail::{Drag, LinkViolation, Order};
 use cutis_solver::{SolverError, StepProfile};
@@ -6,77 +6,75 @@ use cutis_solver_cpu::CpuError;
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use super::device::Relaxer;
+use super::{ChainHandle, ChainmailModel};
 use crate::Error;
-use crate::backend::Relaxer;
 use crate::body::Body;
-use crate::model::chainmail::chain::{ChainBody, ChainHandle};
-use crate::model::{End, Motion};
-use crate::report::ChainmailReport;
+use crate::model::{ModelInput, Simulation, SimulationEnd};
+use crate::output::report::ChainmailReport;
 use crate::run::checkpoint::Checkpoint;
-use crate::scene::LoadedScene;
 
-/// Parts of a frame, as the cost report names them.
+/// Names of the parts of a frame in the cost report.
 const CUTS: &str = "cuts";
 const PROPAGATION: &str = "propagation";
 const RELAXATION: &str = "relaxation";
 
-/// Words of a checkpoint that the energy after the last drag takes.
+/// Words of a checkpoint that hold the energy after the last drag.
 const ENERGY_WORDS: usize = 2;
 
-/// A chain, the body that it moves, and how far the frames have come.
-pub(crate) struct Chained<'a> {
-    chain: ChainBody,
+/// A chain, the body that it moves, and the state of its frames.
+pub(super) struct ChainmailRun<'a> {
+    model: ChainmailModel,
     body: &'a Body,
-    /// A step along each axis of the lattice, m.
+    /// A lattice step along each axis, m.
     steps_m: [Vector3<f64>; 3],
     dt_s: f64,
     order: Order,
     pool: ThreadPool,
-    /// Relaxation on a device.
+    /// Relaxation on a GPU; none relaxes on the host.
     relaxer: Option<Relaxer>,
-    /// Every element that a handle grabs.
+    /// All elements that handles grab.
     held: Vec<u32>,
     frame: u32,
     /// The last frame in which a handle moves.
     last_drag: u32,
-    /// Cuts that are made.
+    /// Number of cuts that have been made.
     cuts_made: usize,
-    /// Nothing relaxes any more.
+    /// Relaxation has ended.
     settled: bool,
-    told: ChainmailReport,
+    report: ChainmailReport,
 }
 
-impl<'a> Chained<'a> {
-    /// `threads`: none for one queue on one thread.
-    pub(crate) fn new(
-        loaded: &LoadedScene,
-        mut chain: ChainBody,
-        body: &'a Body,
+impl<'a> ChainmailRun<'a> {
+    /// Prepares the frames. Without `threads`, drags propagate by one queue on one thread.
+    pub(super) fn new(
+        input: &ModelInput<'a>,
+        mut model: ChainmailModel,
         threads: Option<usize>,
         relaxer: Option<Relaxer>,
     ) -> Result<Self, Error> {
+        let (body, dt_s) = (input.body, input.scene.solver.dt_s);
         let count = threads.unwrap_or(1);
         let pool = ThreadPoolBuilder::new()
             .num_threads(count)
             .thread_name(|k| format!("cutis-chain-{k}"))
             .build()
             .map_err(|error| CpuError::ThreadPool { threads: count, reason: error.to_string() })?;
-        if relaxer.is_none() && chain.relax_per_frame > 0 {
-            // What is looked up once is no part of the first frame.
-            pool.install(|| chain.chain.relax(0, &[]));
+        if relaxer.is_none() && model.relax_per_frame > 0 {
+            // Builds look-up tables now, so that the first frame takes as long as the others.
+            pool.install(|| model.chain.relax(0, &[]));
         }
         let affine = &body.mesh.lattice.grid().affine;
         let origin = affine.to_mm(Point3::origin());
         let step_m =
             |axis| (affine.to_mm(Point3::origin() + Vector3::<f64>::ith(axis, 1.0)) - origin) / 1000.0;
-        let dt_s = loaded.scene.solver.dt_s;
         let frames = |handle: &ChainHandle| (handle.over_s / dt_s).ceil() as u32;
         Ok(Self {
             steps_m: [0, 1, 2].map(step_m),
             order: if threads.is_some() { Order::Slabs } else { Order::Fifo },
-            held: chain.handles.iter().flat_map(|handle| handle.elements.iter().copied()).collect(),
-            last_drag: chain.handles.iter().map(frames).max().unwrap_or(0).min(loaded.scene.run.frames),
-            chain,
+            held: model.handles.iter().flat_map(|handle| handle.elements.iter().copied()).collect(),
+            last_drag: model.handles.iter().map(frames).max().unwrap_or(0).min(input.scene.run.frames),
+            model,
             body,
             dt_s,
             pool,
@@ -84,26 +82,26 @@ impl<'a> Chained<'a> {
             frame: 0,
             cuts_made: 0,
             settled: false,
-            told: ChainmailReport::default(),
+            report: ChainmailReport::default(),
         })
     }
 
-    /// Makes the cuts that are due at the beginning of a frame; whether there were any.
+    /// Makes the cuts that are due at the beginning of a frame. Returns whether there were any.
     fn cut(&mut self) -> bool {
         let time_s = f64::from(self.frame) * self.dt_s;
         let first = self.cuts_made;
-        while let Some(cut) = self.chain.cuts.get(self.cuts_made).filter(|cut| cut.at_s <= time_s) {
-            self.told.cut_links += self.chain.chain.cut_links(&cut.links);
+        while let Some(cut) = self.model.cuts.get(self.cuts_made).filter(|cut| cut.at_s <= time_s) {
+            self.report.cut_links += self.model.chain.cut_links(&cut.links);
             self.cuts_made += 1;
         }
         self.cuts_made > first
     }
 
-    /// Where the handles are at the end of a frame.
+    /// Targets of the grabbed elements at the end of a frame.
     fn drags(&self, frame: u32) -> Vec<Drag> {
         let (grid, time_s) = (self.body.mesh.lattice.grid(), f64::from(frame) * self.dt_s);
         let mut drags = Vec::with_capacity(self.held.len());
-        for handle in &self.chain.handles {
+        for handle in &self.model.handles {
             let share = if time_s < handle.over_s { time_s / handle.over_s } else { 1.0 };
             drags.extend(handle.elements.iter().map(|&element| {
                 let rest = grid.point(element as usize);
@@ -113,37 +111,37 @@ impl<'a> Chained<'a> {
         drags
     }
 
-    /// Carries the handles on, and whatever their links pull along.
+    /// Moves the handles, and the elements that their links pull along.
     fn propagate(&mut self) -> Result<(), Error> {
         let drags = self.drags(self.frame);
-        let Self { chain: ChainBody { chain, .. }, pool, order, .. } = self;
-        pool.install(|| chain.drag(&drags, *order))?;
+        let Self { model, pool, order, .. } = self;
+        pool.install(|| model.chain.drag(&drags, *order))?;
         Ok(())
     }
 
     fn energy(&self) -> f64 {
-        self.pool.install(|| self.chain.chain.energy_mm2())
+        self.pool.install(|| self.model.chain.energy_mm2())
     }
 
     fn relax(&mut self) -> Result<(), Error> {
         let time_s = self.time_s();
-        let Self { chain: ChainBody { chain, relax_per_frame, .. }, pool, relaxer, held, .. } = self;
+        let Self { model: ChainmailModel { chain, relax_per_frame, .. }, pool, relaxer, held, .. } = self;
         let done = match relaxer {
             None => pool.install(|| chain.relax(*relax_per_frame, held)),
             Some(relaxer) => relaxer.relax(chain, *relax_per_frame, held).map_err(|error| {
                 Error::Solver(SolverError::Device { backend: "gpu", time_s, reason: error.to_string() })
             })?,
         };
-        self.told.relax_sweeps += u64::from(done.sweeps);
-        self.told.relax_moves += done.moves;
+        self.report.relax_sweeps += u64::from(done.sweeps);
+        self.report.relax_moves += done.moves;
         self.settled = done.settled;
         Ok(())
     }
 
-    /// Where a vertex is: exactly where it was, unless it moved.
+    /// Position of a vertex, local meters: exactly the rest position if its element has not moved.
     fn position(&self, vertex: u32) -> Point3<f32> {
         let rest = self.body.mesh.positions[vertex as usize];
-        match self.chain.chain.displacement(self.chain.elements[vertex as usize]) {
+        match self.model.chain.displacement(self.model.elements[vertex as usize]) {
             [0.0, 0.0, 0.0] => rest,
             by => {
                 let moved = (0..3).fold(rest.cast::<f64>(), |at, axis| at + self.steps_m[axis] * by[axis]);
@@ -156,16 +154,16 @@ impl<'a> Chained<'a> {
         (0..self.body.mesh.positions.len() as u32).map(|vertex| self.position(vertex)).collect()
     }
 
-    /// Elements of the cut body that are not where they rest.
+    /// Number of elements of the cut body that have left their rest positions.
     fn moved(&self) -> usize {
-        let (chain, elements) = (&self.chain.chain, self.chain.elements.iter().enumerate());
-        let stays = |element: u32| chain.displacement(element) == [0.0; 3];
-        elements.filter(|&(v, &element)| !self.body.is_removed(v as u32) && !stays(element)).count()
+        let (chain, elements) = (&self.model.chain, self.model.elements.iter().enumerate());
+        let at_rest = |element: u32| chain.displacement(element) == [0.0; 3];
+        elements.filter(|&(v, &element)| !self.body.is_removed(v as u32) && !at_rest(element)).count()
     }
 
-    /// Why links are beyond their limits: `worst` and what holds one of its ends.
+    /// Warning about `links` links beyond their limits, with the place that holds an end of the `worst` one.
     fn reason(&self, links: usize, worst: &LinkViolation) -> String {
-        let (lattice, chain) = (&self.body.mesh.lattice, &self.chain.chain);
+        let (lattice, chain) = (&self.body.mesh.lattice, &self.model.chain);
         let ends = [worst.element, worst.next];
         let fixed = ends.into_iter().find(|&end| chain.is_fixed(end));
         let what = if fixed.is_some() { "fixed" } else { "held by a handle" };
@@ -174,32 +172,33 @@ impl<'a> Chained<'a> {
         let mm: [f64; 3] = lattice.mm(grid.point(end.unwrap_or(worst.element) as usize)).into();
         let excess = worst.excess * grid.affine.spacing_mm()[worst.axis];
         format!(
-            "{links} links are beyond their limits: what rests at {mm:.1?} mm is {what} and cannot follow, by up to {excess:.2} mm; \
-             shorten handle.move_mm, fix less, or let links give way further (chainmail.materials)"
+            "{links} links are beyond their limits: the vertex at {mm:.1?} mm is {what} and cannot follow, by \
+             up to {excess:.2} mm; shorten handle.move_mm, fix less, or allow longer links \
+             (chainmail.materials)"
         )
     }
 }
 
-impl Motion for Chained<'_> {
+impl Simulation for ChainmailRun<'_> {
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
-        let count = 3 * self.chain.elements.len();
+        let count = 3 * self.model.elements.len();
         let (units, rest) = saved.words.split_at(count.min(saved.words.len()));
         let (energy, strained) = rest.split_at(ENERGY_WORDS.min(rest.len()));
         let units: Vec<(u32, [i32; 3])> = self
-            .chain
+            .model
             .elements
             .iter()
             .zip(units.chunks_exact(3))
             .map(|(&element, at)| (element, [0, 1, 2].map(|axis| at[axis].cast_signed())))
             .collect();
-        self.chain.chain.restore(&units, strained)?;
-        // What the frames before cut is cut again: a state of its own, which no drag has to follow.
+        self.model.chain.restore(&units, strained)?;
+        // The checkpoint does not hold the cuts of earlier frames, so they are made again.
         if let Some(last) = saved.frame.checked_sub(1) {
             self.frame = last;
             self.cut();
         }
         self.frame = saved.frame;
-        self.told.energy_before =
+        self.report.energy_before =
             f64::from_bits(energy.iter().rev().fold(0, |bits, &word| bits << 32 | u64::from(word)));
         Ok(())
     }
@@ -210,7 +209,7 @@ impl Motion for Chained<'_> {
 
     fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error> {
         let mut changed = false;
-        if !self.chain.cuts.is_empty() {
+        if !self.model.cuts.is_empty() {
             changed = profile.time(CUTS, || self.cut());
         }
         self.frame += 1;
@@ -218,17 +217,17 @@ impl Motion for Chained<'_> {
             profile.time(PROPAGATION, || self.propagate())?;
             changed = true;
             if self.frame == self.last_drag {
-                self.told.energy_before = self.energy();
+                self.report.energy_before = self.energy();
             }
         }
         self.settled &= !changed;
-        if self.chain.relax_per_frame > 0 && !self.settled {
+        if self.model.relax_per_frame > 0 && !self.settled {
             profile.time(RELAXATION, || self.relax())?;
         }
         Ok(())
     }
 
-    fn waits(&self) -> bool {
+    fn parts_are_sequential(&self) -> bool {
         true
     }
 
@@ -241,29 +240,29 @@ impl Motion for Chained<'_> {
     }
 
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {
-        let chain = &self.chain.chain;
-        let units = self.chain.elements.iter().flat_map(|&element| chain.units(element));
-        let energy = self.told.energy_before.to_bits();
+        let chain = &self.model.chain;
+        let units = self.model.elements.iter().flat_map(|&element| chain.units(element));
+        let energy = self.report.energy_before.to_bits();
         let energy: [u32; ENERGY_WORDS] = [energy as u32, (energy >> 32) as u32];
         let words =
             units.map(i32::cast_unsigned).chain(energy).chain(chain.strained().iter().copied()).collect();
         Ok(Checkpoint { frame, positions: self.positions(), words })
     }
 
-    fn end(&mut self) -> Result<End, Error> {
-        let violations = self.pool.install(|| self.chain.chain.violations());
-        let told = ChainmailReport {
+    fn end(&mut self) -> Result<SimulationEnd, Error> {
+        let violations = self.pool.install(|| self.model.chain.violations());
+        let report = ChainmailReport {
             moved: self.moved(),
             violated_links: violations.links,
             energy_after: self.energy(),
             settled: self.settled,
-            ..self.told.clone()
+            ..self.report.clone()
         };
         let warnings = violations.worst.iter().map(|worst| self.reason(violations.links, worst));
-        Ok(End {
+        Ok(SimulationEnd {
             positions: self.positions(),
             residuals: Vec::new(),
-            chainmail: Some(told),
+            chainmail: Some(report),
             warnings: warnings.collect(),
         })
     }

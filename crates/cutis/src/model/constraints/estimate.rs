@@ -1,23 +1,23 @@
-//! What stepping a system takes, as far as it can be counted before: bytes on the host, and the work of a run.
+//! The memory and work of a run of constraints, counted before the run.
 
 use cutis_solver::{Descent, Formulation, Kind, Settings, SolverError, StepProfile, System};
 
 use crate::backend::Work;
-use crate::report::MemoryPart;
+use crate::output::report::MemoryPart;
 
-/// What a system takes with the settings that it is stepped with.
-pub(crate) struct Expense {
-    /// What the solver will store on the host, by part: as [`Solver::bytes`](cutis_solver::Solver::bytes) of it.
+/// Memory and work of stepping a system with given settings.
+pub(crate) struct CostEstimate {
+    /// Memory of the solver on the host by part, equal to its [`Solver::bytes`](cutis_solver::Solver::bytes).
     pub(crate) memory: Vec<MemoryPart>,
     /// The groups of vertex block descent; none with another formulation.
     descent: Option<Descent<f32>>,
 }
 
-impl Expense {
-    /// Of a system with the settings that it is stepped with.
+impl CostEstimate {
+    /// Estimates a system that is stepped with these settings.
     ///
     /// # Errors
-    /// What vertex block descent refuses of a system.
+    /// [`SolverError`] for a system that vertex block descent refuses.
     pub(crate) fn of(system: &System<f32>, settings: &Settings) -> Result<Self, SolverError> {
         let descent = match settings.formulation {
             Formulation::Vbd => Some(Descent::new(system, settings)?),
@@ -37,7 +37,7 @@ impl Expense {
         Ok(Self { memory, descent })
     }
 
-    /// The work of `frames` frames of the system.
+    /// The work of `frames` frames.
     pub(crate) fn work(&self, system: &System<f32>, settings: &Settings, frames: u32) -> Work {
         let kinds = system.kinds();
         let constraints: u64 = kinds.iter().map(|kind| kind.len() as u64).sum();
@@ -60,7 +60,7 @@ impl Expense {
                     evaluations: times(constraints),
                 }
             }
-            // There and back.
+            // A symmetric sweep visits each vertex twice.
             Some(descent) => {
                 let groups = descent.groups();
                 let steps = 2 * groups.order.len() as u64;
@@ -77,7 +77,7 @@ impl Expense {
         }
     }
 
-    /// Colors that an iteration goes through in vertex block descent; none with another formulation.
+    /// Number of vertex colors in vertex block descent; none with another formulation.
     pub(crate) fn vertex_colors(&self) -> Option<usize> {
         self.descent.as_ref().map(|descent| descent.groups().len())
     }
@@ -93,7 +93,7 @@ mod tests {
     use super::*;
     use crate::scene::{LoadedScene, Scene};
 
-    /// A box of tissue with skin and a handle.
+    /// A phantom with skin and a handle.
     fn scene(solver: &str) -> LoadedScene {
         let text = format!(
             "volume = {{ phantom = {{ size = [32, 32, 24], seed = 1 }} }}\nlattice = {{ spacing_mm = 16.0 }}\n\
@@ -105,9 +105,9 @@ mod tests {
         Scene::parse(&text, Path::new("test"), Path::new(""), &[]).unwrap()
     }
 
-    /// What is said before a run is what the solver stores and its schedule runs, and so is what the plan passes on.
+    /// The estimate and the plan agree with the bytes and the schedule of a solver.
     #[test]
-    fn what_is_planned_is_what_the_solver_stores_and_runs() {
+    fn the_estimate_agrees_with_the_solver() {
         for (solver, more) in [
             ("{ backend = \"cpu\" }", None),
             ("{ backend = \"cpu\", iterations = 4 }", Some("multipliers")),
@@ -127,8 +127,8 @@ mod tests {
             assert_eq!(plan.memory, stored);
             let schedule = solver.schedule();
             assert_eq!(plan.projections, 3 * schedule.projections_per_frame());
-            let expense = Expense::of(&system, solver.settings()).unwrap();
-            let work = expense.work(&system, solver.settings(), 1);
+            let estimate = CostEstimate::of(&system, solver.settings()).unwrap();
+            let work = estimate.work(&system, solver.settings(), 1);
             assert_eq!(work.sweeps as usize, schedule.sweeps.len() + 2 * schedule.color_passes.len());
             let passes = u64::from(schedule.iterations) * u64::from(schedule.substeps);
             assert_eq!(work.elements * passes, schedule.projections_per_frame());

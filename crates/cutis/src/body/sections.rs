@@ -1,0 +1,74 @@
+//! The sections of a scene that a body is built from.
+
+use cutis_mesh::{HalfSpace, Incision, SkinMode, Split};
+
+use crate::scene::{
+    HandleSection, IncisionSection, LatticeSection, LoadedScene, PlaneSection, Scene, SceneFile, SkinChoice,
+    SplitChoice, TissueSection,
+};
+
+/// The sections of a scene that a body is built from.
+#[derive(Clone, Copy)]
+pub(crate) struct BodySections<'a> {
+    pub(crate) file: SceneFile<'a>,
+    pub(crate) lattice: &'a LatticeSection,
+    pub(crate) tissue: &'a TissueSection,
+    /// Rule by which the skin is found; none if the scene does not need the skin.
+    pub(crate) skin: Option<SkinChoice>,
+    pub(crate) incisions: &'a [IncisionSection],
+    pub(crate) handles: &'a [HandleSection],
+}
+
+impl<'a> BodySections<'a> {
+    pub(crate) fn of(loaded: &'a LoadedScene) -> Self {
+        let scene = &loaded.scene;
+        Self {
+            file: loaded.file(),
+            lattice: &scene.lattice,
+            tissue: &scene.tissue,
+            skin: needs_skin(scene).then_some(scene.skin.mode),
+            incisions: &scene.incision,
+            handles: &scene.handle,
+        }
+    }
+}
+
+/// Whether a part of the scene refers to the skin, so that it must be found.
+pub(crate) fn needs_skin(scene: &Scene) -> bool {
+    scene.constraints.need_skin()
+        || !scene.incision.is_empty()
+        || scene.output.surface
+        || scene.output.pictures
+}
+
+impl From<&PlaneSection> for HalfSpace {
+    fn from(plane: &PlaneSection) -> Self {
+        Self { point_mm: plane.point_mm, normal: plane.normal }
+    }
+}
+
+impl From<&IncisionSection> for Incision {
+    fn from(section: &IncisionSection) -> Self {
+        let IncisionSection { from_mm, to_mm, depth_mm, width_mm, at_s: _ } = *section;
+        Self { from_mm, to_mm, depth_mm, width_mm }
+    }
+}
+
+impl From<SkinChoice> for SkinMode {
+    fn from(choice: SkinChoice) -> Self {
+        match choice {
+            SkinChoice::Paper => Self::Paper,
+            SkinChoice::Boundary => Self::Boundary,
+            SkinChoice::Exterior => Self::Exterior,
+        }
+    }
+}
+
+impl From<SplitChoice> for Split {
+    fn from(choice: SplitChoice) -> Self {
+        match choice {
+            SplitChoice::Kuhn6 => Self::Kuhn6,
+            SplitChoice::Five => Self::Five,
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Builds the system of a cut body: masses, the constraint kinds of the scene, handles.
+
+use std::collections::BTreeMap;
+
+use cutis_coloring::Groups;
+use cutis_solver::{Formulation, Handle, Settings, SystemBuilder};
+use nalgebra::Vector3;
+
+use super::ConstraintModel;
+use super::kinds::BodyParts;
+use crate::Error;
+use crate::model::ModelInput;
+use crate::scene::{FormulationChoice, SolverSection};
+
+impl SolverSection {
+    /// The section as settings of a solver.
+    pub(crate) fn settings(&self) -> Settings {
+        Settings {
+            formulation: match self.formulation {
+                FormulationChoice::Pbd => Formulation::Pbd,
+                FormulationChoice::Xpbd => Formulation::Xpbd,
+                FormulationChoice::Vbd => Formulation::Vbd,
+            },
+            dt_s: self.dt_s,
+            substeps: self.substeps,
+            iterations: self.iterations,
+            gravity_m_s2: self.gravity_m_s2,
+            damping_per_s: self.damping_per_s,
+            relaxation: self.relaxation,
+        }
+    }
+}
+
+impl ConstraintModel {
+    /// Builds what the scene names and nothing else.
+    ///
+    /// # Errors
+    /// [`Error`] for a value of the scene that does not work with this body.
+    pub(crate) fn build(input: &ModelInput<'_>) -> Result<Self, Error> {
+        let ModelInput { file, scene, body } = *input;
+        let inverse_masses = body.inverse_masses(file, &scene.fixed)?;
+        // The frame's origin is in the middle of the CT, so a region of interest has the same positions
+        // as in the whole body.
+        let mut builder = SystemBuilder::<f32>::in_place(&body.mesh.positions, &inverse_masses)?;
+        let parts = BodyParts {
+            file,
+            solver: &scene.solver,
+            body,
+            inverse_masses: &inverse_masses,
+            nothing_fixed: scene.fixed == Default::default(),
+        };
+        let (mut colors, mut warnings) = (BTreeMap::new(), Vec::new());
+        for (row, kind) in scene.constraints.named() {
+            let section = format!("constraints.{}", row.key);
+            let number;
+            (builder, number) = kind.add(builder, &parts).map_err(file.blame(&section))?;
+            colors.insert(row.key.to_owned(), number);
+            warnings.extend(kind.warnings(&parts));
+        }
+        if scene.solver.formulation == FormulationChoice::Vbd {
+            builder = builder.vertex_groups(Groups::from_colors(&body.mesh.vertex_classes())?);
+        }
+        for (n, (handle, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {
+            let move_m = (Vector3::from(handle.move_mm) / 1000.0).into();
+            let handle = Handle { vertices: grabbed.clone(), move_m, over_s: handle.over_s };
+            builder = builder.handle(handle).map_err(file.blame(&format!("handle[{n}]")))?;
+        }
+        Ok(Self { system: builder.build(), settings: scene.solver.settings(), colors, warnings })
+    }
+}

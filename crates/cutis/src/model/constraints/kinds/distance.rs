@@ -1,0 +1,59 @@
+//! `constraints.distance`: a spring along each lattice edge.
+
+use cutis_coloring::Groups;
+use cutis_constraints::{Constraint, Distance, DistanceMaterial};
+use cutis_solver::{Stiffness, SystemBuilder};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
+use crate::Error;
+use crate::scene::Scene;
+use crate::scene::validate::Check;
+
+/// Springs along the lattice edges.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DistanceSection {
+    /// Young's modulus, Pa (`xpbd`).
+    pub youngs_modulus_pa: f64,
+    /// Share of the error that a projection removes, 0 to 1 (`pbd`).
+    #[serde(default = "one")]
+    pub stiffness: f64,
+}
+
+impl DistanceSection {
+    pub(super) const FACTS: KindFacts = KindFacts {
+        solver_names: &[Distance::NAME],
+        element: "edge",
+        needs_skin: false,
+        counts: |body| [body.mesh.edges.len(), body.mesh.frozen.as_ref().map_or(0, |frozen| frozen.edges)],
+    };
+}
+
+impl ConstraintKind for DistanceSection {
+    fn validate(&self, _: &Scene, check: &Check<'_>) -> Result<(), Error> {
+        check.positive("constraints.distance.youngs_modulus_pa", self.youngs_modulus_pa)?;
+        check.share("constraints.distance.stiffness", self.stiffness)
+    }
+
+    fn add(
+        &self,
+        builder: SystemBuilder<f32>,
+        parts: &BodyParts<'_>,
+    ) -> Result<(SystemBuilder<f32>, usize), Error> {
+        let mesh = &parts.body.mesh;
+        let groups = Groups::from_colors(&mesh.edge_colors(&mesh.edges))?;
+        let stiffness = if parts.compliant() {
+            let volumes = mesh.edge_volumes();
+            compliances(&mesh.edges, |n, [a, b]| {
+                let length = nalgebra::distance(&parts.position(a), &parts.position(b));
+                cutis_constraints::distance_compliance(length, self.youngs_modulus_pa, f64::from(volumes[n]))
+            })?
+        } else {
+            Stiffness::pbd(self.stiffness as f32)
+        };
+        let rest = DistanceMaterial { rest_scale: 1.0 };
+        Ok((builder.add_from_rest::<Distance, 2>(&mesh.edges, &rest, stiffness, &groups)?, groups.len()))
+    }
+}

@@ -1,0 +1,173 @@
+//! The table of constraint kinds that a scene can name.
+//!
+//! This is the one list of them. A kind is one row of [`constraint_kinds!`] and one file of this
+//! folder, with its section of the scene, the range of its values and the way it is built. The scene
+//! format, the plan, the reports, `--without` and `cutis tune` follow from the row.
+
+mod distance;
+mod skin_tension;
+mod tet_volume;
+
+use cutis_solver::{Stiffness, SystemBuilder, Values};
+use nalgebra::Point3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use distance::DistanceSection;
+pub use skin_tension::{NearIncisionSection, StcForm, StcSection};
+pub use tet_volume::VolumeConstraintSection;
+
+use crate::Error;
+use crate::body::Body;
+use crate::scene::validate::Check;
+use crate::scene::{FormulationChoice, Scene, SceneFile, SolverSection};
+
+/// Writes the section `constraints` of a scene and the table of its kinds from one list of rows.
+/// A row is the documentation, the key and the type of a section that is a [`ConstraintKind`].
+macro_rules! constraint_kinds {
+    ($($(#[$doc:meta])* $key:ident: $section:ty,)*) => {
+        /// The constraint kinds of the scene.
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct ConstraintsSection {
+            $(
+                $(#[$doc])*
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub $key: Option<$section>,
+            )*
+        }
+
+        /// One row per constraint kind, in the order in which a solver projects them.
+        pub(crate) const KINDS: &[KindRow] = &[$(
+            KindRow {
+                key: stringify!($key),
+                facts: <$section>::FACTS,
+                section: |all| all.$key.as_ref().map(|section| section as &dyn ConstraintKind),
+                remove: |all| all.$key = None,
+            },
+        )*];
+    };
+}
+
+constraint_kinds! {
+    /// Springs along the lattice edges.
+    distance: DistanceSection,
+    /// Volumes of the tetrahedra.
+    volume: VolumeConstraintSection,
+    /// Skin tension over the skin triangles.
+    stc: StcSection,
+}
+
+/// One row of the table of constraint kinds.
+pub(crate) struct KindRow {
+    /// Key of its section under `constraints`, and its name in all reports.
+    pub(crate) key: &'static str,
+    pub(crate) facts: KindFacts,
+    /// Its section of a scene; none if the scene does not name it.
+    pub(crate) section: fn(&ConstraintsSection) -> Option<&dyn ConstraintKind>,
+    remove: fn(&mut ConstraintsSection),
+}
+
+/// What the rest of the program needs to know about a constraint kind.
+pub(crate) struct KindFacts {
+    /// Names of its constraint types in the solver; one of them is in a system.
+    pub(crate) solver_names: &'static [&'static str],
+    /// What one constraint acts on, for messages.
+    pub(crate) element: &'static str,
+    /// Whether it acts on skin triangles, so that the skin must be found.
+    pub(crate) needs_skin: bool,
+    /// Elements in the body, and elements that a region of interest leaves out.
+    pub(crate) counts: fn(&Body) -> [usize; 2],
+}
+
+/// A section of a scene that names a constraint kind.
+pub(crate) trait ConstraintKind {
+    /// Checks the values of the section.
+    ///
+    /// # Errors
+    /// [`Error::SceneKey`] with the first key whose value is out of range.
+    fn validate(&self, scene: &Scene, check: &Check<'_>) -> Result<(), Error>;
+
+    /// Adds the constraints to a system and returns the number of their colors.
+    ///
+    /// # Errors
+    /// [`Error`] for a value that does not work with this body.
+    fn add(
+        &self,
+        builder: SystemBuilder<f32>,
+        parts: &BodyParts<'_>,
+    ) -> Result<(SystemBuilder<f32>, usize), Error>;
+
+    /// Warnings about this kind in this body.
+    fn warnings(&self, _parts: &BodyParts<'_>) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// What a constraint kind is built from.
+pub(crate) struct BodyParts<'a> {
+    pub(crate) file: SceneFile<'a>,
+    pub(crate) solver: &'a SolverSection,
+    pub(crate) body: &'a Body,
+    /// Inverse mass of each vertex, 1/kg; 0 for a vertex that does not move.
+    pub(crate) inverse_masses: &'a [f32],
+    /// Whether the scene fixes no vertex.
+    pub(crate) nothing_fixed: bool,
+}
+
+impl BodyParts<'_> {
+    /// Whether stiffness is a compliance in physical units, as in `xpbd` and `vbd`.
+    fn compliant(&self) -> bool {
+        self.solver.formulation != FormulationChoice::Pbd
+    }
+
+    /// Rest position of a vertex, local meters.
+    fn position(&self, vertex: u32) -> Point3<f64> {
+        self.body.mesh.positions[vertex as usize].map(f64::from)
+    }
+}
+
+impl ConstraintsSection {
+    /// The kinds that the scene names, each with its row of the table.
+    pub(crate) fn named(&self) -> impl Iterator<Item = (&'static KindRow, &dyn ConstraintKind)> {
+        KINDS.iter().filter_map(|row| Some((row, (row.section)(self)?)))
+    }
+
+    /// Whether a kind that the scene names acts on the skin.
+    pub(crate) fn need_skin(&self) -> bool {
+        self.named().any(|(row, _)| row.facts.needs_skin)
+    }
+
+    /// Removes a kind by its key, so that the scene no longer names it.
+    /// Returns false for a name that is no key of [`constraint_kinds`].
+    pub fn remove(&mut self, kind: &str) -> bool {
+        let row = KINDS.iter().find(|row| row.key == kind);
+        row.inspect(|row| (row.remove)(self)).is_some()
+    }
+}
+
+/// Keys of all constraint kinds that a scene can name, in the order of its schema.
+pub fn constraint_kinds() -> impl Iterator<Item = &'static str> {
+    KINDS.iter().map(|row| row.key)
+}
+
+/// The name of a part of the solver in all reports. A kind has the name of its key, whichever of its
+/// constraint types the solver holds. Other parts keep the solver's name.
+pub(crate) fn report_name(solver_name: &str) -> &str {
+    let named = KINDS.iter().find(|row| row.facts.solver_names.contains(&solver_name));
+    named.map_or(solver_name, |row| row.key)
+}
+
+/// One compliance per element, from its number and vertices.
+fn compliances<const N: usize>(
+    elements: &[[u32; N]],
+    compliance: impl Fn(usize, [u32; N]) -> Result<f64, cutis_constraints::MaterialError>,
+) -> Result<Stiffness<f32>, Error> {
+    let each: Result<Vec<f32>, _> =
+        elements.iter().enumerate().map(|(n, &element)| Ok(compliance(n, element)? as f32)).collect();
+    Ok(Stiffness::Compliance(Values::Each(each.map_err(Error::Material)?)))
+}
+
+fn one() -> f64 {
+    1.0
+}

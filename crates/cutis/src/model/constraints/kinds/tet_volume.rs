@@ -1,0 +1,58 @@
+//! `constraints.volume`: the volume of each tetrahedron.
+
+use cutis_coloring::Groups;
+use cutis_constraints::{Constraint, Volume, VolumeMaterial};
+use cutis_solver::{Stiffness, SystemBuilder};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
+use crate::Error;
+use crate::scene::Scene;
+use crate::scene::validate::Check;
+
+/// Volumes of the tetrahedra.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VolumeConstraintSection {
+    /// Bulk modulus, Pa (`xpbd`).
+    pub bulk_modulus_pa: f64,
+    /// Share of the error that a projection removes, 0 to 1 (`pbd`).
+    #[serde(default = "one")]
+    pub stiffness: f64,
+}
+
+impl VolumeConstraintSection {
+    pub(super) const FACTS: KindFacts = KindFacts {
+        solver_names: &[Volume::NAME],
+        element: "tetrahedron",
+        needs_skin: false,
+        counts: |body| [body.mesh.tets.len(), body.mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets)],
+    };
+}
+
+impl ConstraintKind for VolumeConstraintSection {
+    fn validate(&self, _: &Scene, check: &Check<'_>) -> Result<(), Error> {
+        check.positive("constraints.volume.bulk_modulus_pa", self.bulk_modulus_pa)?;
+        check.share("constraints.volume.stiffness", self.stiffness)
+    }
+
+    fn add(
+        &self,
+        builder: SystemBuilder<f32>,
+        parts: &BodyParts<'_>,
+    ) -> Result<(SystemBuilder<f32>, usize), Error> {
+        let mesh = &parts.body.mesh;
+        let groups = Groups::from_colors(&mesh.tet_classes(&mesh.tets))?;
+        let stiffness = if parts.compliant() {
+            let volumes = mesh.tet_volumes();
+            compliances(&mesh.tets, |n, _| {
+                cutis_constraints::volume_compliance(f64::from(volumes[n]), self.bulk_modulus_pa)
+            })?
+        } else {
+            Stiffness::pbd(self.stiffness as f32)
+        };
+        let rest = VolumeMaterial { rest_scale: 1.0 };
+        Ok((builder.add_from_rest::<Volume, 4>(&mesh.tets, &rest, stiffness, &groups)?, groups.len()))
+    }
+}

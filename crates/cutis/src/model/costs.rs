@@ -1,0 +1,59 @@
+//! What a model costs, and the counts and warnings that models share.
+
+use std::collections::BTreeMap;
+
+use crate::backend::Chosen;
+use crate::body::Body;
+use crate::output::report::{MemoryPart, Sizes};
+use crate::scene::Scene;
+
+/// What a plan says about the model.
+pub(crate) struct ModelCosts {
+    pub(crate) backend: Chosen,
+    pub(crate) sizes: Sizes,
+    pub(crate) colors: BTreeMap<String, usize>,
+    /// Memory on the host by part, bytes.
+    pub(crate) memory: Vec<MemoryPart>,
+    /// Memory on the GPU by part, bytes; empty on a backend of the host.
+    pub(crate) device_memory: Vec<MemoryPart>,
+    /// Projections of the run, or the model's unit of work that corresponds to them.
+    pub(crate) projections: u64,
+    pub(crate) left_out: Vec<String>,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Element counts of a body with `fixed` vertices that do not move, apart from the removed ones.
+pub(super) fn sizes(body: &Body, fixed: usize) -> Sizes {
+    let mesh = &body.mesh;
+    let frozen = mesh.frozen.as_ref();
+    Sizes {
+        lattice: mesh.lattice.grid().shape,
+        vertices: mesh.positions.len(),
+        edges: mesh.edges.len(),
+        tets: mesh.tets.len(),
+        skin_triangles: body.skin.len(),
+        removed_vertices: body.removed_vertices(),
+        fixed_vertices: fixed,
+        frozen_vertices: frozen.map_or(0, |frozen| frozen.vertices),
+        frozen_tets: frozen.map_or(0, |frozen| frozen.tets),
+    }
+}
+
+/// Warnings about handles that are still moving when the last frame ends.
+pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> {
+    let run_s = f64::from(scene.run.frames) * scene.solver.dt_s;
+    let handles = scene.handle.iter().enumerate();
+    // The sum of the frames may fall short of the handle's time by rounding.
+    handles.filter(move |(_, handle)| handle.over_s > run_s * (1.0 + 1e-9)).map(move |(n, handle)| {
+        let share = 100.0 * run_s / handle.over_s;
+        format!(
+            "handle[{n}] comes {share:.3} % of its way: its over_s is {} s, and the frames take {run_s} s",
+            handle.over_s
+        )
+    })
+}
+
+/// The lines whose condition holds.
+pub(crate) fn lines_that_hold(lines: &[(bool, &str)]) -> Vec<String> {
+    lines.iter().filter(|(holds, _)| *holds).map(|(_, line)| (*line).to_owned()).collect()
+}

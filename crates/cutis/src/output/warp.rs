@@ -1,0 +1,113 @@
+//! The deformation of a body as the resampler takes it: the mesh and the shell of air around it.
+
+use std::borrow::Cow;
+
+use cutis_mesh::Shell;
+use cutis_resample::Warp;
+use cutis_volume::Volume;
+use nalgebra::Point3;
+
+use super::report::Resample;
+use crate::backend::{DevicePositions, Stages};
+use crate::body::Body;
+use crate::{Error, Progress};
+
+/// The deformation of a body, with the shell of partly empty tetrahedra that follows its surface.
+pub(crate) struct BodyWarp<'a> {
+    body: &'a Body,
+    body_tets: usize,
+    tets: Vec<[u32; 4]>,
+    rest: Vec<Point3<f32>>,
+    deformed: Vec<Point3<f32>>,
+    removed: Vec<[u32; 4]>,
+    /// The deformed positions of mesh and shell on the GPU, if the simulation left those of the mesh there.
+    on_device: Option<DevicePositions>,
+}
+
+impl<'a> BodyWarp<'a> {
+    /// Prepares the deformation to these positions, one per mesh vertex, in local meters. `on_device`
+    /// are the same positions on the GPU of the stages.
+    ///
+    /// # Errors
+    /// As [`Shell::new`].
+    pub(crate) fn new(
+        body: &'a Body,
+        deformed: &[Point3<f32>],
+        on_device: Option<&DevicePositions>,
+        stages: &Stages,
+    ) -> Result<Self, Error> {
+        let mesh = &body.mesh;
+        let shell = Shell::new(mesh, &body.air, &body.cut)?;
+        let followed = shell.follow(&mesh.positions, deformed);
+        Ok(Self {
+            body,
+            body_tets: mesh.tets.len(),
+            tets: [mesh.tets.as_slice(), &shell.tets].concat(),
+            rest: [mesh.positions.as_slice(), &shell.positions].concat(),
+            on_device: on_device.and_then(|positions| stages.append(positions, &followed)),
+            deformed: [deformed, &followed].concat(),
+            removed: [body.removed.tets.as_slice(), &shell.removed].concat(),
+        })
+    }
+
+    /// Resamples a volume through the deformation.
+    ///
+    /// # Errors
+    /// As the resampler gives them.
+    pub(crate) fn apply(
+        &self,
+        volume: &Volume,
+        stages: &mut Stages,
+        progress: &dyn Progress,
+    ) -> Result<(Volume, Resample), Error> {
+        let (volume, report) = stages.resample(
+            volume,
+            &self.warp(&self.deformed, &self.tets, self.body_tets),
+            self.on_device.as_ref(),
+            &|done, _total| progress.advance(done as u64),
+        )?;
+        let report = Resample {
+            covered_voxels: report.covered_voxels as u64,
+            folds: report.folds as u64,
+            vacated_voxels: report.vacated_voxels as u64,
+        };
+        Ok((volume, report))
+    }
+
+    /// The volume with the incisions cut and nothing moved. Voxels outside the removed tetrahedra keep
+    /// their values, so only the tetrahedra around them take part.
+    ///
+    /// # Errors
+    /// As the resampler gives them.
+    pub(crate) fn cut_at_rest<'v>(
+        &self,
+        volume: &'v Volume,
+        stages: &mut Stages,
+        progress: &dyn Progress,
+    ) -> Result<Cow<'v, Volume>, Error> {
+        if self.removed.is_empty() {
+            return Ok(Cow::Borrowed(volume));
+        }
+        let mut touched = vec![false; self.rest.len()];
+        self.removed.iter().flatten().for_each(|&v| touched[v as usize] = true);
+        let touches = |tet: &&[u32; 4]| tet.iter().any(|&v| touched[v as usize]);
+        let around = |tets: &[[u32; 4]]| -> Vec<[u32; 4]> { tets.iter().filter(touches).copied().collect() };
+        let (body, shell) = self.tets.split_at(self.body_tets);
+        let (body, shell) = (around(body), around(shell));
+        let tets = [body.as_slice(), &shell].concat();
+        let warp = self.warp(&self.rest, &tets, body.len());
+        let progress = |done: usize, _total: usize| progress.advance(done as u64);
+        Ok(Cow::Owned(stages.resample(volume, &warp, None, &progress)?.0))
+    }
+
+    fn warp<'w>(&'w self, deformed: &'w [Point3<f32>], tets: &'w [[u32; 4]], body_tets: usize) -> Warp<'w> {
+        Warp {
+            origin_mm: self.body.mesh.frame.origin_mm,
+            rest: &self.rest,
+            deformed,
+            tets,
+            body_tets,
+            removed: &self.removed,
+        }
+    }
+}

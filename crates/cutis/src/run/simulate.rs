@@ -1,0 +1,107 @@
+//! The frames of a run: starts the model, resumes from a checkpoint, steps the simulation.
+
+use super::RunOptions;
+use super::checkpoint::{self, Checkpoint};
+use super::clock::Clock;
+use super::files::{self, RunFolder};
+use super::run_loop::{RunLoop, RunResult};
+use super::timing::Timing;
+use crate::backend::{Chosen, DeviceMeter};
+use crate::body::Body;
+use crate::cost::Plan;
+use crate::ct::source::Source;
+use crate::model::{Model, ModelInput, Simulation, Started};
+use crate::scene::LoadedScene;
+use crate::{Error, Progress};
+
+/// What a run consists of before its first frame.
+pub(super) struct Setup<'a> {
+    pub(super) loaded: &'a LoadedScene,
+    pub(super) options: &'a RunOptions,
+    pub(super) folder: &'a RunFolder,
+    pub(super) source: &'a Source,
+    pub(super) body: &'a Body,
+}
+
+/// A run after its last frame.
+pub(super) struct Simulated {
+    /// The plan, with the warnings of the run.
+    pub(super) plan: Plan,
+    /// The GPU that the simulation ran on, if it ran on one.
+    pub(super) device: Option<DeviceMeter>,
+    /// Frame of the checkpoint from which the run resumed.
+    pub(super) resumed: Option<u32>,
+    pub(super) result: RunResult,
+}
+
+/// Runs the frames.
+///
+/// # Errors
+/// [`Error`] for a backend that does not start, a checkpoint that does not fit, and a frame that fails.
+pub(super) fn simulate(
+    setup: &Setup<'_>,
+    model: Box<dyn Model>,
+    backend: &Chosen,
+    mut plan: Plan,
+    clock: &mut Clock<'_>,
+) -> Result<Simulated, Error> {
+    let Setup { loaded, options, folder, source, body } = *setup;
+    let scene = &loaded.scene;
+    let input = ModelInput { file: loaded.file(), scene, body };
+    let Started { mut simulation, device } = model.start(&input, backend, clock)?;
+    files::create_folder(&folder.0)?;
+    plan.warnings.extend(stale_files(setup));
+    plan.warnings.iter().for_each(|warning| clock.progress.note(warning));
+    let fingerprint = checkpoint::fingerprint(scene, &source.sha256);
+    let resumed = if options.resume { Some(resume(setup, &fingerprint, &mut *simulation)?) } else { None };
+    let run_loop = RunLoop {
+        run: &scene.run,
+        folder,
+        fingerprint,
+        gapes: &body.cut.gapes,
+        resumed,
+        timing: match (scene.output.report, simulation.parts_are_sequential()) {
+            (false, _) => Timing::No,
+            (true, true) => Timing::EveryFrame,
+            (true, false) => Timing::ExtraFrame,
+        },
+        resamples: scene.output.volume || scene.output.pictures,
+        device: device.as_ref(),
+    };
+    let frames = |progress: &dyn Progress| run_loop.run(&mut *simulation, progress);
+    let result = clock.stage_on(backend.place(), "simulate", run_loop.count(), frames)?;
+    // This frees the simulation's memory on the GPU for the stages that follow.
+    drop(simulation);
+    warn(&mut plan, &result.end.warnings, clock.progress);
+    Ok(Simulated { plan, device, resumed, result })
+}
+
+/// Adds warnings to the plan, and shows them to the user.
+pub(super) fn warn(plan: &mut Plan, warnings: &[String], progress: &dyn Progress) {
+    warnings.iter().for_each(|warning| progress.note(warning));
+    plan.warnings.extend_from_slice(warnings);
+}
+
+/// Warning about files of an earlier run that this run will not replace.
+fn stale_files(setup: &Setup<'_>) -> Option<String> {
+    let stale = setup.folder.stale_files(&setup.loaded.scene.output);
+    (!stale.is_empty() && !setup.options.resume).then(|| {
+        format!(
+            "{} holds files of an earlier run that this one does not write: {}",
+            setup.folder.0.display(),
+            stale.join(", ")
+        )
+    })
+}
+
+/// Restores the state of the run folder's checkpoint, and returns its frame.
+fn resume(setup: &Setup<'_>, fingerprint: &[u8; 32], simulation: &mut dyn Simulation) -> Result<u32, Error> {
+    let (path, frames) = (setup.folder.checkpoint(), setup.loaded.scene.run.frames);
+    let saved = Checkpoint::read(&path, fingerprint, setup.body.mesh.positions.len())?;
+    if saved.frame > frames {
+        let why = format!("it is at frame {}, and run.frames = {frames} lies before it", saved.frame);
+        return Err(Error::Checkpoint { path, why });
+    }
+    simulation.restore(&saved)?;
+    Ok(saved.frame)
+}

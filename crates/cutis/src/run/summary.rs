@@ -1,0 +1,92 @@
+//! The end of a run: measures the wounds and displacements, and writes the report.
+
+use cutis_mesh::WoundGape;
+
+use super::clock::Clock;
+use super::files;
+use super::frames::{FrameRow, earlier_frames, frame_times, frames_csv};
+use super::simulate::{Setup, Simulated, warn};
+use crate::Error;
+use crate::backend::DeviceMeter;
+use crate::body::Body;
+use crate::output::report::{Machine, Report, SCHEMA, Wound};
+use crate::output::{OutputResults, html};
+
+/// Collects the report of a run, and writes it if the scene asks for it.
+///
+/// # Errors
+/// [`Error::File`] if a file cannot be written.
+pub(super) fn report(
+    setup: &Setup<'_>,
+    simulated: Simulated,
+    outputs: OutputResults,
+    clock: Clock<'_>,
+) -> Result<Report, Error> {
+    let Setup { loaded, options, folder, source, body } = *setup;
+    let Simulated { mut plan, device, resumed, result } = simulated;
+    let (rows, end) = (result.rows, result.end);
+    let wounds = wounds(body, &rows);
+    warn(&mut plan, &crossed_lips(&wounds), clock.progress);
+    let rest = &body.mesh.positions;
+    let moved = rest.iter().zip(&end.positions).map(|(a, b)| f64::from((b - a).norm()) * 1e3);
+    let report = Report {
+        schema: SCHEMA.into(),
+        cutis_version: env!("CARGO_PKG_VERSION").into(),
+        machine: Machine::here(),
+        inputs: source.inputs.clone(),
+        scene: loaded.scene.clone(),
+        backend: plan.backend,
+        sizes: plan.sizes,
+        skin: body.skin_report.as_ref().map(Into::into),
+        colors: plan.colors,
+        memory: plan.memory,
+        device_memory: plan.device_memory,
+        costs: result.times.add_to(plan.costs),
+        device: device.as_ref().map(DeviceMeter::work),
+        stages: clock.stages,
+        frames: frame_times(&rows),
+        wound: wounds.first().cloned(),
+        wounds,
+        resample: outputs.resample,
+        chainmail: end.chainmail,
+        residuals: end.residuals,
+        max_displacement_mm: moved.fold(0.0, f64::max),
+        border_displacement_mm: body.border_displacement_mm(&end.positions),
+        left_out: plan.left_out,
+        warnings: [plan.warnings, outputs.warnings].concat(),
+    };
+    if loaded.scene.output.report {
+        let earlier =
+            if options.resume { earlier_frames(folder, resumed.unwrap_or(0))? } else { String::new() };
+        files::write(&folder.frames(), frames_csv(&earlier, &rows).as_bytes())?;
+        html::write(&report, &rows, &outputs.figures, folder)?;
+        report.write(&folder.report())?;
+    }
+    Ok(report)
+}
+
+/// Opening of each wound, in the body at rest and after the last frame.
+fn wounds(body: &Body, rows: &[FrameRow]) -> Vec<Wound> {
+    let before = body.cut.gapes.iter().map(|gape| gape.measure(&body.mesh.positions));
+    let after = rows.last().map(|row| row.gapes.as_slice()).unwrap_or_default();
+    let wound = |(before, after): (WoundGape, &WoundGape)| Wound {
+        initial_mm: before.mean_mm,
+        final_mm: after.mean_mm,
+        mid_mm: after.mid_mm,
+        initial_mid_mm: before.mid_mm,
+    };
+    before.zip(after).map(wound).collect()
+}
+
+/// Warnings about wounds whose lips have passed through each other.
+fn crossed_lips(wounds: &[Wound]) -> Vec<String> {
+    let least = wounds.iter().map(|wound| wound.final_mm.min(wound.mid_mm)).enumerate();
+    let crossed = least.filter(|(_, least)| *least < 0.0);
+    let warnings = crossed.map(|(n, least)| {
+        format!(
+            "the lips of incision[{n}] have passed through each other, by {:.2} mm: there is no contact",
+            -least
+        )
+    });
+    warnings.collect()
+}
