@@ -1,8 +1,9 @@
 //! A scene on a GPU: the run of the CPU, what is built and read for it, and what is left of it if the device goes away.
 
 use std::path::Path;
+use std::sync::Mutex;
 
-use cutis::gpu::{AdapterKind, Gpu, GpuError, GpuOptions};
+use cutis::gpu::{AdapterKind, Counters, Gpu, GpuError, GpuOptions};
 use cutis::report::Report;
 use cutis::solver::SolverError;
 use cutis::volume::nifti;
@@ -258,6 +259,47 @@ fn the_ct_and_the_pictures_come_from_the_gpu_too() {
     let (a, b) = (expected.resample.unwrap(), report.resample.unwrap());
     let near = |a: u64, b: u64| a.abs_diff(b) as f64 <= 1e-4 * cpu.len() as f64;
     assert!(near(a.covered_voxels, b.covered_voxels) && near(a.folds, b.folds), "{a:?} {b:?}");
+}
+
+/// Counters of a GPU when stages begin and end, each with the name of the stage.
+struct Counts<'a>(&'a Gpu, Mutex<Vec<(String, Counters)>>);
+
+impl Progress for Counts<'_> {
+    fn begin(&self, stage: &str, _total: u64) {
+        self.1.lock().unwrap().push((stage.to_owned(), self.0.counters()));
+    }
+    fn advance(&self, _done: u64) {}
+    fn end(&self) {
+        let mut counts = self.1.lock().unwrap();
+        let name = format!("end of {}", counts.last().unwrap().0);
+        counts.push((name, self.0.counters()));
+    }
+    fn note(&self, _message: &str) {}
+}
+
+/// After the simulation the GPU copies the positions for the resampler. The host uploads only the shell of
+/// air around the body, and reads nothing but the resampled voxels.
+#[test]
+fn positions_stay_on_the_gpu_for_resampling() {
+    let Some(gpu) = gpu() else { return };
+    let loaded = scene(&[("output", "{ volume = true }"), ("run.frames", "2")]);
+    let folder = tempfile::tempdir().unwrap();
+    let options = RunOptions { out: folder.path().into(), resume: false };
+    let counts = Counts(&gpu, Mutex::default());
+    let report = cutis::run_on(&gpu, &loaded, &options, &counts).unwrap();
+    let counts = counts.1.into_inner().unwrap();
+    let at = |name: &str| counts.iter().find(|(stage, _)| stage == name).unwrap().1;
+    let [simulated, begun, done] = ["end of simulate", "resample the CT", "end of resample the CT"].map(at);
+    let between = [
+        begun.submits - simulated.submits,
+        begun.writes - simulated.writes,
+        begun.readbacks - simulated.readbacks,
+    ];
+    assert_eq!(between, [1, 1, 0], "one copy on the GPU, one upload of the shell, no read");
+    let read = done.readback_bytes - begun.readback_bytes;
+    let voxels = deformed(folder.path()).len() as u64;
+    let positions = 12 * report.sizes.vertices as u64;
+    assert!(read >= 2 * voxels && read < 2 * voxels + positions, "{read} bytes for {voxels} voxels");
 }
 
 /// Takes the device away when a stage begins.

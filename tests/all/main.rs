@@ -8,6 +8,7 @@ mod determinism;
 mod gpu;
 mod identity;
 mod left_out;
+mod paper_form;
 mod problems;
 mod random_scenes;
 mod region;

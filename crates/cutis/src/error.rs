@@ -1,4 +1,4 @@
-//! What can go wrong between a scene file and a run folder, and whose fault it is.
+//! The errors of this crate, and whether the input or the run is at fault.
 
 use std::path::PathBuf;
 
@@ -23,7 +23,7 @@ pub enum Error {
     SceneFile {
         /// The scene file.
         file: PathBuf,
-        /// What the system said.
+        /// The message of the system.
         why: String,
     },
     /// The scene file is not TOML.
@@ -41,19 +41,19 @@ pub enum Error {
         file: PathBuf,
         /// Dotted key.
         key: String,
-        /// The value found, as text; empty if there is none to show.
+        /// The value that was found, as text; empty if there is none to show.
         value: String,
         /// What would be right.
         why: String,
     },
-    /// A section of the scene is well formed, but what it asks for cannot be done.
+    /// A section of the scene is well formed, but asks for something that cannot be done.
     #[error("{}: `{section}`: {source}", file.display())]
     SceneSection {
         /// The scene file.
         file: PathBuf,
         /// Dotted name of the section.
         section: String,
-        /// What stands against it.
+        /// The reason.
         source: Box<Error>,
     },
     /// A request from the command line or a caller that cannot be met.
@@ -64,93 +64,95 @@ pub enum Error {
         /// What would be right.
         why: String,
     },
-    /// The scene names a backend that this build does not have, or an adapter that this machine does not have.
+    /// The scene names a backend that this build lacks, or an adapter that this machine lacks.
     #[error("backend `{backend}`: {why}")]
     Backend {
-        /// The backend asked for.
+        /// The backend that the scene names.
         backend: String,
         /// What would be right.
         why: String,
     },
-    /// A volume, its file or a table.
+    /// An error of a volume, its file or a table.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// Lattice, skin or incision.
+    /// An error of the lattice, the skin or an incision.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A material parameter.
+    /// An error of a material parameter.
     #[error(transparent)]
     Material(#[from] MaterialError),
-    /// Grouping of constraints.
+    /// An error of the grouping of constraints.
     #[error(transparent)]
     Coloring(#[from] ColoringError),
-    /// System or time stepping.
+    /// An error of the system or of time stepping.
     #[error(transparent)]
     Solver(#[from] SolverError),
-    /// The CPU backend.
+    /// An error of the CPU backend.
     #[error(transparent)]
     Cpu(#[from] CpuError),
-    /// A chain, or what is asked of it.
+    /// An error of the ChainMail model.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// A GPU that is there could not be opened, or did not take the body.
+    /// A GPU could not be opened, or has no room for the body.
     #[cfg(feature = "gpu")]
-    #[error("{0}; the backend \"cpu\" does without")]
+    #[error("{0}; the backend \"cpu\" needs no GPU")]
     Gpu(#[from] GpuError),
     /// The device of the backend failed during a run.
     #[error(
         "frame {frame}: {source}; {}",
         match saved {
             Some((frame, path)) => format!(
-                "{} holds frame {frame}: go on with --resume, without a GPU with --backend cpu", path.display()
+                "{} holds frame {frame}: continue with --resume, and with --backend cpu to use no GPU",
+                path.display()
             ),
-            None => "there is no checkpoint to go on from (run.checkpoint_every)".into(),
+            None => "there is no checkpoint to resume from (run.checkpoint_every)".into(),
         }
     )]
     Stopped {
-        /// The frame that it happened in, counted from 1.
+        /// The frame in which it happened, counted from 1.
         frame: u32,
-        /// The last checkpoint of this run, and the frame that it holds.
+        /// The frame and the path of the last checkpoint of this run.
         saved: Option<(u32, PathBuf)>,
-        /// What happened, with the time of the last state that was read.
+        /// The error, with the time of the last state that was read.
         source: SolverError,
     },
-    /// No setting of a scene does what is asked of it.
+    /// No setting of a scene meets the demand.
     #[error("no setting meets the demand ({demand}): {nearest}; no scene was written")]
     NoSetting {
-        /// What was asked for.
+        /// The demand.
         demand: String,
-        /// How near the settings came.
+        /// The best value of the measured settings.
         nearest: String,
     },
-    /// Resampling.
+    /// An error of resampling.
     #[error(transparent)]
     Resample(#[from] ResampleError),
-    /// Pictures.
+    /// An error of a picture.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A file of the run folder.
+    /// A file of the run folder cannot be read or written.
     #[error("{}: cannot {action}: {why}", path.display())]
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried.
+        /// The action that failed.
         action: &'static str,
-        /// What the system said.
+        /// The message of the system.
         why: String,
     },
-    /// A checkpoint that does not belong to this scene or is damaged.
+    /// A checkpoint belongs to another scene or is damaged.
     #[error("{}: not a checkpoint of this scene: {why}", path.display())]
     Checkpoint {
         /// The checkpoint file.
         path: PathBuf,
-        /// What does not fit.
+        /// What does not match.
         why: String,
     },
 }
 
 impl Error {
-    /// True if the input or the request is at fault (exit code 2), false if the run itself failed (exit code 1).
+    /// True if the input or the request is at fault (exit code 2), false if the run itself failed
+    /// (exit code 1).
     pub fn is_bad_input(&self) -> bool {
         match self {
             Self::SceneFile { .. }
@@ -170,7 +172,8 @@ impl Error {
             Self::Solver(e) => !matches!(e, SolverError::NotFinite { .. } | SolverError::Device { .. }),
             Self::Cpu(e) => !matches!(e, CpuError::ThreadPool { .. }),
             Self::File { action, .. } => *action == "read",
-            // What was asked of the device does not fit it; all else is the device's or the program's fault.
+            // These say that the scene does not fit the GPU. All others are faults of the GPU or
+            // the program.
             #[cfg(feature = "gpu")]
             Self::Gpu(e) => matches!(
                 e,

@@ -11,15 +11,15 @@
 //! # Ok::<(), cutis::Error>(())
 //! ```
 //!
-//! A run is a walk through the modules of this crate: `scene` (the scene file), `ct` (the volume), `body`
-//! (lattice, skin, incisions), `model` (constraints or ChainMail), `backend` (CPU or GPU), `run` (frames),
-//! `output` (files and report), and next to them `cost` (plans and costs) and `tune` (the choice of a
-//! setting). Start reading at `run`.
+//! A run is a walk through the modules of this crate: `scene` (the scene file), `ct` (the volume),
+//! `body` (lattice, skin, incisions), `model` (constraints or ChainMail), `backend` (CPU or GPU),
+//! `run` (frames), `output` (files and report), and next to them `cost` (plans and costs) and
+//! `tune` (the choice of a setting). Start reading at `run`.
 //!
-//! The parts are crates of their own, re-exported here: [`volume`] (CT in and out), [`mesh`] (lattice, skin,
-//! incisions), [`constraints`], [`coloring`], [`solver`] and [`solver_cpu`], [`chainmail`], [`resample`] and
-//! [`render`]. This crate adds the scene file ([`scene`]), the order of the stages, and the run folder with
-//! its [`report::Report`].
+//! The parts are crates of their own, re-exported here: [`volume`] (CT in and out), [`mesh`]
+//! (lattice, skin, incisions), [`constraints`], [`coloring`], [`solver`] and [`solver_cpu`],
+//! [`chainmail`], [`resample`] and [`render`]. This crate adds the scene file ([`scene`]), the
+//! order of the stages, and the run folder with its [`report::Report`].
 #![forbid(unsafe_code)]
 
 mod backend;

@@ -1,4 +1,5 @@
-//! A build without the feature `gpu` refuses a GPU by name, and `auto` and `devices` say what it lacks.
+//! A build without the feature `gpu` refuses a GPU by name, and `auto` and `devices` say what it
+//! lacks.
 #![cfg(not(feature = "gpu"))]
 
 use cutis::scene::BackendChoice;

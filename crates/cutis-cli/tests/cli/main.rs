@@ -5,6 +5,7 @@ mod exit_codes;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod json;
+mod paper_form;
 mod printed;
 mod tune;
 

@@ -1,5 +1,5 @@
-//! A build without the feature `gpu`: a scene that names a GPU is refused, and `auto` takes the CPU and
-//! says why.
+//! A build without the feature `gpu`: a scene that names a GPU is refused, and `auto` takes the CPU
+//! and says why.
 
 use cutis_render::{Image, RenderError, View};
 use cutis_resample::{ResampleError, ResampleReport, Warp};

@@ -1,29 +1,31 @@
-//! Decides when `auto` takes a GPU: first by the amount of work, then by the adapters of the machine.
+//! Decides when `auto` takes a GPU: first by the amount of work, then by the adapters of the
+//! machine.
 
 use cutis_gpu::{Adapter, AdapterKind, GpuError, Select};
 use cutis_solver::Vertex;
 
 use super::Work;
 
-/// Mean number of constraints of a color (of vertices in vertex block descent) above which `auto` takes a
-/// GPU with memory of its own.
+/// Mean number of constraints of a color (of vertices in vertex block descent) above which `auto`
+/// takes a GPU with memory of its own.
 ///
-/// A color is one dispatch, and colors run one after the other. The launch of a dispatch and the barrier
-/// before it take about 10 µs on a GPU. The CPU backend projects about 40 constraints per microsecond and
-/// core (the demo on two cores: 57 million projections in 0.7 s). With fewer constraints than
-/// 40 × 10 µs × cores, several thousand on a common machine, the CPU ends before a GPU has begun. A large
-/// GPU also needs some ten thousand threads at once to be busy. A vertex has several tens of constraints,
-/// so the CPU would take longer, but a GPU needs as many threads. All this is an estimate: no hardware
-/// GPU was available to measure it.
+/// A color is one dispatch, and colors run one after the other. The launch of a dispatch and the
+/// barrier before it take about 10 µs on a GPU. The CPU backend projects about 40 constraints per
+/// microsecond and core (the demo on two cores: 57 million projections in 0.7 s). With fewer
+/// constraints than 40 × 10 µs × cores, several thousand on a common machine, the CPU ends before a
+/// GPU has begun. A large GPU also needs some ten thousand threads at once to be busy. A vertex has
+/// several tens of constraints, so the CPU would take longer, but a GPU needs as many threads. All
+/// this is an estimate: no hardware GPU was available to measure it.
 const MIN_PER_SWEEP: u64 = 16_384;
 
-/// Number of constraint evaluations of a run above which `auto` takes a GPU: one or two seconds on the CPU
-/// backend with two cores. A GPU takes part of a second to open, to compile kernels and to upload the
-/// body, which a shorter run never earns back. This is an estimate too.
+/// Number of constraint evaluations of a run above which `auto` takes a GPU: one or two seconds on
+/// the CPU backend with two cores. A GPU takes part of a second to open, to compile kernels and to
+/// upload the body, which a shorter run never earns back. This is an estimate too.
 const MIN_EVALUATIONS: u64 = 100_000_000;
 
-/// Factor on [`MIN_PER_SWEEP`] for a GPU that shares the memory of the CPU. Projections wait for memory
-/// rather than for arithmetic, and there both wait for the same memory. This is an estimate too.
+/// Factor on [`MIN_PER_SWEEP`] for a GPU that shares the memory of the CPU. Projections wait for
+/// memory rather than for arithmetic, and there both wait for the same memory. This is an estimate
+/// too.
 const SHARED_MEMORY_FACTOR: u64 = 4;
 
 /// The decision of `auto`, with its reason.

@@ -1,4 +1,5 @@
-//! `cutis devices`: the GPUs of this machine, whether they can be used, and the one that `auto` takes.
+//! `cutis devices`: the GPUs of this machine, whether they can be used, and the one that `auto`
+//! takes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,8 @@ pub struct Devices {
     pub gpu_backend: bool,
     /// Best hardware first, software last.
     pub devices: Vec<Device>,
-    /// Index of the GPU that `backend = "auto"` takes for a large scene; none if it takes the CPU backend.
+    /// Index of the GPU that `backend = "auto"` takes for a large scene; none if it takes the CPU
+    /// backend.
     pub auto: Option<usize>,
     /// What `auto` takes and why, or what to install.
     pub note: String,

@@ -62,7 +62,8 @@ pub(super) fn devices() -> Devices {
     Devices { gpu_backend: true, auto, note, devices }
 }
 
-/// Index of the adapter that `auto` takes for a large scene, if it can be opened, and a note about it.
+/// Index of the adapter that `auto` takes for a large scene, if it can be opened, and a note about
+/// it.
 fn taken_by_auto(all: &[Adapter], listed: &[Listed]) -> (Option<usize>, String) {
     let Some(first) = all.first() else {
         return (None, format!("\"auto\" takes the CPU backend: {}", GpuError::NoAdapter));
@@ -201,7 +202,8 @@ pub(super) fn resample(
     Ok((resampler.volume(progress)?, resampler.report()?))
 }
 
-/// Whether a stage failed for lack of memory or because the GPU is gone, and not by a faulty kernel.
+/// Whether a stage failed for lack of memory or because the GPU is gone, and not by a faulty
+/// kernel.
 pub(super) fn lacks_device(error: &Error) -> bool {
     match error {
         Error::Resample(ResampleError::TooLarge { .. }) => true,

@@ -1,7 +1,7 @@
 //! The choice of the backend that runs a scene, and why it was chosen.
 //!
-//! A backend or adapter that the scene names is settled before any work is done ([`Request::of`]); if it
-//! does not exist, the scene is refused. `auto` is settled when the size of the work is known
+//! A backend or adapter that the scene names is settled before any work is done ([`Request::of`]);
+//! if it does not exist, the scene is refused. `auto` is settled when the size of the work is known
 //! ([`Request::settle`]), so that a small scene never looks for a GPU. No device is opened before
 //! [`Chosen::open`].
 
@@ -40,8 +40,8 @@ pub(crate) struct Work {
     pub(crate) sweeps: u64,
     /// Projections of the whole run, or steps of a vertex.
     pub(crate) projections: u64,
-    /// Evaluations of a constraint in the whole run: one per projection, and one for each constraint of
-    /// a vertex in the step of that vertex.
+    /// Evaluations of a constraint in the whole run: one per projection, and one for each
+    /// constraint of a vertex in the step of that vertex.
     pub(crate) evaluations: u64,
 }
 
@@ -84,8 +84,8 @@ impl Request {
         })
     }
 
-    /// Opens the GPU that the scene names. None for any other backend, and for `auto`, which decides by
-    /// the size of a simulation.
+    /// Opens the GPU that the scene names. None for any other backend, and for `auto`, which
+    /// decides by the size of a simulation.
     ///
     /// # Errors
     /// As the GPU gives them.

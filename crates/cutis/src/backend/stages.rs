@@ -35,8 +35,8 @@ impl Stages {
         positions.with(self.gpu.as_ref()?, further).ok()
     }
 
-    /// Resamples as [`cutis_resample::resample`]. `positions` are the deformed positions of the warp, if
-    /// they are on the GPU.
+    /// Resamples as [`cutis_resample::resample`]. `positions` are the deformed positions of the
+    /// warp, if they are on the GPU.
     pub(crate) fn resample(
         &mut self,
         volume: &Volume,
@@ -60,8 +60,8 @@ impl Stages {
         )
     }
 
-    /// Tries the GPU. If it lacks memory or is lost, the CPU runs this stage and all later ones, so that a
-    /// finished simulation is not lost; the report says so.
+    /// Tries the GPU. If it lacks memory or is lost, the CPU runs this stage and all later ones, so
+    /// that a finished simulation is not lost; the report says so.
     fn first_on_gpu<T>(
         &mut self,
         what: &str,

@@ -56,8 +56,8 @@ impl Body {
     }
 }
 
-/// Skin triangles of the body in lattice points, and their report; empty if the scene does not need the
-/// skin.
+/// Skin triangles of the body in lattice points, and their report; empty if the scene does not need
+/// the skin.
 fn find_skin(
     sections: &BodySections<'_>,
     whole: &TissueMask,

@@ -25,7 +25,8 @@ pub struct SkinRequest {
 /// Finds the skin of a volume file. If `out` is given, writes its triangles (`.vtu` or `.vtp`).
 ///
 /// # Errors
-/// [`Error`] for a volume that cannot be read, a lattice that does not fit, or a file that cannot be written.
+/// [`Error`] for a volume that cannot be read, a lattice that does not fit, or a file that cannot
+/// be written.
 pub fn find_skin(
     volume: &Path,
     request: &SkinRequest,
@@ -86,7 +87,8 @@ mod tests {
 
     use super::*;
 
-    /// The paper's table of opacity and the default of a scene agree on air, so there is one definition.
+    /// The paper's table of opacity and the default of a scene agree on air, so there is one
+    /// definition.
     #[test]
     fn air_is_below_the_foot_of_the_opacity_ramp() {
         let opacity = Table::preset(TableKind::Alpha, "paper").unwrap();

@@ -26,7 +26,8 @@ impl Body {
         Ok((0..self.masses.len()).map(|v| if motionless(v) { 0.0 } else { 1.0 / self.masses[v] }).collect())
     }
 
-    /// Per vertex: whether the scene fixes it. Vertices on the border of a region of interest are fixed.
+    /// Per vertex: whether the scene fixes it. Vertices on the border of a region of interest are
+    /// fixed.
     ///
     /// # Errors
     /// [`Error`] for a plane without a direction.

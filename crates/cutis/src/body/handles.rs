@@ -26,7 +26,8 @@ impl Grasp {
     }
 }
 
-/// The vertices that each handle of the scene grabs, in ascending order. Removed vertices are not grabbed.
+/// The vertices that each handle of the scene grabs, in ascending order. Removed vertices are not
+/// grabbed.
 ///
 /// # Errors
 /// [`Error::SceneKey`] for a handle that grabs no vertex.

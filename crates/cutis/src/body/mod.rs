@@ -19,8 +19,8 @@ pub(crate) use lattice::even_shape;
 pub(crate) use lattice::lattice;
 pub(crate) use sections::{BodySections, needs_skin};
 
-/// HU below which a lattice point is air, unless a scene says otherwise: the foot of the ramp in the
-/// paper's table of opacity. A point with exactly this HU is tissue.
+/// HU below which a lattice point is air, unless a scene says otherwise: the foot of the ramp in
+/// the paper's table of opacity. A point with exactly this HU is tissue.
 pub(crate) const AIR_BELOW_HU: f32 = -449.0;
 
 /// Per lattice point: whether it is air. `hu` holds a value per point.
@@ -28,11 +28,12 @@ fn air(hu: &[f32], air_below_hu: f32) -> Vec<bool> {
     hu.iter().map(|&hu| hu < air_below_hu).collect()
 }
 
-/// The cut body at rest. Vertices keep their numbers through the cut. `mesh` and `skin` hold the elements
-/// that the incisions left.
+/// The cut body at rest. Vertices keep their numbers through the cut. `mesh` and `skin` hold the
+/// elements that the incisions left.
 pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
-    /// Skin triangles in mesh vertices, oriented outward; empty if the scene does not need the skin.
+    /// Skin triangles in mesh vertices, oriented outward; empty if the scene does not need the
+    /// skin.
     pub(crate) skin: Vec<[u32; 3]>,
     /// The skin outside the region of interest, which never moves.
     pub(crate) inactive_skin: InactiveSkin,
@@ -62,8 +63,8 @@ impl Body {
         self.cut.removed.iter().filter(|&&removed| removed).count()
     }
 
-    /// Largest displacement of a vertex next to the border of the region of interest, mm. None without a
-    /// region that leaves something out.
+    /// Largest displacement of a vertex next to the border of the region of interest, mm. None
+    /// without a region that leaves something out.
     pub(crate) fn border_displacement_mm(&self, deformed: &[Point3<f32>]) -> Option<f64> {
         let frozen = self.mesh.frozen.as_ref().filter(|frozen| frozen.tets > 0)?;
         let at_border = |tet: &&[u32; 4]| tet.iter().any(|&v| frozen.border[v as usize]);
@@ -72,8 +73,8 @@ impl Body {
         Some(self.mesh.tets.iter().filter(at_border).flatten().map(moved).fold(0.0, f64::max))
     }
 
-    /// The skin of the whole body: the given positions of the mesh's vertices, then the positions of the
-    /// inactive skin; and all triangles.
+    /// The skin of the whole body: the given positions of the mesh's vertices, then the positions
+    /// of the inactive skin; and all triangles.
     pub(crate) fn whole_skin(&self, positions: &[Point3<f32>]) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
         let inactive = &self.inactive_skin;
         ([positions, &inactive.positions].concat(), [self.skin.as_slice(), &inactive.triangles].concat())

@@ -30,8 +30,8 @@ pub(super) fn mesh(
     })
 }
 
-/// Whether a place, given in local meters and in world mm, lies within `around` mm of an incision or of a
-/// handle's sphere.
+/// Whether a place, given in local meters and in world mm, lies within `around` mm of an incision
+/// or of a handle's sphere.
 pub(super) fn near_action(
     handles: &[HandleSection],
     slits: &[Slit],
@@ -64,8 +64,8 @@ pub(super) fn incision_error(sections: &BodySections<'_>, error: MeshError) -> E
     sections.file.bad_key(name, &shown(zone), &why)
 }
 
-/// Refuses a handle that grabs vertices outside the region of interest, or outside the fine zone of a
-/// graded lattice. `mesh` is not cut yet.
+/// Refuses a handle that grabs vertices outside the region of interest, or outside the fine zone of
+/// a graded lattice. `mesh` is not cut yet.
 pub(super) fn check_handles(sections: &BodySections<'_>, mesh: &TetMesh) -> Result<(), Error> {
     let (lattice, grid) = (&mesh.lattice, mesh.lattice.grid());
     let grasps: Vec<Grasp> = sections.handles.iter().map(|handle| Grasp::new(handle, &mesh.frame)).collect();

@@ -10,8 +10,8 @@ use crate::output::report::MemoryPart;
 /// The cost of the solver, part by part.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct CostReport {
-    /// Parts that store something, then parts that only take time. A part that the scene leaves out is
-    /// not listed.
+    /// Parts that store something, then parts that only take time. A part that the scene leaves out
+    /// is not listed.
     pub parts: Vec<CostPart>,
     /// How the times were measured, or why they were not.
     pub time: String,
@@ -79,7 +79,8 @@ mod tests {
         MemoryPart { part: part.into(), bytes }
     }
 
-    /// The solver calls the paper's form of skin tension `stc_paper`; its time belongs to the kind `stc`.
+    /// The solver calls the paper's form of skin tension `stc_paper`; its time belongs to the kind
+    /// `stc`.
     #[test]
     fn bytes_and_times_of_a_part_are_joined_by_its_name() {
         let (host, device) = ([bytes("vertices", 40), bytes("stc", 12)], [bytes("vertices", 48)]);

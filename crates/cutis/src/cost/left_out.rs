@@ -29,7 +29,8 @@ pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
     lines.into_iter().filter(|(absent, _)| *absent).map(|(_, line)| line.to_owned()).collect()
 }
 
-/// What a region of interest and a graded lattice leave out. `memory` is the memory of the solver by part.
+/// What a region of interest and a graded lattice leave out. `memory` is the memory of the solver
+/// by part.
 pub(super) fn of_lattice(body: &Body, memory: &[MemoryPart]) -> Vec<String> {
     [region(body, memory), grading(body)].into_iter().flatten().collect()
 }

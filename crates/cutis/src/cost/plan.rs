@@ -26,20 +26,21 @@ pub struct Plan {
     pub backend: Backend,
     /// Element counts.
     pub sizes: Sizes,
-    /// Colors per constraint kind; in vertex block descent only the colors of the vertices, as `descent`.
+    /// Colors per constraint kind; in vertex block descent only the colors of the vertices, as
+    /// `descent`.
     pub colors: BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
-    /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend. Kernels are compiled for
-    /// these parts and for no others.
+    /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend. Kernels are compiled
+    /// for these parts and for no others.
     pub device_memory: Vec<MemoryPart>,
     /// Bytes and time of the solver by part.
     #[serde(rename = "ledger")]
     pub costs: CostReport,
     /// Bytes of the volume's voxels.
     pub volume_bytes: usize,
-    /// Projections of the run, steps of a vertex in vertex block descent, or at most so many visits of
-    /// elements by the relaxation of ChainMail. The largest 64-bit number if there are more.
+    /// Projections of the run, steps of a vertex in vertex block descent, or at most so many visits
+    /// of elements by the relaxation of ChainMail. The largest 64-bit number if there are more.
     pub projections: u64,
     /// Parts that the scene leaves out, which therefore cost nothing.
     pub left_out: Vec<String>,
@@ -49,8 +50,8 @@ pub struct Plan {
     pub stages: Vec<Stage>,
 }
 
-/// Plans a scene: reads the CT and builds body and model, but opens no device and writes nothing. On a CPU
-/// backend it steps the body for a moment to measure the time of a frame.
+/// Plans a scene: reads the CT and builds body and model, but opens no device and writes nothing.
+/// On a CPU backend it steps the body for a moment to measure the time of a frame.
 ///
 /// # Errors
 /// [`Error`] as a run of the scene would give it before its first frame.
@@ -103,7 +104,8 @@ fn idle_adapter(scene: &Scene, backend: &Chosen) -> Option<String> {
     ))
 }
 
-/// Warnings about incisions narrower than a lattice step, whose lips begin wider apart than the scene says.
+/// Warnings about incisions narrower than a lattice step, whose lips begin wider apart than the
+/// scene says.
 fn narrow_incisions(incisions: &[IncisionSection], body: &Body) -> Vec<String> {
     let step = body.mesh.lattice.longest_step_mm();
     let all = incisions.iter().enumerate();

@@ -1,8 +1,8 @@
 //! Deformation models: what moves the body from frame to frame.
 //!
-//! A model is a type that is a [`Model`], in a folder of its own. [`build`] makes the model that the
-//! scene names; nothing after it needs to know which one it is. A started model is a [`Simulation`],
-//! which the stage `run` steps.
+//! A model is a type that is a [`Model`], in a folder of its own. [`build`] makes the model that
+//! the scene names; nothing after it needs to know which one it is. A started model is a
+//! [`Simulation`], which the stage `run` steps.
 
 pub(crate) mod chainmail;
 mod choice;
@@ -82,12 +82,12 @@ pub(crate) trait Simulation {
     /// Computes a frame.
     fn step(&mut self) -> Result<(), Error>;
 
-    /// Computes a frame with the same result as [`step`](Self::step), and adds the time of each part to
-    /// the profile.
+    /// Computes a frame with the same result as [`step`](Self::step), and adds the time of each
+    /// part to the profile.
     fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error>;
 
-    /// Whether each part of a frame ends before the next one begins, so that timing the parts does not
-    /// slow the frame.
+    /// Whether each part of a frame ends before the next one begins, so that timing the parts does
+    /// not slow the frame.
     fn parts_are_sequential(&self) -> bool;
 
     /// Time since the start of the first frame, s.

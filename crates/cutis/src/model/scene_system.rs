@@ -21,8 +21,8 @@ pub struct SceneSystem {
     pub gapes: Vec<Gape>,
 }
 
-/// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and adds the constraints
-/// and handles that the scene names. Opens no device, makes no step and writes nothing.
+/// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and adds the
+/// constraints and handles that the scene names. Opens no device, makes no step and writes nothing.
 ///
 /// ```no_run
 /// use cutis::Scene;
@@ -37,8 +37,8 @@ pub struct SceneSystem {
 /// ```
 ///
 /// # Errors
-/// [`Error`] as a run of the scene would give it before its first frame; [`Error::SceneKey`] for a model
-/// without a system.
+/// [`Error`] as a run of the scene would give it before its first frame; [`Error::SceneKey`] for a
+/// model without a system.
 pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
     needs_system(loaded)?;
     let source = source::load(loaded)?;

@@ -1,5 +1,5 @@
-//! The files that a run writes: the deformed CT, surfaces, pictures and the report. An output that the
-//! scene does not name is not computed.
+//! The files that a run writes: the deformed CT, surfaces, pictures and the report. An output that
+//! the scene does not name is not computed.
 
 pub(crate) mod html;
 mod pictures;
@@ -109,7 +109,8 @@ fn write_tissue(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
     write_mesh(path, body, &mesh.positions, deformed.positions, &mesh.hu, Cells::Tets(&mesh.tets))
 }
 
-/// Writes cells at their present positions, with the displacement from `rest` and the HU of each vertex.
+/// Writes cells at their present positions, with the displacement from `rest` and the HU of each
+/// vertex.
 fn write_mesh(
     path: &Path,
     body: &Body,

@@ -21,8 +21,8 @@ const DEEPEST_MM: f64 = 20.0;
 /// Colors of the contours at rest and deformed.
 const COLORS: [[u8; 3]; 2] = [[90, 160, 255], [255, 170, 60]];
 
-/// Draws a run: the skin before and after, and a slice before and after. Before, the CT is cut but has not
-/// moved. `after` is the deformed CT.
+/// Draws a run: the skin before and after, and a slice before and after. Before, the CT is cut but
+/// has not moved. `after` is the deformed CT.
 ///
 /// # Errors
 /// As resampler and renderer give them.

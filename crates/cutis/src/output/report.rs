@@ -32,8 +32,8 @@ pub struct Report {
     /// Quality of the detected skin, if the scene needs the skin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinQuality>,
-    /// Colors (groups without shared vertices) per constraint kind; a kind that the scene does not name is
-    /// absent. In vertex block descent only the colors of the vertices, as `descent`.
+    /// Colors (groups without shared vertices) per constraint kind; a kind that the scene does not
+    /// name is absent. In vertex block descent only the colors of the vertices, as `descent`.
     pub colors: std::collections::BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
@@ -49,7 +49,8 @@ pub struct Report {
     pub stages: Vec<Stage>,
     /// Time per frame.
     pub frames: Frames,
-    /// Opening of each incision. `initial` is the body at rest, also for an incision that is made later.
+    /// Opening of each incision. `initial` is the body at rest, also for an incision that is made
+    /// later.
     pub wounds: Vec<Wound>,
     /// Opening of the first incision, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -64,8 +65,8 @@ pub struct Report {
     pub residuals: Vec<KindResidual>,
     /// Largest distance that a vertex moved, mm.
     pub max_displacement_mm: f64,
-    /// Largest distance that a vertex at the border of the region of interest moved, mm. None without a
-    /// region that leaves something out.
+    /// Largest distance that a vertex at the border of the region of interest moved, mm. None
+    /// without a region that leaves something out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub border_displacement_mm: Option<f64>,
     /// Parts that the scene leaves out, which therefore cost nothing.
@@ -251,8 +252,8 @@ pub struct ChainmailReport {
     pub violated_links: usize,
     /// Links that the incisions have cut, including those before a resumed checkpoint.
     pub cut_links: usize,
-    /// System energy after the last drag and before the relaxation that followed, mm²: half the sum of the
-    /// squared differences of links from rest.
+    /// System energy after the last drag and before the relaxation that followed, mm²: half the sum
+    /// of the squared differences of links from rest.
     pub energy_before: f64,
     /// System energy at the end, mm².
     pub energy_after: f64,

@@ -29,7 +29,8 @@ pub struct ResampleRequest {
 /// Deforms a volume as a finished run deformed its own.
 ///
 /// # Errors
-/// [`Error::Checkpoint`] if the run's checkpoint belongs to another scene; other [`Error`]s as for a run.
+/// [`Error::Checkpoint`] if the run's checkpoint belongs to another scene; other [`Error`]s as for
+/// a run.
 pub fn resample_run(
     loaded: &LoadedScene,
     request: &ResampleRequest,

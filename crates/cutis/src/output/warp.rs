@@ -20,13 +20,14 @@ pub(crate) struct BodyWarp<'a> {
     rest: Vec<Point3<f32>>,
     deformed: Vec<Point3<f32>>,
     removed: Vec<[u32; 4]>,
-    /// The deformed positions of mesh and shell on the GPU, if the simulation left those of the mesh there.
+    /// The deformed positions of mesh and shell on the GPU, if the simulation left those of the
+    /// mesh there.
     on_device: Option<DevicePositions>,
 }
 
 impl<'a> BodyWarp<'a> {
-    /// Prepares the deformation to these positions, one per mesh vertex, in local meters. `on_device`
-    /// are the same positions on the GPU of the stages.
+    /// Prepares the deformation to these positions, one per mesh vertex, in local meters.
+    /// `on_device` are the same positions on the GPU of the stages.
     ///
     /// # Errors
     /// As [`Shell::new`].
@@ -74,8 +75,8 @@ impl<'a> BodyWarp<'a> {
         Ok((volume, report))
     }
 
-    /// The volume with the incisions cut and nothing moved. Voxels outside the removed tetrahedra keep
-    /// their values, so only the tetrahedra around them take part.
+    /// The volume with the incisions cut and nothing moved. Voxels outside the removed tetrahedra
+    /// keep their values, so only the tetrahedra around them take part.
     ///
     /// # Errors
     /// As the resampler gives them.

@@ -1,10 +1,11 @@
 //! Checkpoints: the exact state from which `--resume` continues.
 //!
-//! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32), vertex count
-//! (u64), positions (3 × f32 per vertex, m, local frame), three words of 32 bits per vertex, further words,
-//! SHA-256 of all that (32). With the model `pbd` the words are velocities (f32, m/s). With `chainmail`
-//! they are coordinates (i32, units of the chain), the energy after the last drag (f64, mm², two words),
-//! and the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
+//! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32),
+//! vertex count (u64), positions (3 × f32 per vertex, m, local frame), three words of 32 bits per
+//! vertex, further words, SHA-256 of all that (32). With the model `pbd` the words are velocities
+//! (f32, m/s). With `chainmail` they are coordinates (i32, units of the chain), the energy after
+//! the last drag (f64, mm², two words), and the elements that
+//! [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
 
 use std::path::Path;
 
@@ -29,8 +30,8 @@ pub struct Checkpoint {
     pub words: Vec<u32>,
 }
 
-/// Identifies scene and volume. It ignores the keys that a resumed run may change: number of frames,
-/// outputs, threads, backend.
+/// Identifies scene and volume. It ignores the keys that a resumed run may change: number of
+/// frames, outputs, threads, backend.
 pub(crate) fn fingerprint(scene: &Scene, volume_sha256: &str) -> [u8; 32] {
     let mut scene = scene.clone();
     scene.run = crate::scene::RunSection::default();
@@ -74,7 +75,8 @@ impl Checkpoint {
     /// Reads a checkpoint of a scene with `vertices` vertices.
     ///
     /// # Errors
-    /// [`Error::File`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or of another scene.
+    /// [`Error::File`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or of another
+    /// scene.
     pub(crate) fn read(path: &Path, fingerprint: &[u8; 32], vertices: usize) -> Result<Self, Error> {
         let fail = |why: String| Error::Checkpoint { path: path.into(), why };
         if !path.exists() {

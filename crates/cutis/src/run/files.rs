@@ -1,5 +1,5 @@
-//! The files of a run folder. A file is written under a temporary name and renamed, so that a run folder
-//! never holds a partial file.
+//! The files of a run folder. A file is written under a temporary name and renamed, so that a run
+//! folder never holds a partial file.
 
 use std::fs;
 use std::io::Write;

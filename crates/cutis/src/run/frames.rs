@@ -43,8 +43,8 @@ pub(crate) fn earlier_frames(folder: &RunFolder, done: u32) -> Result<String, Er
     Ok(text.lines().filter(before).flat_map(|line| [line, "\n"]).collect())
 }
 
-/// The text of `frames.csv`. Its first line of values is the state before the first frame. `earlier` are
-/// the lines of the run that this one resumes.
+/// The text of `frames.csv`. Its first line of values is the state before the first frame.
+/// `earlier` are the lines of the run that this one resumes.
 pub(crate) fn frames_csv(earlier: &str, rows: &[FrameRow]) -> String {
     let wounds = rows.first().map_or(0, |row| row.gapes.len());
     let mut out = String::from("frame,time_s,ms");

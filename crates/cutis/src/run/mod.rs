@@ -1,9 +1,9 @@
 //! A run of a scene, from the NIfTI file to the pictures.
 //!
-//! [`run_with`] is the whole walk. [`prepare`](prepare::prepare) reads the CT ([`ct`](crate::ct)), builds
-//! the body ([`body`](crate::body)) and its model ([`model`](crate::model)).
-//! [`simulate`](simulate::simulate) computes the frames. [`output::write`] deforms the CT and draws it, and
-//! [`summary::report`] collects the report.
+//! [`run_with`] is the whole walk. [`prepare`](prepare::prepare) reads the CT ([`ct`](crate::ct)),
+//! builds the body ([`body`](crate::body)) and its model ([`model`](crate::model)).
+//! [`simulate`](simulate::simulate) computes the frames. [`output::write`] deforms the CT and draws
+//! it, and [`summary::report`] collects the report.
 
 pub(crate) mod checkpoint;
 pub(crate) mod clock;
@@ -40,14 +40,14 @@ pub struct RunOptions {
 /// Runs a scene and writes its run folder.
 ///
 /// # Errors
-/// [`Error`]. [`Error::is_bad_input`] tells bad input from a failed run. Files that were written before the
-/// error stay.
+/// [`Error`]. [`Error::is_bad_input`] tells bad input from a failed run. Files that were written
+/// before the error stay.
 pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) -> Result<Report, Error> {
     run_with(loaded, options, Request::of(loaded)?, progress)
 }
 
-/// Does the same as [`run`] on a GPU that the caller opened. It ignores the scene's backend and adapter.
-/// This serves many runs on one device, or a device with other options.
+/// Does the same as [`run`] on a GPU that the caller opened. It ignores the scene's backend and
+/// adapter. This serves many runs on one device, or a device with other options.
 ///
 /// # Errors
 /// As [`run`].
@@ -108,8 +108,8 @@ mod tests {
         }
     }
 
-    /// A run resumes at its last frame from a body whose vertices all lie in one point. Its constraints
-    /// cannot act, and the report says so.
+    /// A run resumes at its last frame from a body whose vertices all lie in one point. Its
+    /// constraints cannot act, and the report says so.
     #[test]
     fn a_collapsed_body_is_reported() {
         let folder = tempfile::tempdir().unwrap();

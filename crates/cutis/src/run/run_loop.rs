@@ -100,8 +100,8 @@ impl RunLoop<'_> {
         Ok(RunResult { rows, end, on_device, times })
     }
 
-    /// Times the parts of one more frame, if they are not timed in every frame. The state is no longer
-    /// needed, so a failure is ignored.
+    /// Times the parts of one more frame, if they are not timed in every frame. The state is no
+    /// longer needed, so a failure is ignored.
     fn time_extra_frame(&self, simulation: &mut dyn Simulation, times: &mut PartTimes) {
         if self.timing == Timing::ExtraFrame && simulation.step_timed(&mut times.profile).is_ok() {
             times.frames = 1;

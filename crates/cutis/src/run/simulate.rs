@@ -37,7 +37,8 @@ pub(super) struct Simulated {
 /// Runs the frames.
 ///
 /// # Errors
-/// [`Error`] for a backend that does not start, a checkpoint that does not fit, and a frame that fails.
+/// [`Error`] for a backend that does not start, a checkpoint that does not fit, and a frame that
+/// fails.
 pub(super) fn simulate(
     setup: &Setup<'_>,
     model: Box<dyn Model>,

@@ -1,5 +1,5 @@
-//! A value that may be written in two ways: by itself, or as a list. An error inside a list names its
-//! place in the list.
+//! A value that may be written in two ways: by itself, or as a list. An error inside a list names
+//! its place in the list.
 
 use std::fmt;
 use std::marker::PhantomData;

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, Scene};
 
-/// Longest scene file that is read, bytes. A scene is a page of text, so a longer file is a mistake.
+/// Longest scene file that is read, bytes. A scene is a page of text, so a longer file is a
+/// mistake.
 const MAX_SCENE_BYTES: u64 = 1 << 20;
 /// Most parts of an override's dotted key. The deepest key of a scene has four parts.
 const MAX_KEY_PARTS: usize = 16;
@@ -56,8 +57,8 @@ impl LoadedScene {
 pub(crate) struct SceneFile<'a>(pub(crate) &'a Path);
 
 impl SceneFile<'_> {
-    /// Turns an error into one that names the section of the scene which asked for the impossible. An
-    /// error that names a key already stays as it is.
+    /// Turns an error into one that names the section of the scene which asked for the impossible.
+    /// An error that names a key already stays as it is.
     pub(crate) fn blame<E: Into<Error>>(self, section: &str) -> impl FnOnce(E) -> Error {
         move |error| match error.into() {
             named @ Error::SceneKey { .. } => named,
@@ -67,16 +68,16 @@ impl SceneFile<'_> {
         }
     }
 
-    /// The error for a key whose value cannot be used. `value` is the value found, or empty if there is
-    /// none to show; `why` says what would be right.
+    /// The error for a key whose value cannot be used. `value` is the value found, or empty if
+    /// there is none to show; `why` says what would be right.
     pub(crate) fn bad_key(self, key: &str, value: &str, why: &str) -> Error {
         Error::SceneKey { file: self.0.into(), key: key.into(), value: value.into(), why: why.into() }
     }
 }
 
 impl Scene {
-    /// Reads a scene file, applies `overrides` in order, resolves the volume's path and checks every
-    /// value.
+    /// Reads a scene file, applies `overrides` in order, resolves the volume's path and checks
+    /// every value.
     ///
     /// # Errors
     /// [`Error::SceneFile`] if the file cannot be read, [`Error::SceneSyntax`] if it is not TOML,
@@ -95,8 +96,8 @@ impl Scene {
         Self::parse(&text, file, directory, overrides)
     }
 
-    /// Does the same as [`Scene::load`] with a scene given as text. Messages name `file`; a relative path
-    /// of the volume starts from `directory`.
+    /// Does the same as [`Scene::load`] with a scene given as text. Messages name `file`; a
+    /// relative path of the volume starts from `directory`.
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -150,7 +151,8 @@ impl Scene {
     }
 }
 
-/// Sets the value of a dotted key and creates missing tables. Entries of lists are addressed by number.
+/// Sets the value of a dotted key and creates missing tables. Entries of lists are addressed by
+/// number.
 fn set(mut at: &mut toml::Value, key: &str, new: toml::Value) -> Result<(), String> {
     // A key may have the form of messages (`incision[0].depth_mm`), or dots alone.
     let key = &key.replace('[', ".").replace(']', "");

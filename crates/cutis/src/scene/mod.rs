@@ -1,8 +1,8 @@
 //! The scene file: all inputs of a run as plain data, with units in the key names.
 //!
 //! Positions are world millimeters in the volume's RAS+ frame. Unknown keys are refused.
-//! [`Scene::load`] reads a file, applies overrides and checks every value. Each section is a struct of
-//! this module. The sections of constraint kinds and of models are defined next to the code that
+//! [`Scene::load`] reads a file, applies overrides and checks every value. Each section is a struct
+//! of this module. The sections of constraint kinds and of models are defined next to the code that
 //! builds them, in the stage `model`.
 
 mod choice;

@@ -1,4 +1,5 @@
-//! The scene reference of the book, written from the schema, so that the page cannot lag behind the code.
+//! The scene reference of the book, written from the schema, so that the page always matches the
+//! code.
 
 use std::fmt::Write as _;
 
@@ -8,14 +9,14 @@ use super::load::schema;
 
 const HEAD: &str = "# Scene reference
 
-Written by `cutis scene reference` from the schema of the program; do not edit by hand.
+`cutis scene reference` writes this page from the schema of the program; do not edit it by hand.
 
 A scene is a TOML file. Lengths are millimeters and positions world millimeters in the volume's RAS+ frame (x right,
 y anterior, z superior); everything else is SI. Moduli, lengths, factors and durations are above 0 unless their row says
 otherwise. Unknown keys and values out of range are refused by name. `cutis scene new` prints a scene to start from.
 ";
 
-/// The reference as Markdown: one table per section, in the order of the schema.
+/// Returns the reference as Markdown: one table per section, in the order of the schema.
 pub fn reference() -> String {
     let page = Page { schema: schema() };
     let mut out = HEAD.to_owned();
@@ -35,17 +36,17 @@ struct Page {
     schema: Value,
 }
 
-/// A table of TOML, or a list of them.
+/// A TOML table, or a list of tables.
 struct Section<'a> {
     definition: &'a Value,
     list: bool,
 }
 
 impl Page {
-    /// A heading, what the section is for, its keys, then the sections inside it.
+    /// Writes a heading, the description of the section, its keys, then the sections inside it.
     fn write_section(&self, out: &mut String, path: &str, property: &Value, required: bool) {
         let Some(Section { definition, list }) = self.section_within(property) else { return };
-        // Where it is one choice of several, the property's text is about all of them.
+        // The text of a property that is one choice of several describes all of them.
         let described = if self.section(property).is_some() { property } else { definition };
         let heading = if list { format!("[[{path}]]") } else { format!("[{path}]") };
         let level = 2 + path.matches('.').count();
@@ -58,7 +59,7 @@ impl Page {
         }
     }
 
-    /// One row per key.
+    /// Writes a table with one row per key.
     fn table(&self, out: &mut String, owner: &Value, keys: &[(&str, &Value)]) {
         out.push_str("\n| key | value | default | meaning |\n|---|---|---|---|\n");
         for &(key, property) in keys {
@@ -72,7 +73,7 @@ impl Page {
         }
     }
 
-    /// What a value may be, in words.
+    /// The type of a value, for people.
     fn kind(&self, property: &Value) -> String {
         match self.section(property) {
             Some(Section { list: true, .. }) => return "list of sections, see below".into(),
@@ -104,7 +105,7 @@ impl Page {
         }
     }
 
-    /// The section that a property stands for, if it is one.
+    /// The section that a property refers to, if it refers to one.
     fn section<'a>(&'a self, property: &'a Value) -> Option<Section<'a>> {
         let whole = self.definition(property);
         let definition = whole.get("items").map_or(whole, |item| self.definition(item));
@@ -113,14 +114,14 @@ impl Page {
             .then_some(Section { definition, list: whole.get("items").is_some() })
     }
 
-    /// The section that a property stands for, or may stand for beside something else.
+    /// The section that a property refers to, possibly as one of several choices.
     fn section_within<'a>(&'a self, property: &'a Value) -> Option<Section<'a>> {
         let choices = self.definition(property)["anyOf"].as_array();
         self.section(property)
             .or_else(|| choices.into_iter().flatten().find_map(|choice| self.section(choice)))
     }
 
-    /// The definition that a property points to, through `$ref` and an optional's `anyOf`.
+    /// The definition that a property refers to by `$ref`, or by the `anyOf` of an optional value.
     fn definition<'a>(&'a self, property: &'a Value) -> &'a Value {
         if let Some(name) = property["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/")) {
             return &self.schema["$defs"][name];
@@ -141,7 +142,7 @@ fn required(owner: &Value, key: &str) -> bool {
     owner["required"].as_array().is_some_and(|keys| keys.iter().any(|k| k == key))
 }
 
-/// `a, b or c`.
+/// Joins choices as `a, b or c`.
 fn either(mut choices: Vec<String>) -> String {
     match choices.pop() {
         Some(last) if choices.is_empty() => last,
@@ -150,7 +151,7 @@ fn either(mut choices: Vec<String>) -> String {
     }
 }
 
-/// A property's own description, else that of its type.
+/// The description of a property, or else of its type.
 fn text<'a>(property: &'a Value, definition: &'a Value) -> &'a str {
     property["description"].as_str().or(definition["description"].as_str()).unwrap_or_default()
 }

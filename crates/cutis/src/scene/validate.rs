@@ -38,8 +38,8 @@ impl Check<'_> {
         self.require(finite, key, format!("{value:?}"), "must be three finite numbers")
     }
 
-    /// Checks a zone, given by `around_mm` or by two corners. `acts`: the scene has an incision or a
-    /// handle.
+    /// Checks a zone, given by `around_mm` or by two corners. `acts`: the scene has an incision or
+    /// a handle.
     fn zone(
         &self,
         key: &str,
@@ -167,8 +167,8 @@ impl Scene {
         Ok(())
     }
 
-    /// The time of an incision. Only some models can cut a body that has begun to move, and an incision
-    /// after the last frame would never be made.
+    /// The time of an incision. Only some models can cut a body that has begun to move, and an
+    /// incision after the last frame would never be made.
     fn validate_time(&self, check: &Check<'_>, key: &str, at_s: f64) -> Result<(), Error> {
         check.not_negative(key, at_s)?;
         let why = "must be 0 with model = \"pbd\", whose incisions are there from the start";

@@ -25,7 +25,8 @@ impl ChainmailModel {
         let table = section.table(file, &scene.tissue)?;
         let mut materials = vec![NO_MATERIAL; grid.len()];
         for (&element, &hu) in mesh.lattice_index.iter().zip(&mesh.hu) {
-            // Tissue is at or above `tissue.air_below_hu`, and the first material begins there or below.
+            // Tissue is at or above `tissue.air_below_hu`, and the first material begins there or
+            // below.
             materials[element as usize] = table.at(hu).unwrap_or_default();
         }
         let mut chain = Chain::new(grid.shape, grid.affine.spacing_mm(), table.materials(), materials)
@@ -52,8 +53,8 @@ impl ChainmailModel {
     }
 }
 
-/// Per lattice point, a bit for each link to a later point that is an edge of the uncut body. `removed`
-/// holds the edges that the incisions removed.
+/// Per lattice point, a bit for each link to a later point that is an edge of the uncut body.
+/// `removed` holds the edges that the incisions removed.
 fn linked(mesh: &TetMesh, removed: &[[u32; 2]]) -> Vec<u8> {
     let grid = mesh.lattice.grid();
     let mut linked = vec![0_u8; grid.len()];
@@ -113,8 +114,8 @@ fn handles(input: &ModelInput<'_>) -> Result<Vec<ChainHandle>, Error> {
     Ok(handles)
 }
 
-/// The links that each incision cuts: those that are in no tetrahedron any more. The first incision that
-/// takes a tetrahedron removes it.
+/// The links that each incision cuts: those that are in no tetrahedron any more. The first incision
+/// that takes a tetrahedron removes it.
 fn cuts(incisions: &[IncisionSection], body: &Body) -> Vec<ChainCut> {
     let mesh = &body.mesh;
     let slits = incisions.iter().zip(&body.cut.slits);

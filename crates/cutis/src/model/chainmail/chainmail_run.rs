@@ -161,7 +161,8 @@ impl<'a> ChainmailRun<'a> {
         elements.filter(|&(v, &element)| !self.body.is_removed(v as u32) && !at_rest(element)).count()
     }
 
-    /// Warning about `links` links beyond their limits, with the place that holds an end of the `worst` one.
+    /// Warning about `links` links beyond their limits, with the place that holds an end of the
+    /// `worst` one.
     fn reason(&self, links: usize, worst: &LinkViolation) -> String {
         let (lattice, chain) = (&self.body.mesh.lattice, &self.model.chain);
         let ends = [worst.element, worst.next];

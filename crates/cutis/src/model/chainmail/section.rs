@@ -15,11 +15,11 @@ const MATERIALS_KEY: &str = "chainmail.materials";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ChainmailSection {
-    /// How far links stretch, shorten and shear, by HU: preset `tissue` (fat, firmer soft tissue, rigid
-    /// bone) or `uniform`, or a list of materials.
+    /// How far links stretch, shorten and shear, by HU: preset `tissue` (fat, firmer soft tissue,
+    /// rigid bone) or `uniform`, or a list of materials.
     pub materials: MaterialsChoice,
-    /// Most sweeps of elastic relaxation after the drag of each frame; 0 leaves links where the drag
-    /// left them. Frames after the last drag continue to relax.
+    /// Most sweeps of elastic relaxation after the drag of each frame; 0 leaves links where the
+    /// drag left them. Frames after the last drag continue to relax.
     pub relax_per_frame: u32,
 }
 
@@ -61,8 +61,8 @@ pub struct ChainMaterialSection {
     pub longest: PerAxis,
     /// Largest distance across the link by which its ends move apart, 0 to 16.
     pub shear: PerAxis,
-    /// Distance from the balance with its neighbors at which relaxation leaves an element, in lattice
-    /// steps, 0 to 4096; 0 is elastic.
+    /// Distance from the balance with its neighbors at which relaxation leaves an element, in
+    /// lattice steps, 0 to 4096; 0 is elastic.
     #[serde(default)]
     pub k_steps: f64,
 }

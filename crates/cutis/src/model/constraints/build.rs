@@ -39,8 +39,8 @@ impl ConstraintModel {
     pub(crate) fn build(input: &ModelInput<'_>) -> Result<Self, Error> {
         let ModelInput { file, scene, body } = *input;
         let inverse_masses = body.inverse_masses(file, &scene.fixed)?;
-        // The frame's origin is in the middle of the CT, so a region of interest has the same positions
-        // as in the whole body.
+        // The frame's origin is in the middle of the CT, so a region of interest has the same
+        // positions as in the whole body.
         let mut builder = SystemBuilder::<f32>::in_place(&body.mesh.positions, &inverse_masses)?;
         let parts = BodyParts {
             file,

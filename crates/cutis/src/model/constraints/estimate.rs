@@ -7,7 +7,8 @@ use crate::output::report::MemoryPart;
 
 /// Memory and work of stepping a system with given settings.
 pub(crate) struct CostEstimate {
-    /// Memory of the solver on the host by part, equal to its [`Solver::bytes`](cutis_solver::Solver::bytes).
+    /// Memory of the solver on the host by part, equal to its
+    /// [`Solver::bytes`](cutis_solver::Solver::bytes).
     pub(crate) memory: Vec<MemoryPart>,
     /// The groups of vertex block descent; none with another formulation.
     descent: Option<Descent<f32>>,

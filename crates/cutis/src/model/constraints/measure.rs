@@ -14,8 +14,9 @@ const LONG_ENOUGH_S: f64 = 0.1;
 /// Most iterations of a substep that are measured; further ones are taken to last as long.
 const MOST_ITERATIONS: u32 = 4;
 
-/// Measures substeps of a system that is no longer needed, on a backend of the host. The first substep
-/// touches all memory and is not counted; then follow as many as fit into a tenth of a second.
+/// Measures substeps of a system that is no longer needed, on a backend of the host. The first
+/// substep touches all memory and is not counted; then follow as many as fit into a tenth of a
+/// second.
 ///
 /// # Errors
 /// As the backend gives them. Numbers that explode are an error of the run, not of its plan.

@@ -39,7 +39,8 @@ impl StartedSolver {
         !matches!(self, Self::Host(_))
     }
 
-    /// A copy of the present positions that stays on the GPU. None on the host, or if the GPU has no room.
+    /// A copy of the present positions that stays on the GPU. None on the host, or if the GPU has
+    /// no room.
     pub(crate) fn positions_on_device(&self) -> Option<DevicePositions> {
         match self {
             Self::Host(_) => None,

@@ -16,8 +16,8 @@ pub struct FixedSection {
     /// Vertices on the side of these planes to which the normal points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub planes: Vec<PlaneSection>,
-    /// Vertices in the first and last layer of the lattice along these axes (`"i"`, `"j"`, `"k"`), where
-    /// the scan ends.
+    /// Vertices in the first and last layer of the lattice along these axes (`"i"`, `"j"`, `"k"`),
+    /// where the scan ends.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub end_layers: Vec<AxisChoice>,
 }
@@ -61,8 +61,8 @@ pub struct PlaneSection {
     pub normal: [f64; 3],
 }
 
-/// An incision as in the paper, with a mid-surface that always separates the lips. It is placed on the body
-/// at rest.
+/// An incision as in the paper, with a mid-surface that always separates the lips. It is placed on
+/// the body at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IncisionSection {

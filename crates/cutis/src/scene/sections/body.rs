@@ -32,7 +32,8 @@ pub struct PhantomSection {
     pub seed: u64,
 }
 
-/// The lattice: at most one of `spacing_mm` and `vertices`; neither puts a vertex on every voxel center.
+/// The lattice: at most one of `spacing_mm` and `vertices`; neither puts a vertex on every voxel
+/// center.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LatticeSection {
@@ -45,14 +46,14 @@ pub struct LatticeSection {
     /// How a cell is split into tetrahedra.
     #[serde(default)]
     pub split: SplitChoice,
-    /// The part of the body that is simulated: `around_mm`, or a box. Tissue outside it does not move and
-    /// takes neither time nor memory of the solver. Skin and largest part are found on the whole body
-    /// first. Left out: the whole body.
+    /// The part of the body that is simulated: `around_mm`, or a box. Tissue outside it does not
+    /// move and takes neither time nor memory of the solver. Skin and largest part are found on the
+    /// whole body first. Left out: the whole body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<RegionSection>,
-    /// A fine zone, `around_mm` or a box, in which the lattice has the spacing that it would have without
-    /// this section. Outside it the distance between planes of vertices grows along each axis. Left out:
-    /// all cells have the same size.
+    /// A fine zone, `around_mm` or a box, in which the lattice has the spacing that it would have
+    /// without this section. Outside it the distance between planes of vertices grows along each
+    /// axis. Left out: all cells have the same size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grading: Option<GradingSection>,
 }
@@ -76,8 +77,8 @@ pub struct RegionSection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GradingSection {
-    /// The fine zone is the box, along the axes of the lattice, around everything within this distance of
-    /// an incision (straight down to its depth) or a handle, mm.
+    /// The fine zone is the box, along the axes of the lattice, around everything within this
+    /// distance of an incision (straight down to its depth) or a handle, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub around_mm: Option<f64>,
     /// Lowest corner of the box, mm.
@@ -207,8 +208,8 @@ impl<'de> Deserialize<'de> for TableChoice {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SkinSection {
-    /// Rule by which skin triangles are chosen: the outer skin of the body, all faces between tissue and the
-    /// rest, or the paper's rule, taken literally.
+    /// Rule by which skin triangles are chosen: the outer skin of the body, all faces between
+    /// tissue and the rest, or the paper's rule, taken literally.
     #[serde(default)]
     pub mode: SkinChoice,
 }
@@ -217,7 +218,8 @@ pub struct SkinSection {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SkinChoice {
-    /// The paper's rule, taken literally: every tetrahedron with exactly one air vertex gives a triangle.
+    /// The paper's rule, taken literally: every tetrahedron with exactly one air vertex gives a
+    /// triangle.
     Paper,
     /// All faces between a kept and a dropped tetrahedron.
     Boundary,

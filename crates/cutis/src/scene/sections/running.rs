@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolverSection {
-    /// Backend of the solver: all CPU cores, the scalar reference solver, a GPU, or the best one for the size
-    /// of the scene. A build without the feature `gpu` refuses `"gpu"`.
+    /// Backend of the solver: all CPU cores, the scalar reference solver, a GPU, or the best one
+    /// for the size of the scene. A build without the feature `gpu` refuses `"gpu"`.
     pub backend: BackendChoice,
     /// The GPU to use: a part of its name, or its index in `cutis devices`. Left out: the best one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adapter: Option<String>,
-    /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent. `vbd` has the
-    /// materials of `xpbd`, and its state of rest is an equilibrium for any number of substeps.
+    /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent. `vbd` has
+    /// the materials of `xpbd`, and its state of rest is an equilibrium for any number of substeps.
     pub formulation: FormulationChoice,
     /// Duration of a frame, s.
     pub dt_s: f64,
@@ -26,8 +26,8 @@ pub struct SolverSection {
     pub gravity_m_s2: [f64; 3],
     /// Velocities decay as exp(−damping·t), 1/s; 0 or more.
     pub damping_per_s: f64,
-    /// Over-relaxation of `vbd`, above 0 and below 2; 1 with the other formulations. About 1.3 helps with
-    /// several iterations.
+    /// Over-relaxation of `vbd`, above 0 and below 2; 1 with the other formulations. About 1.3
+    /// helps with several iterations.
     pub relaxation: f64,
     /// Worker threads; 0 takes all cores. The result does not depend on their number.
     pub threads: usize,
@@ -74,8 +74,8 @@ pub enum FormulationChoice {
     /// Compliance in physical units.
     #[default]
     Xpbd,
-    /// The materials of `xpbd`, solved vertex by vertex (vertex block descent). The state of rest is an
-    /// equilibrium for any number of substeps and iterations.
+    /// The materials of `xpbd`, solved vertex by vertex (vertex block descent). The state of rest
+    /// is an equilibrium for any number of substeps and iterations.
     Vbd,
 }
 
@@ -95,8 +95,8 @@ impl Default for RunSection {
     }
 }
 
-/// The files to write. In a scene with this section, an output that the section does not name is neither
-/// computed nor written.
+/// The files to write. In a scene with this section, an output that the section does not name is
+/// neither computed nor written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputSection {

@@ -1,4 +1,5 @@
-//! `constraints.stc`: skin tension over each skin triangle, by HU and by distance from the incisions.
+//! `constraints.stc`: skin tension over each skin triangle, by HU and by distance from the
+//! incisions.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{
@@ -33,12 +34,12 @@ pub struct StcSection {
     /// Rest area over area in the scan; below 1 the skin is under tension.
     #[serde(default = "default_rest_area_scale")]
     pub rest_area_scale: f64,
-    /// Formula: `"energy"` is stable for any amplification; `"paper"` is the paper's clamped update,
-    /// for `pbd` only.
+    /// Formula: `"energy"` is stable for any amplification; `"paper"` is the paper's clamped
+    /// update, for `pbd` only.
     #[serde(default)]
     pub form: StcForm,
-    /// HU → factor on the modulus (on the stiffness in `pbd`), at the mean HU of a triangle's vertices:
-    /// preset `uniform` or `paper`, or points.
+    /// HU → factor on the modulus (on the stiffness in `pbd`), at the mean HU of a triangle's
+    /// vertices: preset `uniform` or `paper`, or points.
     #[serde(default = "uniform")]
     pub stiffness_table: TableChoice,
     /// Other values near the incisions.
@@ -259,10 +260,10 @@ impl ConstraintKind for StcSection {
     }
 }
 
-/// Warns if skin tension is too stiff for the substeps. One projection per substep moves a vertex as
-/// far as its inertia lets it within `h`. Beyond `h·frequency` of about one half, the wound opens less
-/// than the modulus asks for, and the deficit grows as the lattice gets finer. With 2 projections per
-/// 1/frequency, the openings of the demo were within 5 % of those with many more.
+/// Warns if skin tension is too stiff for the substeps. One projection per substep moves a vertex
+/// as far as its inertia lets it within `h`. Beyond `h·frequency` of about one half, the wound
+/// opens less than the modulus asks for, and the deficit grows as the lattice gets finer. With 2
+/// projections per 1/frequency, the openings of the demo were within 5 % of those with many more.
 fn too_stiff(solver: &SolverSection, frequency: f64) -> Option<String> {
     let projections = f64::from(solver.substeps) * f64::from(solver.iterations);
     let needed = (2.0 * solver.dt_s * frequency / f64::from(solver.iterations)).ceil();
