@@ -84,6 +84,17 @@ impl Incidence {
         &self.places[self.starts[v] as usize..self.starts[v + 1] as usize]
     }
 
+    /// Start of each vertex's places, followed by their number: one entry more than there are
+    /// vertices.
+    pub fn starts(&self) -> &[u32] {
+        &self.starts
+    }
+
+    /// All places, one vertex after the other.
+    pub fn places(&self) -> &[u32] {
+        &self.places
+    }
+
     /// Stored bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.starts.as_slice()) + size_of_val(self.places.as_slice())

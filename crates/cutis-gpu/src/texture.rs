@@ -88,6 +88,11 @@ impl Texture3d {
     pub fn whole(&self) -> Binding<'_> {
         Binding::texture(&self.view, &self.memory)
     }
+
+    /// Returns the number of voxels along x, y and z.
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
 }
 
 impl fmt::Debug for Texture3d {

@@ -4,7 +4,7 @@
 
 use std::error::Error;
 
-use cutis_mesh::{Lattice, Split, TetMesh, Tissue};
+use cutis_mesh::{Lattice, Split, Tissue, TissueMask};
 use cutis_resample::{Warp, resample};
 use cutis_volume::phantom::Phantom;
 use nalgebra::{Point3, Vector3};
@@ -21,7 +21,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let hu: Vec<f32> = volume.voxels().iter().map(|&v| f32::from(v)).collect();
     let air: Vec<bool> = hu.iter().map(|&hu| hu < -449.0).collect();
     let lattice = Lattice::new(grid, Split::Kuhn6)?;
-    let mesh = TetMesh::build(&lattice, &hu, &Tissue { air: &air, cut_away: &[], largest_component: true })?;
+    let mesh = TissueMask::find(&lattice, &Tissue { air: &air, cut_away: &[], largest_component: true })?
+        .mesh(&hu)?;
 
     // A smooth push towards the back, strongest at a point of the belly's skin.
     let (site, _) = phantom.incision_site();

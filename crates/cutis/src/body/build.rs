@@ -18,7 +18,7 @@ impl Body {
     pub(crate) fn build(sections: &BodySections<'_>, volume: &Volume) -> Result<Self, Error> {
         let BodySections { file, tissue, incisions, .. } = *sections;
         let lattice = lattice(sections, volume)?;
-        let hu = lattice.sample(volume);
+        let hu = lattice.sample(volume)?;
         let air = air(&hu, tissue.air_below_hu);
         let cut_away: Vec<HalfSpace> = tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = tissue.keep == Keep::Largest;
@@ -80,13 +80,13 @@ fn find_skin(
 
 /// Warning about tissue that is not connected with the largest part.
 fn dropped_tets(mesh: &TetMesh) -> Option<String> {
-    let frozen = mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets);
+    let inactive = mesh.inactive.as_ref().map_or(0, |inactive| inactive.tets);
     (mesh.dropped_tets > 0).then(|| {
         format!(
             "{} of {} tissue tetrahedra lie apart from the largest part and were left out \
              (tissue.keep = \"largest\")",
             mesh.dropped_tets,
-            mesh.dropped_tets + mesh.tets.len() + frozen
+            mesh.dropped_tets + mesh.tets.len() + inactive
         )
     })
 }

@@ -41,7 +41,7 @@ pub fn find_skin(
     progress.end();
     progress.begin("detect the skin", 0);
     let lattice = Lattice::new(sample::lattice_grid(volume.grid(), request.lattice)?, request.split)?;
-    let air = air(&sample::to_grid(&volume, lattice.grid()), AIR_BELOW_HU);
+    let air = air(&sample::to_grid(&volume, lattice.grid())?, AIR_BELOW_HU);
     let found = skin::detect(&lattice, &air, request.mode, &SkinOptions::default())?;
     progress.end();
     if let Some(path) = out {

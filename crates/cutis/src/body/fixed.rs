@@ -33,7 +33,7 @@ impl Body {
     /// [`Error`] for a plane without a direction.
     pub(crate) fn fixed(&self, file: SceneFile<'_>, section: &FixedSection) -> Result<Vec<bool>, Error> {
         let mesh = &self.mesh;
-        let border = mesh.frozen.as_ref().map(|frozen| frozen.border.clone());
+        let border = mesh.inactive.as_ref().map(|inactive| inactive.border.clone());
         let mut fixed = border.unwrap_or_else(|| vec![false; mesh.positions.len()]);
         let mut add =
             |which: Vec<bool>| fixed.iter_mut().zip(which).for_each(|(fixed, other)| *fixed |= other);

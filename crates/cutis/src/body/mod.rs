@@ -66,8 +66,8 @@ impl Body {
     /// Largest displacement of a vertex next to the border of the region of interest, mm. None
     /// without a region that leaves something out.
     pub(crate) fn border_displacement_mm(&self, deformed: &[Point3<f32>]) -> Option<f64> {
-        let frozen = self.mesh.frozen.as_ref().filter(|frozen| frozen.tets > 0)?;
-        let at_border = |tet: &&[u32; 4]| tet.iter().any(|&v| frozen.border[v as usize]);
+        let inactive = self.mesh.inactive.as_ref().filter(|inactive| inactive.tets > 0)?;
+        let at_border = |tet: &&[u32; 4]| tet.iter().any(|&v| inactive.border[v as usize]);
         let moved =
             |&v: &u32| f64::from((deformed[v as usize] - self.mesh.positions[v as usize]).norm()) * 1e3;
         Some(self.mesh.tets.iter().filter(at_border).flatten().map(moved).fold(0.0, f64::max))

@@ -78,9 +78,9 @@ pub(super) fn check_handles(sections: &BodySections<'_>, mesh: &TetMesh) -> Resu
         );
         Err(sections.file.bad_key(name, &zone.map(shown).unwrap_or_default(), &why))
     };
-    if let Some(frozen) = &mesh.frozen {
-        let border = mesh.positions.iter().zip(&frozen.border).filter(|(_, border)| **border);
-        let outside = frozen.points.iter().enumerate().filter(|(_, frozen)| **frozen);
+    if let Some(inactive) = &mesh.inactive {
+        let border = mesh.positions.iter().zip(&inactive.border).filter(|(_, border)| **border);
+        let outside = inactive.points.iter().enumerate().filter(|(_, inactive)| **inactive);
         let outside = outside.map(|(point, _)| mesh.frame.to_local(lattice.mm(grid.point(point))));
         for position in border.map(|(position, _)| *position).chain(outside) {
             if let Some(handle) = grabbed(position) {
@@ -100,8 +100,8 @@ pub(super) fn check_handles(sections: &BodySections<'_>, mesh: &TetMesh) -> Resu
 
 /// Warning about a region of interest that leaves nothing out.
 pub(super) fn warning(mesh: &TetMesh) -> Option<String> {
-    let frozen = mesh.frozen.as_ref()?;
-    (frozen.tets == 0).then(|| "lattice.region holds the whole body: it leaves nothing out".to_owned())
+    let inactive = mesh.inactive.as_ref()?;
+    (inactive.tets == 0).then(|| "lattice.region holds the whole body: it leaves nothing out".to_owned())
 }
 
 fn region_zone(lattice: &LatticeSection) -> Option<Zone> {

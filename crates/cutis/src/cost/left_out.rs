@@ -37,10 +37,10 @@ pub(super) fn of_lattice(body: &Body, memory: &[MemoryPart]) -> Vec<String> {
 
 fn region(body: &Body, memory: &[MemoryPart]) -> Option<String> {
     let mesh = &body.mesh;
-    let frozen = mesh.frozen.as_ref().filter(|frozen| frozen.tets > 0)?;
+    let inactive = mesh.inactive.as_ref().filter(|inactive| inactive.tets > 0)?;
     let kept_and_left = |part: &str| match KINDS.iter().find(|row| row.key == part) {
         Some(row) => (row.facts.counts)(body),
-        None if part == "vertices" => [mesh.positions.len(), frozen.vertices],
+        None if part == "vertices" => [mesh.positions.len(), inactive.vertices],
         None => [0, 0],
     };
     let saved = |part: &MemoryPart| {
@@ -51,10 +51,10 @@ fn region(body: &Body, memory: &[MemoryPart]) -> Option<String> {
     Some(format!(
         "region: {} of {} tetrahedra and {} of {} vertices lie outside it; they are neither stored nor \
          simulated, which saves about {:.1} MB of the solver's memory",
-        frozen.tets,
-        frozen.tets + mesh.tets.len(),
-        frozen.vertices,
-        frozen.vertices + mesh.positions.len(),
+        inactive.tets,
+        inactive.tets + mesh.tets.len(),
+        inactive.vertices,
+        inactive.vertices + mesh.positions.len(),
         bytes / 1e6
     ))
 }

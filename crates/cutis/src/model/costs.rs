@@ -25,7 +25,7 @@ pub(crate) struct ModelCosts {
 /// Element counts of a body with `fixed` vertices that do not move, apart from the removed ones.
 pub(super) fn sizes(body: &Body, fixed: usize) -> Sizes {
     let mesh = &body.mesh;
-    let frozen = mesh.frozen.as_ref();
+    let inactive = mesh.inactive.as_ref();
     Sizes {
         lattice: mesh.lattice.grid().shape,
         vertices: mesh.positions.len(),
@@ -34,8 +34,8 @@ pub(super) fn sizes(body: &Body, fixed: usize) -> Sizes {
         skin_triangles: body.skin.len(),
         removed_vertices: body.removed_vertices(),
         fixed_vertices: fixed,
-        frozen_vertices: frozen.map_or(0, |frozen| frozen.vertices),
-        frozen_tets: frozen.map_or(0, |frozen| frozen.tets),
+        frozen_vertices: inactive.map_or(0, |inactive| inactive.vertices),
+        frozen_tets: inactive.map_or(0, |inactive| inactive.tets),
     }
 }
 

@@ -99,7 +99,8 @@ fn body() -> Result<Chain, Failure> {
     let elements = (0..nx * ny * nz).map(of).collect();
     let mut chain = Chain::new(SHAPE, [1.0, 0.8, 2.0], &[soft, across, Material::RIGID, plastic], elements)?;
     let [first, second] = GRABBED.map(|place| chain.element(place));
-    let fixed = |element: &u32| chain.has_element(*element) && noise(*element as usize + 7).is_multiple_of(61);
+    let fixed =
+        |element: &u32| chain.has_element(*element) && noise(*element as usize + 7).is_multiple_of(61);
     let mut fixed: Vec<u32> = (0..chain.places() as u32).filter(fixed).collect();
     fixed.retain(|element| ![first, second].contains(element));
     chain.fix(&fixed)?;

@@ -34,8 +34,12 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     let name = "resample: one slab";
     let scene = Scene::new()?;
     let options = ResamplerOptions { slab_slices: Some(SLAB), ..ResamplerOptions::centered(&scene.warp()) };
-    let expected =
-        cutis_resample_twin::resample_slab(&scene.volume, &scene.warp(), &options, NUMBER * SLAB..(NUMBER + 1) * SLAB)?;
+    let expected = cutis_resample_twin::resample_slab(
+        &scene.volume,
+        &scene.warp(),
+        &options,
+        NUMBER * SLAB..(NUMBER + 1) * SLAB,
+    )?;
     let measure = |gpu: &Gpu, policy, deformed: &[Point3<f32>]| {
         let mut resampler = ResamplerGpu::new(gpu, &scene.volume, &scene.warp(), &options)?;
         resampler.resample(deformed)?;

@@ -126,7 +126,7 @@ fn cuts(incisions: &[IncisionSection], body: &Body) -> Vec<ChainCut> {
     let mut removed_by = HashMap::new();
     for tet in &body.removed.tets {
         let corners = tet.map(|vertex| mesh.positions[vertex as usize]);
-        let Some(cut) = slits.iter().position(|(_, slit)| slit.takes(&corners)) else { continue };
+        let Some(cut) = slits.iter().position(|(_, slit)| slit.cuts(&corners)) else { continue };
         for (a, &p) in tet.iter().enumerate() {
             for &q in &tet[a + 1..] {
                 let last = removed_by.entry([p.min(q), p.max(q)]).or_insert(cut);

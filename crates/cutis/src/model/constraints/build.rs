@@ -58,7 +58,7 @@ impl ConstraintModel {
             warnings.extend(kind.warnings(&parts));
         }
         if scene.solver.formulation == FormulationChoice::Vbd {
-            builder = builder.vertex_groups(Groups::from_colors(&body.mesh.vertex_classes())?);
+            builder = builder.vertex_groups(Groups::from_colors(&body.mesh.vertex_colors())?);
         }
         for (n, (handle, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {
             let move_m = (Vector3::from(handle.move_mm) / 1000.0).into();

@@ -27,7 +27,9 @@ impl DistanceSection {
         solver_names: &[Distance::NAME],
         element: "edge",
         needs_skin: false,
-        counts: |body| [body.mesh.edges.len(), body.mesh.frozen.as_ref().map_or(0, |frozen| frozen.edges)],
+        counts: |body| {
+            [body.mesh.edges.len(), body.mesh.inactive.as_ref().map_or(0, |inactive| inactive.edges)]
+        },
     };
 }
 

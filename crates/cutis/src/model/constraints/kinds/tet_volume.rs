@@ -27,7 +27,9 @@ impl VolumeConstraintSection {
         solver_names: &[Volume::NAME],
         element: "tetrahedron",
         needs_skin: false,
-        counts: |body| [body.mesh.tets.len(), body.mesh.frozen.as_ref().map_or(0, |frozen| frozen.tets)],
+        counts: |body| {
+            [body.mesh.tets.len(), body.mesh.inactive.as_ref().map_or(0, |inactive| inactive.tets)]
+        },
     };
 }
 
@@ -43,7 +45,7 @@ impl ConstraintKind for VolumeConstraintSection {
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
         let mesh = &parts.body.mesh;
-        let groups = Groups::from_colors(&mesh.tet_classes(&mesh.tets))?;
+        let groups = Groups::from_colors(&mesh.tet_colors(&mesh.tets))?;
         let stiffness = if parts.compliant() {
             let volumes = mesh.tet_volumes();
             compliances(&mesh.tets, |n, _| {
