@@ -1,7 +1,7 @@
-//! Error against run time: the quick measurement holds its checks, in which single substeps converge, bodies settle in their
-//! equilibria, and controls are refused.
+//! Error against run time: the checks of the quick study hold. Single substeps converge, bodies settle in their equilibria, and
+//! controls are refused.
 
-use cutis_tests::accuracy::{self, Options};
+use cutis_studies::accuracy::{self, Options};
 
 #[test]
 fn the_quick_checks_hold() {

@@ -1,15 +1,15 @@
-//! The quick part of the stability suite: stiff and extreme cases end as they must, at three length scales.
+//! The quick part of the stability study: stiff and extreme cases meet their requirements at three length scales.
 
-use cutis::gpu::{Gpu, GpuError, GpuOptions};
-use cutis_tests::stability::{self, Effort, Failure, Row, SCALES, case::Case, cases};
+use cutis_studies::stability::{self, Effort, Failure, SCALES, Trial, case::Case, cases};
+use cutis_test_kit::gpu;
 
-/// Runs `cases` and fails with every row that did not end as it must.
-fn check(run: impl FnOnce(&mut dyn FnMut(Row) -> Result<(), Failure>) -> Result<(), Failure>) {
+/// Runs cases and fails with a list of all trials that do not meet their requirements.
+fn check(run: impl FnOnce(&mut dyn FnMut(Trial) -> Result<(), Failure>) -> Result<(), Failure>) {
     let (mut count, mut failed) = (0, Vec::new());
-    let mut keep = |row: Row| {
+    let mut keep = |trial: Trial| {
         count += 1;
-        if !row.outcome.is_good() {
-            failed.push(format!("{} at scale {:?}: {}", row.case, row.scale, row.outcome.note()));
+        if !trial.outcome.is_good() {
+            failed.push(format!("{} at scale {:?}: {}", trial.case, trial.scale, trial.outcome.note()));
         }
         Ok(())
     };
@@ -30,19 +30,9 @@ fn extreme_cases_end_as_they_must_in_double_precision() {
     check(|keep| stability::run_reference(&cases, &[1e-3], keep));
 }
 
-/// A software device takes its time: one case of each sort, at the scale where an absolute length would show.
+/// One case of each sort at the scale where an absolute length would show, since a software adapter is slow.
 #[test]
 fn extreme_cases_end_as_they_must_on_a_gpu() {
-    let gpu = match Gpu::open(&GpuOptions::default()) {
-        Ok(gpu) => gpu,
-        Err(error @ GpuError::NoAdapter) => {
-            let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
-            assert!(!required, "{error}");
-            eprintln!("skipped: {error}");
-            return;
-        }
-        Err(error) => panic!("{error}"),
-    };
     const ON_GPU: [&str; 11] = [
         "amplification 1e6, held a hundredfold, XPBD",
         "collapsed to a point, PBD",
@@ -59,11 +49,11 @@ fn extreme_cases_end_as_they_must_on_a_gpu() {
     let of_gpu = |case: &Case| ON_GPU.contains(&case.name.as_str());
     let cases: Vec<Case> = cases::all(Effort::Quick).into_iter().filter(of_gpu).collect();
     assert_eq!(cases.len(), ON_GPU.len());
-    check(|keep| stability::run_gpu(&gpu, "gpu", &cases, &[1e-3], keep));
+    gpu::on_each_adapter(|gpu| check(|keep| stability::run_gpu(gpu, "gpu", &cases, &[1e-3], keep)));
 }
 
 #[test]
-fn what_cannot_be_used_is_refused_by_name() {
-    let doors = stability::doors::all();
-    check(|keep| doors.into_iter().try_for_each(keep));
+fn wrong_inputs_are_refused_by_name() {
+    let trials = stability::input_validation::all();
+    check(|keep| trials.into_iter().try_for_each(keep));
 }

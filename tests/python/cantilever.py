@@ -1,31 +1,32 @@
 """P8: the bent beam by finite elements (scikit-fem), compared with Newton's method and the solver of Cutis at rest.
 
-Without arguments the cases of every day; with `--page FOLDER` all of them, also in real time, and the page and table
-`cantilever.md` and `cantilever.csv` in that folder. `CUTIS_CANTILEVER` names the program that bends the beams."""
+Without arguments: a few cases, as part of the tests. With `--json FILE`: all cases, also in real time, and all figures
+in that file; `cargo xtask study cantilever` makes the tables from it. `CUTIS_STUDY` names the program of the studies."""
 
 import json
 import os
+import platform
 import subprocess
 import sys
 import tempfile
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from _cantilever_fem import Beam, Solid, isotropic
 from _cantilever_moduli import effective
-from _cantilever_page import write_page
 from _compare import Tally
 
-# The end of the beam, and every vertex (RMS), may differ from the FEM's by this share of the displacement.
+# Largest difference of the end and of all vertices (RMS) from the FEM, as a share of the displacement.
 EXACT = 1e-6
-# So may the end in a run of the solver with short substeps.
+# The same for the end in a run of the solver with short substeps.
 CONVERGED = 1e-2
-# Single precision is held to that only where the strain that the weight causes is so many times the rounding of a cell's strain.
+# Single precision has to meet CONVERGED only if the strain due to the weight is this many times the rounding of a cell's strain.
 RESOLVED = 100.0
-# Sizes that Cutis keeps in single precision.
+# Relative difference of sizes, which Cutis keeps in single precision.
 SIZES = 1e-6
-# Analytic against numerical derivatives.
+# Relative difference of analytic and numerical derivatives.
 DERIVATIVES = 1e-7
 LOAD_STEPS = 4
 
@@ -36,12 +37,12 @@ def apart(found, reference):
 
 
 def beyond(label, difference, bound):
-    """What is wrong, as text; nothing if it is within the bound."""
+    """A list with one message, or an empty list if the difference is within the bound."""
     return [] if difference <= bound else [f"{label}: off by {difference:.1e}, more than {bound:.0e}"]
 
 
 def size_problems(ours, beam, corners):
-    """Volumes of tetrahedra, shares of edges and vertices: summed up anew from the mesh of scikit-fem."""
+    """Compares the volumes of tetrahedra, edges and vertices with sums over the mesh of scikit-fem."""
     volumes = beam.volumes
     vertices = np.zeros(len(ours["positions"]))
     np.add.at(vertices, corners.ravel(), np.tile(volumes / 4, 4))
@@ -64,7 +65,7 @@ def size_problems(ours, beam, corners):
 
 
 class Mesh:
-    """A mesh of the file, as both sides see it."""
+    """A mesh of the file in Cutis and in scikit-fem."""
 
     def __init__(self, ours):
         self.points = np.array(ours["positions"])
@@ -83,7 +84,7 @@ class Mesh:
 
 
 def solve(mesh, case, gravity):
-    """The FEM's answer: the solid, the coefficients at rest, and how it went."""
+    """The solution of the FEM: the solid, its coefficients at rest, and the end displacement with the iterations."""
     material = case["material"]
     youngs, bulk, density = (material[key] for key in ("youngs_pa", "bulk_pa", "density_kg_m3"))
     solid = Solid(mesh.beam, youngs, bulk, density, gravity)
@@ -92,7 +93,7 @@ def solve(mesh, case, gravity):
 
 
 def resolution(mesh, case, gravity):
-    """The strain ρgL/max(E, K) that the weight causes, over the strain of a cell that `f32` rounds away at the beam's length."""
+    """The strain ρgL/max(E, K) due to the weight, over the rounding of the strain of a cell in `f32` at the beam's length."""
     material = case["material"]
     strain = material["density_kg_m3"] * np.linalg.norm(gravity) * mesh.length / max(material["youngs_pa"], material["bulk_pa"])
     cell = np.cbrt(6 * mesh.beam.volumes.min())
@@ -100,7 +101,7 @@ def resolution(mesh, case, gravity):
 
 
 def small_strain(mesh, case, gravity):
-    """For orientation: the end by small-strain isotropic elasticity, and the moduli of the lattice that it was given."""
+    """The end displacement by small-strain isotropic elasticity, and the moduli of the lattice, for comparison."""
     material = case["material"]
     moduli = effective(material["youngs_pa"], material["bulk_pa"])
     u = isotropic(mesh.beam, moduli["lame_pa"], moduli["shear_pa"], material["density_kg_m3"], gravity)
@@ -108,7 +109,7 @@ def small_strain(mesh, case, gravity):
 
 
 def check_case(tally, mesh, case, gravity):
-    """Compares one case; gives the FEM's side of it."""
+    """Compares one case and returns the figures of the FEM."""
     name, newton = case["name"], case["newton"]
     solid, u, fem = solve(mesh, case, gravity)
     rng = np.random.default_rng(0)
@@ -119,13 +120,13 @@ def check_case(tally, mesh, case, gravity):
     fem["newton_end"] = apart(newton["displacement"], fem["displacement"])
     fem["newton_field"] = apart(field, mesh.beam.vectors(u))
     tally.check(f"{name}: Newton", beyond("end", fem["newton_end"], EXACT) + beyond("field", fem["newton_field"], EXACT))
-    # Ours counts the height from the origin of the coordinates, the FEM's from where the beam was.
+    # Cutis counts the height from the origin, the FEM from the rest shape.
     energy = solid.energy(u) - solid.load @ mesh.beam.field(mesh.points * ~mesh.held[:, None])
     tally.check(f"{name}: energy", beyond("energy", abs(newton["energy_j"] / energy - 1), EXACT))
     fem["f32_resolution"] = resolution(mesh, case, gravity)
     for run in case["converged"]:
-        run["held"] = run["precision"] == "f64" or fem["f32_resolution"] >= RESOLVED
-        if not run["held"]:
+        run["required"] = run["precision"] == "f64" or fem["f32_resolution"] >= RESOLVED
+        if not run["required"]:
             continue
         label = f"{name}: {run['backend']} {run['precision']}"
         if run["rest"] is None or not run["rest"]["at_rest"]:
@@ -134,7 +135,7 @@ def check_case(tally, mesh, case, gravity):
             tally.check(label, beyond("end", apart(run["rest"]["displacement"], fem["displacement"]), CONVERGED))
     for what, displacement in case["controls"].items():
         difference = apart(displacement, fem["displacement"])
-        # A tetrahedron more or less is a matter of the exact comparison, the others of both.
+        # One tetrahedron shows only in the exact comparison, the other faults show in both.
         bound = EXACT if what.startswith("one") else CONVERGED
         noticed = beyond(what, difference, bound)
         fem.setdefault("controls", {})[what] = difference
@@ -144,13 +145,13 @@ def check_case(tally, mesh, case, gravity):
 
 
 def main(arguments):
-    program = os.environ.get("CUTIS_CANTILEVER") or sys.exit("FAILED: CUTIS_CANTILEVER does not name the program")
-    page = Path(arguments[1]) if arguments[:1] == ["--page"] and len(arguments) == 2 else None
-    if arguments and page is None:
-        sys.exit(f"FAILED: {' '.join(arguments)}: only `--page FOLDER` is understood")
+    program = os.environ.get("CUTIS_STUDY") or sys.exit("FAILED: CUTIS_STUDY does not name the program of the studies")
+    output = Path(arguments[1]) if arguments[:1] == ["--json"] and len(arguments) == 2 else None
+    if arguments and output is None:
+        sys.exit(f"FAILED: {' '.join(arguments)}: the only option is `--json FILE`")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "cantilever.json"
-        subprocess.run([program, *([] if page else ["--quick"]), "--out", str(file)], check=True)
+        subprocess.run([program, "cantilever", *([] if output else ["--quick"]), "--beams", str(file)], check=True)
         found = json.loads(file.read_text())
     tally = Tally("bent beams, compared with scikit-fem")
     meshes = {key: Mesh(ours) for key, ours in found["beams"].items()}
@@ -159,8 +160,11 @@ def main(arguments):
         tally.check(f"mesh {key}: control", [] if all(mesh.controls) else ["wrong sizes were not noticed"])
     for case in found["cases"]:
         case["fem"] = check_case(tally, meshes[str(case["refinement"])], case, found["gravity_m_s2"])
-    if page and not tally.failed:
-        write_page(page, found)
+    if output and not tally.failed:
+        packages = ", ".join(f"{name} {version(name)}" for name in ("scikit-fem", "numpy", "scipy"))
+        found["python"] = f"Python {platform.python_version()}, {packages}"
+        found["beams"] = {}  # the meshes are large, and the tables do not need them
+        output.write_text(json.dumps(found))
     tally.finish()
 
 

@@ -3,18 +3,13 @@
 
 mod default_features;
 mod examples;
-mod leaving_out;
 mod lines;
 mod miri;
-mod mutations;
-mod parity;
 mod publish;
 mod python;
-mod results;
 mod steps;
 mod tidy;
 mod tools;
-mod tuning;
 mod unsafe_files;
 mod vulkan;
 mod workspace;
@@ -22,7 +17,6 @@ mod workspace;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
-use mutations::Choice;
 use steps::Selection;
 use workspace::Workspace;
 
@@ -40,22 +34,23 @@ usage: cargo xtask COMMAND
   python              compare outputs with nibabel and SimpleITK, and a bent beam with scikit-fem
   lines [--at REV]    count lines per tree and language, in the checkout or in a revision of git
   publish --dry-run   pack every crate as for crates.io and build it from its package
-  cantilever          compare a bent beam with scikit-fem: docs/results/cantilever.md
-  parity [OPTIONS]    the GPU backend compared with the CPU, operation by operation, on every adapter; `parity --help`
-                      lists the options, and the exit code is that of the comparison
-  parity-page         the same three ways, as it is, in small chunks and at full size: docs/results/parity.md
-  stability [OPTIONS] stiff and extreme cases on every backend at three length scales; `stability --help` lists the options, with
-                      --write: docs/results/stability.md; the exit code says whether every case ended as it must
-  accuracy [OPTIONS]  error against run time, for each problem and setting, against direct solutions in f64; `accuracy --help`
-                      lists the options, --write writes docs/results/accuracy.md
-  chainmail [OPTIONS] ChainMail on scans, and beside position-based dynamics; --write writes docs/results/chainmail.md; the exit code
-                      says whether all checks hold
-  mutations [TEXT]    faults put in on purpose, in a copy of the last commit, each of which a test must see: docs/results/;
-                      with a text only those whose description contains it, and nothing is written; with --suite NAME
-                      those that one suite of tests must see, and only its section is written
-  results             the main job on the phantom and the real volumes, with and without skin tension: docs/results/
-  leaving-out         what a region or a graded lattice saves and costs, against the whole body: docs/results/
-  tuning              `cutis tune` on the demo, and whether a full run keeps what it promises: docs/results/";
+  study NAME [OPTIONS]
+                      run a study; `study NAME --help` lists its options. With --write it writes its
+                      tables and charts into docs/results/NAME.md:
+      accuracy        error against run time for each problem and setting
+      stability       stiff and extreme cases on every backend at three length scales
+      parity          the GPU backend and the CPU backend, operation by operation
+      cantilever      a bent beam and scikit-fem; always writes its page
+      chainmail       ChainMail on scans, and position-based dynamics
+      main-job        the main job on the phantom and on real scans, with and without skin tension
+      region          cost and error of a region of interest and of a graded lattice
+      tuning          `cutis tune` on the demo, compared with a full run
+      mutations       deliberate faults that a test must see
+  accuracy, stability, parity, cantilever, chainmail [OPTIONS]
+                      short for `study NAME`
+  results, leaving-out, tuning, parity-page, mutations [--suite NAME]
+                      short for `study NAME --write` with the names main-job, region, tuning,
+                      parity and mutations; `mutations TEXT` tries only the faults with this text";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -69,8 +64,32 @@ fn main() -> ExitCode {
     }
 }
 
+/// The study that a command starts, with its options.
+fn study<'a>(words: &[&'a str]) -> Option<(&'a str, Vec<&'a str>)> {
+    Some(match words {
+        ["study", name, options @ ..] => (name, options.to_vec()),
+        [name @ ("accuracy" | "stability" | "parity" | "cantilever" | "chainmail"), options @ ..] => {
+            (name, options.to_vec())
+        }
+        ["results"] => ("main-job", vec!["--write"]),
+        ["leaving-out"] => ("region", vec!["--write"]),
+        ["tuning"] => ("tuning", vec!["--write"]),
+        ["parity-page"] => ("parity", vec!["--write"]),
+        ["mutations"] => ("mutations", vec!["--write"]),
+        ["mutations", "--suite", suite] => ("mutations", vec!["--suite", suite, "--write"]),
+        ["mutations", options @ ..] => ("mutations", options.to_vec()),
+        _ => return None,
+    })
+}
+
 fn dispatch(words: &[&str]) -> Result<ExitCode> {
     let workspace = Workspace::find()?;
+    if let Some((name, options)) = study(words) {
+        return match (name, &options[..]) {
+            ("cantilever", []) => steps::cantilever(&workspace).map(|()| ExitCode::SUCCESS),
+            _ => workspace::exit_code(&mut steps::study_command(&workspace, name, &options)),
+        };
+    }
     match words {
         ["test"] => steps::run_all(&workspace, Selection::All),
         ["test", "--quick"] => steps::run_all(&workspace, Selection::Quick),
@@ -86,26 +105,6 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["lines"] => lines::run(&workspace, None),
         ["lines", "--at", revision] => lines::run(&workspace, Some(revision)),
         ["python"] => steps::build_for_python(&workspace).and_then(|()| python::run(&workspace)),
-        ["cantilever"] => steps::cantilever(&workspace),
-        ["parity", arguments @ ..] => {
-            return workspace::exit_code(&mut steps::parity_command(&workspace, arguments));
-        }
-        ["stability", arguments @ ..] => {
-            return workspace::exit_code(&mut steps::stability_command(&workspace, arguments));
-        }
-        ["accuracy", arguments @ ..] => {
-            return workspace::exit_code(&mut steps::accuracy_command(&workspace, arguments));
-        }
-        ["chainmail", arguments @ ..] => {
-            return workspace::exit_code(&mut steps::chainmail_command(&workspace, arguments));
-        }
-        ["parity-page"] => parity::run(&workspace),
-        ["mutations"] => mutations::run(&workspace, Choice::All),
-        ["mutations", "--suite", name] => mutations::run(&workspace, Choice::Suite(name)),
-        ["mutations", text] => mutations::run(&workspace, Choice::Containing(text)),
-        ["results"] => steps::build_program(&workspace).and_then(|()| results::run(&workspace)),
-        ["leaving-out"] => steps::build_program(&workspace).and_then(|()| leaving_out::run(&workspace)),
-        ["tuning"] => steps::build_program(&workspace).and_then(|()| tuning::run(&workspace)),
         ["publish", "--dry-run"] => publish::dry_run(&workspace),
         ["publish"] => bail!(
             "`cargo xtask` only offers `publish --dry-run`; make a release with `cargo publish --workspace`"
@@ -117,4 +116,18 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         other => bail!("unknown command `{}`\n\n{USAGE}", other.join(" ")),
     }
     .map(|()| ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_commands_start_the_same_studies() {
+        assert_eq!(study(&["study", "parity", "--quick"]), study(&["parity", "--quick"]));
+        assert_eq!(study(&["results"]), Some(("main-job", vec!["--write"])));
+        assert_eq!(study(&["mutations", "sign"]), Some(("mutations", vec!["sign"])));
+        assert_eq!(study(&["mutations"]), study(&["study", "mutations", "--write"]));
+        assert_eq!(study(&["test"]), None);
+    }
 }

@@ -13,9 +13,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     for script in scripts(&workspace.root.join("tests/python"))? {
         let mut command = check(workspace, &script)?;
         execute(
-            command
-                .env("CUTIS_PROGRAM", workspace.program()?)
-                .env("CUTIS_CANTILEVER", workspace.cantilever("debug")?),
+            command.env("CUTIS_PROGRAM", workspace.program()?).env("CUTIS_STUDY", workspace.study("debug")?),
         )?;
     }
     Ok(())

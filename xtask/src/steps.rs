@@ -162,39 +162,16 @@ fn third_party(workspace: &Workspace) -> Result<()> {
     execute(vulkan::for_gpu_tests(&mut cargo("test")))
 }
 
-/// The comparison of the backends that `cargo xtask parity` runs.
-pub fn parity_command(workspace: &Workspace, arguments: &[&str]) -> Command {
+/// Studies that measure time in their own process and need a release build.
+const TIMED_STUDIES: [&str; 2] = ["accuracy", "chainmail"];
+
+/// `cargo run` of a study.
+pub fn study_command(workspace: &Workspace, name: &str, options: &[&str]) -> Command {
     let mut command = workspace.cargo("run");
-    command.args(["--quiet", "--package", "cutis-tests", "--bin", "parity", "--"]).args(arguments);
-    vulkan::for_gpu_tests(&mut command);
-    command
-}
-
-/// The stability suite that `cargo xtask stability` runs.
-pub fn stability_command(workspace: &Workspace, arguments: &[&str]) -> Command {
-    let mut command = workspace.cargo("run");
-    command.args(["--quiet", "--package", "cutis-tests", "--bin", "stability", "--"]).args(arguments);
-    vulkan::for_gpu_tests(&mut command);
-    command
-}
-
-/// The measurement of error against run time that `cargo xtask accuracy` runs. A release build,
-/// because it measures times.
-pub fn accuracy_command(workspace: &Workspace, arguments: &[&str]) -> Command {
-    released(workspace, "accuracy", arguments)
-}
-
-/// ChainMail on scans that `cargo xtask chainmail` runs. A release build, because it measures
-/// times.
-pub fn chainmail_command(workspace: &Workspace, arguments: &[&str]) -> Command {
-    released(workspace, "chainmail", arguments)
-}
-
-/// A program of `cutis-tests` that measures times.
-fn released(workspace: &Workspace, program: &str, arguments: &[&str]) -> Command {
-    let mut command = workspace.cargo("run");
-    let build = ["--quiet", "--release", "--package", "cutis-tests", "--bin", program, "--"];
-    command.args(build).args(arguments);
+    if TIMED_STUDIES.contains(&name) {
+        command.arg("--release");
+    }
+    command.args(["--quiet", "--package", "cutis-studies", "--bin", "study", "--", name]).args(options);
     vulkan::for_gpu_tests(&mut command);
     command
 }
@@ -205,7 +182,8 @@ fn released(workspace: &Workspace, program: &str, arguments: &[&str]) -> Command
 /// workspace.
 fn parity(workspace: &Workspace) -> Result<()> {
     for arguments in [&["--quick"][..], &["--quick", "--chunk-cap", "200", "--baseline-limits"]] {
-        execute(vulkan::for_gpu_tests(workspace.command(workspace.parity()?).args(arguments)))?;
+        let mut command = workspace.command(workspace.study("debug")?);
+        execute(vulkan::for_gpu_tests(command.arg("parity").args(arguments)))?;
     }
     Ok(())
 }
@@ -216,23 +194,25 @@ fn documentation(workspace: &Workspace) -> Result<()> {
     execute(command.args(["--workspace", "--lib", "--no-deps", "--quiet"]).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Builds the programs that the Python checks run.
+/// Builds the programs of the Python checks: the release program and the studies.
 pub fn build_for_python(workspace: &Workspace) -> Result<()> {
     build_program(workspace)?;
-    build_cantilever(workspace, &[])
+    build_studies(workspace, &[])
 }
 
-fn build_cantilever(workspace: &Workspace, more: &[&str]) -> Result<()> {
-    execute(workspace.cargo("build").args(["--package", "cutis-tests", "--bin", "cantilever"]).args(more))
+fn build_studies(workspace: &Workspace, more: &[&str]) -> Result<()> {
+    execute(workspace.cargo("build").args(["--package", "cutis-studies", "--bin", "study"]).args(more))
 }
 
-/// Compares beams bent by the solver with an independent FEM, and writes
-/// `docs/results/cantilever.md` with its table.
+/// The study `cantilever`: bends all beams by the solver and by the FEM of the Python check, and writes the page.
 pub fn cantilever(workspace: &Workspace) -> Result<()> {
-    build_cantilever(workspace, &["--release"])?;
+    build_studies(workspace, &["--release"])?;
+    let study = workspace.study("release")?;
+    let compared = workspace.target_dir()?.join("cantilever.json");
     let mut command = python::check(workspace, &workspace.root.join("tests/python/cantilever.py"))?;
-    command.env("CUTIS_CANTILEVER", workspace.cantilever("release")?).args(["--page", "docs/results"]);
-    execute(vulkan::for_gpu_tests(&mut command))
+    command.env("CUTIS_STUDY", &study).arg("--json").arg(&compared);
+    execute(vulkan::for_gpu_tests(&mut command))?;
+    execute(workspace.command(study).args(["cantilever", "--compared"]).arg(&compared))
 }
 
 /// Builds the release program.

@@ -98,39 +98,14 @@ impl Workspace {
         serde_json::from_slice(&output.stdout).context("cargo metadata did not print JSON")
     }
 
-    /// The commit of the checkout, with a mark if there are changes since.
-    pub fn commit(&self) -> Result<String> {
-        let words = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"];
-        let output = self.command("git").args(words).output().context("cannot start git")?;
-        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    }
-
-    /// The `cutis` program of the release build.
+    /// The released `cutis` program.
     pub fn program(&self) -> Result<PathBuf> {
         self.built("release/cutis", "cargo build --release -p cutis-cli")
     }
 
-    /// Runs the `cutis` program of the release build and returns its output. The error holds its
-    /// messages.
-    pub fn run_program(&self, arguments: impl FnOnce(&mut Command)) -> Result<Vec<u8>> {
-        let mut command = self.command(self.program()?);
-        arguments(&mut command);
-        let output = command.output().context("cannot start the program")?;
-        if !output.status.success() {
-            bail!("{command:?} failed: {}", String::from_utf8_lossy(&output.stderr).trim());
-        }
-        Ok(output.stdout)
-    }
-
-    /// The program that compares the backends. The tests of the workspace build it.
-    pub fn parity(&self) -> Result<PathBuf> {
-        self.built("debug/parity", "cargo test --workspace --no-run")
-    }
-
-    /// The program that bends beams for the independent FEM. The tests of the workspace build it in
-    /// the profile `debug`.
-    pub fn cantilever(&self, profile: &str) -> Result<PathBuf> {
-        self.built(&format!("{profile}/cantilever"), "cargo build -p cutis-tests --bin cantilever")
+    /// The program of the studies. `cargo test --workspace` builds it with the profile `debug`.
+    pub fn study(&self, profile: &str) -> Result<PathBuf> {
+        self.built(&format!("{profile}/study"), "cargo build -p cutis-studies --bin study")
     }
 
     /// A program in the build folder. If it is missing, the error names the command that builds it.
@@ -142,21 +117,7 @@ impl Workspace {
         Ok(program)
     }
 
-    /// The folder of real volumes: `CUTIS_TEST_DATA`, or else `shared/data` in the parent folder of
-    /// the checkout. `None` if it does not exist; in CI this is an error.
-    pub fn test_data(&self) -> Result<Option<PathBuf>> {
-        let folder = std::env::var_os("CUTIS_TEST_DATA")
-            .map_or_else(|| self.root.join("../shared/data"), PathBuf::from);
-        match folder.is_dir() {
-            true => Ok(Some(folder)),
-            false if self.ci => {
-                bail!("{} is missing; CI needs the real volumes", folder.display())
-            }
-            false => Ok(None),
-        }
-    }
-
-    /// The build folder, which follows `CARGO_TARGET_DIR`.
+    /// Where builds go; follows `CARGO_TARGET_DIR`.
     pub fn target_dir(&self) -> Result<PathBuf> {
         let metadata = self.metadata(&self.root.join("Cargo.toml"), Scope::Members)?;
         let folder =

@@ -5,7 +5,7 @@
 //! length; times grow with the root.
 
 use cutis_constraints::Scalar;
-use cutis_tests::cantilever::{Beam, GRAVITY_M_S2, Material, converged, settle};
+use cutis_studies::cantilever::{Beam, GRAVITY_M_S2, Material, converged, settle};
 
 use super::{SCALES, Start, at_most, cpu, on_each_adapter, within};
 

@@ -6,7 +6,7 @@
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, SkinTension};
 use cutis_solver::{Stiffness, SystemBuilder, Values};
-use cutis_tests::sheet::{ROW, Sheet};
+use cutis_studies::sheet::{ROW, Sheet};
 use nalgebra::{Matrix2, Point3};
 
 use super::{SCALES, within};

@@ -4,7 +4,7 @@ use cutis_coloring::greedy;
 use cutis_constraints::{Distance, SkinTension};
 use cutis_newton::{Options, Problem};
 use cutis_solver::{Stiffness, SystemBuilder};
-use cutis_tests::sheet::Sheet;
+use cutis_studies::sheet::Sheet;
 
 use super::{SCALES, scaled};
 

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, SQRT_2};
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, SkinTension};
 use cutis_solver::{Formulation, Settings, Stiffness, SystemBuilder};
-use cutis_tests::sheet::Sheet;
+use cutis_studies::sheet::Sheet;
 
 use super::{SCALES, Start, cpu, in_double, in_single, positions, scaled, within};
 

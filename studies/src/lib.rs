@@ -1,0 +1,38 @@
+//! Studies: what was measured, one module for each page of `docs/results`. `cargo xtask study NAME` runs one.
+//!
+//! The figures are for readers. What must hold after every change is in `tests/`, which uses the problems of this crate.
+
+pub mod accuracy;
+pub mod cantilever;
+pub mod chainmail;
+pub mod kit;
+pub mod main_job;
+pub mod mutations;
+pub mod parity;
+pub mod region;
+pub mod sheet;
+pub mod stability;
+pub mod tuning;
+
+#[cfg(test)]
+mod tests {
+    use crate::kit::Page;
+
+    /// A study that ends with a page that it cannot write would have measured for nothing.
+    #[test]
+    fn every_page_has_the_tables_of_its_study() {
+        for (name, tables) in [
+            ("accuracy", &crate::accuracy::TABLES[..]),
+            ("cantilever", &crate::cantilever::TABLES),
+            ("chainmail", &crate::chainmail::TABLES),
+            ("main-job", &crate::main_job::TABLES),
+            ("parity", &crate::parity::TABLES),
+            ("region", &crate::region::TABLES),
+            ("stability", &crate::stability::TABLES),
+            ("tuning", &crate::tuning::TABLES),
+        ] {
+            Page::open(name, tables).unwrap();
+        }
+        Page::open("mutations", &crate::mutations::tables()).unwrap();
+    }
+}

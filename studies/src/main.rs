@@ -1,0 +1,52 @@
+//! The program behind `cargo xtask study`.
+
+use std::io::{Write, stdout};
+use std::process::ExitCode;
+
+use clap::Parser;
+use cutis_studies::kit::Failure;
+use cutis_studies::{
+    accuracy, cantilever, chainmail, main_job, mutations, parity, region, stability, tuning,
+};
+
+/// A study and its options.
+#[derive(Debug, Parser)]
+#[command(name = "study", bin_name = "cargo xtask study")]
+enum Study {
+    Accuracy(accuracy::Options),
+    Cantilever(cantilever::Options),
+    Chainmail(chainmail::Options),
+    MainJob(main_job::Options),
+    Mutations(mutations::Options),
+    Parity(parity::Options),
+    Region(region::Options),
+    Stability(stability::Options),
+    Tuning(tuning::Options),
+}
+
+impl Study {
+    fn run(&self, out: &mut dyn Write) -> Result<bool, Failure> {
+        match self {
+            Self::Accuracy(options) => accuracy::run(options, out),
+            Self::Cantilever(options) => cantilever::run(options, out),
+            Self::Chainmail(options) => chainmail::run(options, out),
+            Self::MainJob(options) => main_job::run(options, out),
+            Self::Mutations(options) => mutations::run(options, out),
+            Self::Parity(options) => parity::run(options, out),
+            Self::Region(options) => region::run(options, out),
+            Self::Stability(options) => stability::run(options, out),
+            Self::Tuning(options) => tuning::run(options, out),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    match Study::parse().run(&mut stdout()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("\nerror: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Bodies for kernels and long runs: a lattice with any choice of kinds, in either formulation.
+
+use cutis_coloring::greedy;
+use cutis_constraints::{
+    Distance, SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Volume,
+};
+use cutis_solver::{Formulation, Handle, Stiffness, System, SystemBuilder, Values};
+use nalgebra::{Point3, Vector3};
+
+use super::bench::Failure;
+use cutis_test_kit::Kuhn;
+
+/// Length of a lattice step in m.
+pub const STEP: f64 = 0.1;
+
+/// A kind of constraint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConstraintKind {
+    /// Along the edges.
+    Distance,
+    /// Of the tetrahedra.
+    Volume,
+    /// On a part of the faces.
+    SkinTension,
+    /// The same, in the paper's form; PBD only.
+    SkinTensionPaper,
+}
+
+impl ConstraintKind {
+    /// All kinds.
+    pub const ALL: [Self; 4] = [Self::Distance, Self::Volume, Self::SkinTension, Self::SkinTensionPaper];
+
+    /// Whether it can be run with a formulation.
+    pub fn fits(self, formulation: Formulation) -> bool {
+        self != Self::SkinTensionPaper || formulation == Formulation::Pbd
+    }
+}
+
+/// What a body is made of.
+#[derive(Clone, Debug)]
+pub struct Plan<'a> {
+    /// Vertices along each axis.
+    pub size: [usize; 3],
+    /// Formulation of the stiffness.
+    pub formulation: Formulation,
+    /// Kinds, in order.
+    pub kinds: &'a [ConstraintKind],
+    /// A stiffness for each constraint, or one for all.
+    pub each: bool,
+    /// Whether the face at x = 0 is fixed; a body that is free has momentum.
+    pub fixed: bool,
+    /// Whether two edges of the opposite face are dragged.
+    pub handles: bool,
+    /// Factor on the compliances; at 1 a substep of 1 ms takes about half of an error back.
+    pub softness: f64,
+}
+
+impl Plan<'_> {
+    /// The body at rest.
+    ///
+    /// # Errors
+    /// What the builder refuses.
+    pub fn system(&self) -> Result<System<f32>, Failure> {
+        let lattice = Kuhn::new(self.size, STEP);
+        let count = lattice.positions.len();
+        let [nx, ny, _] = self.size;
+        let inverse_mass = |n: usize| match self.fixed && n.is_multiple_of(nx) {
+            true => 0.0,
+            false => 0.5 + (n % 7) as f64,
+        };
+        let masses: Vec<f64> = (0..count).map(inverse_mass).collect();
+        // Vertices that lie away from the origin by no round number, as real ones do.
+        let positions: Vec<Point3<f64>> =
+            lattice.positions.iter().map(|p| p + Vector3::new(-0.43, 0.117, 0.0291)).collect();
+        let faces: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(5).collect();
+        let mut builder = SystemBuilder::<f32>::new(&positions, &masses)?;
+        for &kind in self.kinds {
+            builder = match kind {
+                ConstraintKind::Distance => {
+                    let groups = greedy(&lattice.edges, count)?;
+                    let stiffness = self.stiffness(lattice.edges.len(), 1e-5);
+                    builder.add_from_rest::<Distance, 2>(
+                        &lattice.edges,
+                        &Default::default(),
+                        stiffness,
+                        &groups,
+                    )?
+                }
+                ConstraintKind::Volume => {
+                    let groups = greedy(&lattice.tets, count)?;
+                    let stiffness = self.stiffness(lattice.tets.len(), 1e-10);
+                    builder.add_from_rest::<Volume, 4>(
+                        &lattice.tets,
+                        &Default::default(),
+                        stiffness,
+                        &groups,
+                    )?
+                }
+                ConstraintKind::SkinTension => {
+                    let material = SkinTensionMaterial { rest_area_scale: 0.8, amplification: 2.0 };
+                    let groups = greedy(&faces, count)?;
+                    let stiffness = self.stiffness(faces.len(), 5e-8);
+                    builder.add_from_rest::<SkinTension, 3>(&faces, &material, stiffness, &groups)?
+                }
+                ConstraintKind::SkinTensionPaper => {
+                    let material = SkinTensionPaperMaterial::for_stiffness(0.9, 0.8, 2.0)?;
+                    let groups = greedy(&faces, count)?;
+                    let stiffness = self.stiffness(faces.len(), 0.0);
+                    builder.add_from_rest::<SkinTensionPaper, 3>(&faces, &material, stiffness, &groups)?
+                }
+            };
+        }
+        if self.handles {
+            for row in [0, ny - 1] {
+                let vertices =
+                    (0..count as u32).filter(|&n| n as usize % nx == nx - 1 && n as usize / nx % ny == row);
+                let (vertices, over_s) = (vertices.collect(), 0.03 + row as f64);
+                builder = builder.handle(Handle { vertices, move_m: [0.1, 0.23, -0.07], over_s })?;
+            }
+        }
+        Ok(builder.build())
+    }
+
+    fn stiffness(&self, count: usize, compliance: f64) -> Stiffness<f32> {
+        let unit = match self.formulation {
+            Formulation::Pbd => 0.3,
+            Formulation::Xpbd | Formulation::Vbd => compliance * self.softness,
+        };
+        let value = |n: usize| (unit * (1 + n % 3) as f64) as f32;
+        let values = match self.each {
+            true => Values::Each((0..count).map(value).collect()),
+            false => Values::Uniform(value(0)),
+        };
+        match self.formulation {
+            Formulation::Pbd => Stiffness::Pbd(values),
+            Formulation::Xpbd | Formulation::Vbd => Stiffness::Compliance(values),
+        }
+    }
+
+    /// Diagonal of the body in m.
+    pub fn extent(&self) -> f64 {
+        STEP * self.size.iter().map(|&n| (n * n) as f64).sum::<f64>().sqrt()
+    }
+}

@@ -1,0 +1,131 @@
+//! Scenes of the outer ring.
+
+use cutis::scene::{FormulationChoice, HandleSection, OutputSection, StcForm};
+use cutis::{LoadedScene, Override, Scene};
+
+use crate::kit::scene;
+use crate::parity::bench::{Effort, Failure};
+
+/// A named scene.
+pub struct SceneCase {
+    pub name: String,
+    pub loaded: LoadedScene,
+}
+
+impl SceneCase {
+    /// A scene with this number of frames. The only output is the deformed volume, if `volume`.
+    fn new(name: &str, mut loaded: LoadedScene, frames: u32, volume: bool) -> Self {
+        loaded.scene.run.frames = frames;
+        loaded.scene.run.checkpoint_every = frames;
+        loaded.scene.output =
+            OutputSection { volume, surface: false, tissue: false, pictures: false, report: false };
+        Self { name: name.into(), loaded }
+    }
+}
+
+/// The demo, an abdomen, a handle, and every kind of constraint alone and all together.
+pub fn all(effort: Effort) -> Result<Vec<SceneCase>, Failure> {
+    let quick = effort == Effort::Quick;
+    let frames = if quick { 2 } else { 5 };
+    let (size, spacing) = if quick { ("[64, 64, 48]", "12.0") } else { ("[96, 96, 64]", "8.0") };
+    let phantom = format!("{{ size = {size}, seed = 1 }}");
+    let coarse =
+        [("volume.phantom", phantom.as_str()), ("lattice.spacing_mm", spacing), ("solver.substeps", "5")];
+    let mut cases = vec![
+        SceneCase::new("demo, coarse", cutis::demo(&set(&coarse))?, frames, true),
+        SceneCase::new("demo, coarse, PBD", pbd(cutis::demo(&set(&coarse))?), frames, false),
+        SceneCase::new("demo, coarse, VBD", vbd(cutis::demo(&set(&coarse))?), frames, false),
+        SceneCase::new("demo, coarse, 3 iterations", iterated(cutis::demo(&set(&coarse))?), frames, false),
+        abdomen(quick, frames)?,
+        handle(frames)?,
+    ];
+    if effort == Effort::Full {
+        cases.push(SceneCase::new("demo as it is", cutis::demo(&[])?, 40, true));
+    }
+    cases.extend(kinds(frames)?);
+    Ok(cases)
+}
+
+/// The cut abdomen of a CT, or of the phantom if the CT is missing.
+fn abdomen(quick: bool, frames: u32) -> Result<SceneCase, Failure> {
+    let ct = cutis_test_kit::scans::folder().join("ct/abdomen_ts_122x101x112.nii.gz");
+    if !ct.is_file() {
+        let loaded = fixture("phantom-small", &[])?;
+        return Ok(SceneCase::new("abdomen (phantom: no CT at hand)", loaded, frames, true));
+    }
+    let path = ct.to_string_lossy();
+    let spacing = if quick { "15.0" } else { "9.0" };
+    let overrides =
+        [("volume.path", path.as_ref()), ("lattice.spacing_mm", spacing), ("solver.substeps", "5")];
+    Ok(SceneCase::new("abdomen of a CT, cut", fixture("abdomen-incision", &overrides)?, frames, true))
+}
+
+/// Skin next to the incision is dragged up and to the side.
+fn handle(frames: u32) -> Result<SceneCase, Failure> {
+    let mut loaded = fixture("phantom-small", SMALL)?;
+    let (at_mm, move_mm) = ([-30.0, 105.0, 0.0], [0.0, 15.0, 5.0]);
+    loaded.scene.handle.push(HandleSection { at_mm, radius_mm: 30.0, move_mm, over_s: 0.05 });
+    Ok(SceneCase::new("dragged handle", loaded, frames, false))
+}
+
+/// A body of a few hundred vertices.
+const SMALL: &[(&str, &str)] = &[
+    ("volume.phantom", "{ size = [48, 48, 32], seed = 1 }"),
+    ("lattice.spacing_mm", "16.0"),
+    ("solver.substeps", "4"),
+    ("solver.gravity_m_s2", "[0.7, -9.81, 1.3]"),
+];
+
+/// Each kind of constraint alone and all together, in all formulations. Gravity loads them.
+fn kinds(frames: u32) -> Result<Vec<SceneCase>, Failure> {
+    let mut cases = Vec::new();
+    for (formula, formulation) in
+        [("XPBD", FormulationChoice::Xpbd), ("PBD", FormulationChoice::Pbd), ("VBD", FormulationChoice::Vbd)]
+    {
+        for (kind, kept) in [
+            ("distance", [true, false, false]),
+            ("volume", [false, true, false]),
+            ("skin tension", [false, false, true]),
+            ("all kinds", [true; 3]),
+        ] {
+            let mut loaded = fixture("phantom-small", SMALL)?;
+            loaded.scene.solver.formulation = formulation;
+            let constraints = &mut loaded.scene.constraints;
+            constraints.distance = constraints.distance.take().filter(|_| kept[0]);
+            constraints.volume = constraints.volume.take().filter(|_| kept[1]);
+            constraints.stc = constraints.stc.take().filter(|_| kept[2]);
+            cases.push(SceneCase::new(&format!("{kind}, {formula}"), loaded, frames, false));
+        }
+    }
+    let mut loaded = pbd(fixture("phantom-small", SMALL)?);
+    if let Some(stc) = &mut loaded.scene.constraints.stc {
+        (stc.form, stc.stiffness) = (StcForm::Paper, 0.5);
+    }
+    (loaded.scene.constraints.distance, loaded.scene.constraints.volume) = (None, None);
+    cases.push(SceneCase::new("skin tension of the paper, PBD", loaded, frames, false));
+    Ok(cases)
+}
+
+fn pbd(mut loaded: LoadedScene) -> LoadedScene {
+    loaded.scene.solver.formulation = FormulationChoice::Pbd;
+    loaded
+}
+
+fn vbd(mut loaded: LoadedScene) -> LoadedScene {
+    loaded.scene.solver.formulation = FormulationChoice::Vbd;
+    (loaded.scene.solver.iterations, loaded.scene.solver.relaxation) = (2, 1.3);
+    loaded
+}
+
+fn iterated(mut loaded: LoadedScene) -> LoadedScene {
+    (loaded.scene.solver.substeps, loaded.scene.solver.iterations) = (2, 3);
+    loaded
+}
+
+fn fixture(name: &str, overrides: &[(&str, &str)]) -> Result<LoadedScene, Failure> {
+    Ok(Scene::load(&scene(name), &set(overrides))?)
+}
+
+fn set(overrides: &[(&str, &str)]) -> Vec<Override> {
+    overrides.iter().map(|&(key, value)| Override { key: key.into(), value: value.into() }).collect()
+}

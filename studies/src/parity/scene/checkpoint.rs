@@ -1,0 +1,43 @@
+//! The state in a checkpoint, as far as it is compared: its layout is described in `crates/cutis/src/run/checkpoint.rs`.
+
+use std::path::Path;
+
+use anyhow::bail;
+
+use crate::parity::bench::Failure;
+
+const MAGIC: &[u8] = b"CUTISCP2";
+/// Magic, fingerprint, frame, number of vertices.
+const HEADER: usize = 8 + 32 + 4 + 8;
+/// The checksum behind the state.
+const SEAL: usize = 32;
+
+/// Positions in local meters and velocities in m/s, x, y, z of each vertex in turn.
+pub struct State {
+    pub positions: Vec<f32>,
+    pub velocities: Vec<f32>,
+}
+
+impl State {
+    /// The state that a run left.
+    ///
+    /// # Errors
+    /// No such file, or one of another layout.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let bytes = std::fs::read(path)?;
+        let numbers = bytes.len().checked_sub(HEADER + SEAL).filter(|n| n % 24 == 0);
+        let (Some(length), true) = (numbers, bytes.starts_with(MAGIC)) else {
+            bail!("{} is not a checkpoint of the known layout", path.display());
+        };
+        let state = &bytes[HEADER..HEADER + length];
+        let mut values: Vec<f32> =
+            state.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let velocities = values.split_off(values.len() / 2);
+        Ok(Self { positions: values, velocities })
+    }
+
+    /// Largest coordinate in m; the origin is in the middle of the body.
+    pub fn extent(&self) -> f64 {
+        self.positions.iter().fold(0.0, |most: f64, &x| most.max(f64::from(x).abs()))
+    }
+}

@@ -1,0 +1,177 @@
+//! Cost and error of a region of interest and of a graded lattice, compared with the whole body, on the phantom and on a real
+//! abdomen.
+
+use std::io::Write;
+
+use anyhow::{Context, ensure};
+use clap::Parser;
+use serde_json::Value;
+
+use crate::kit::{
+    Checks, Failure, Page, Program, Provenance, Table, number_at, optional, results, scene, target_dir,
+};
+use crate::main_job::{SCENES, volume};
+
+/// Measures cost and error of regions of interest and graded lattices.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "region", bin_name = "cargo xtask study region")]
+pub struct Options {
+    /// Write the tables of docs/results/region.md. Needs all scans.
+    #[arg(long)]
+    pub write: bool,
+}
+
+/// Number of scenes of the main job in this study.
+const COMPARED: usize = 2;
+/// Tables of the page.
+pub const TABLES: [&str; 4] = ["provenance", "demo", "abdomen-incision", "checks"];
+
+/// Region and grading of each variant, as TOML. The first is the whole body, then the regions by size.
+const VARIANTS: [(Option<&str>, Option<&str>); 15] = [
+    (None, None),
+    (Some("{ around_mm = 20 }"), None),
+    (Some("{ around_mm = 30 }"), None),
+    (Some("{ around_mm = 40 }"), None),
+    (Some("{ around_mm = 60 }"), None),
+    (Some("{ around_mm = 80 }"), None),
+    (Some("{ around_mm = 120 }"), None),
+    (None, Some("{ around_mm = 20, growth = 1.5, coarsest = 4 }")),
+    (None, Some("{ around_mm = 40, growth = 1.2, coarsest = 2 }")),
+    (None, Some("{ around_mm = 40, growth = 1.5, coarsest = 4 }")),
+    (None, Some("{ around_mm = 40, growth = 2, coarsest = 8 }")),
+    (None, Some("{ around_mm = 80, growth = 1.5, coarsest = 4 }")),
+    (Some("{ around_mm = 60 }"), Some("{ around_mm = 20, growth = 1.5, coarsest = 4 }")),
+    (Some("{ around_mm = 80 }"), Some("{ around_mm = 40, growth = 1.5, coarsest = 4 }")),
+    (Some("{ around_mm = 120 }"), Some("{ around_mm = 40, growth = 1.5, coarsest = 4 }")),
+];
+/// Index of the smallest and of the largest region.
+const REGIONS: [usize; 2] = [1, 6];
+/// Frames of the second run of each variant, which only measures time.
+const TIMED_FRAMES: &str = "10";
+
+/// Runs the scenes with each variant. Returns whether all checks hold.
+///
+/// # Errors
+/// The program fails, a scan is missing with `--write`, or a file cannot be written.
+pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    let mut page = options.write.then(|| Page::open("region", &TABLES)).transpose()?;
+    let provenance = Provenance::start(if options.write { "region --write" } else { "region" });
+    let program = Program::build()?;
+    let folder = target_dir()?.join("studies/region");
+    let mut checks = Checks::default();
+    for (name, scan) in SCENES.into_iter().take(COMPARED) {
+        let Some(own) = volume(scan) else {
+            ensure!(!options.write, "{name}: the page needs all scans (set CUTIS_TEST_DATA)");
+            continue;
+        };
+        let simulate = |(region, grading): (Option<&str>, Option<&str>), options: &[&str]| {
+            let mut set = vec!["output={report=true}".to_owned(), "solver.backend=cpu".to_owned()];
+            set.extend(own.iter().cloned());
+            set.extend(region.map(|region| format!("lattice.region={region}")));
+            set.extend(grading.map(|grading| format!("lattice.grading={grading}")));
+            program.scene(&scene(name), &set, options, &folder)
+        };
+        let mut variants = Vec::new();
+        for (region, grading) in VARIANTS {
+            variants.push(Variant::of(region, grading, &simulate((region, grading), &[])?)?);
+        }
+        // A second run in the opposite order, since other programs may slow down parts of the first.
+        for (&choice, variant) in VARIANTS.iter().zip(&mut variants).rev() {
+            let again = simulate(choice, &["--frames", TIMED_FRAMES])?;
+            variant.ms_min = variant.ms_min.min(number_at(&again, "/frames/ms_min")?);
+        }
+        check(name, &variants, &mut checks);
+        let table = table(&variants).markdown();
+        writeln!(out, "{name}\n\n{table}")?;
+        if let Some(page) = &mut page {
+            page.set(name, &table)?;
+        }
+    }
+    checks.print(out)?;
+    if let Some(mut page) = page.filter(|_| checks.pass()) {
+        page.set("provenance", &provenance.markdown())?;
+        page.set("checks", &checks.summary())?;
+        page.save(&results())?;
+    }
+    Ok(checks.pass())
+}
+
+/// Results of one variant.
+struct Variant {
+    region: String,
+    grading: String,
+    tets: f64,
+    memory_mb: f64,
+    ms_min: f64,
+    growth_mm: f64,
+    /// Largest displacement next to frozen vertices. `None` if nothing is frozen.
+    border_mm: Option<f64>,
+    largest_mm: f64,
+}
+
+impl Variant {
+    fn of(region: Option<&str>, grading: Option<&str>, report: &Value) -> Result<Self, Failure> {
+        let number = |pointer: &str| number_at(report, pointer);
+        let memory = report["memory"].as_array().context("the report has no memory")?;
+        let text = |toml: Option<&str>| toml.map_or("none", |text| text.trim_matches(['{', '}', ' '])).into();
+        Ok(Self {
+            region: text(region),
+            grading: text(grading),
+            tets: number("/sizes/tets")?,
+            memory_mb: memory.iter().filter_map(|part| part["bytes"].as_f64()).sum::<f64>() / 1e6,
+            ms_min: number("/frames/ms_min")?,
+            growth_mm: number("/wound/final_mm")? - number("/wound/initial_mm")?,
+            border_mm: report["border_displacement_mm"].as_f64(),
+            largest_mm: number("/max_displacement_mm")?,
+        })
+    }
+
+    /// Relative difference of the growth from the growth of the whole body.
+    fn error(&self, whole: &Self) -> f64 {
+        self.growth_mm / whole.growth_mm - 1.0
+    }
+}
+
+/// Checks that the smallest region has a larger error and fewer tetrahedra than the largest one.
+fn check(name: &str, variants: &[Variant], checks: &mut Checks) {
+    let [whole, small, large] = [0, REGIONS[0], REGIONS[1]].map(|n| &variants[n]);
+    checks.add(
+        format!("{name}: a larger region has a smaller error"),
+        small.error(whole).abs() > large.error(whole).abs(),
+    );
+    checks.add(
+        format!("{name}: a smaller region has fewer tetrahedra"),
+        small.tets < large.tets && large.tets < whole.tets,
+    );
+}
+
+fn table(variants: &[Variant]) -> Table {
+    let mut table = Table::new([
+        "region",
+        "grading",
+        "tetrahedra",
+        "share",
+        "MB",
+        "ms/frame",
+        "share",
+        "growth, mm",
+        "error",
+        "displacement at the border, mm",
+    ]);
+    let whole = &variants[0];
+    for variant in variants {
+        table.add([
+            variant.region.clone(),
+            variant.grading.clone(),
+            variant.tets.to_string(),
+            format!("{:.0} %", 100.0 * variant.tets / whole.tets),
+            format!("{:.1}", variant.memory_mb),
+            format!("{:.1}", variant.ms_min),
+            format!("{:.0} %", 100.0 * variant.ms_min / whole.ms_min),
+            format!("{:.2}", variant.growth_mm),
+            format!("{:+.1} %", 100.0 * variant.error(whole)),
+            optional(variant.border_mm, |border| format!("{border:.2} of {:.2}", variant.largest_mm)),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,33 @@
+//! The cases in groups: materials, collapsed shapes, limits of bodies, time and forces.
+
+mod materials;
+mod places;
+mod shapes;
+mod time;
+
+use cutis_test_kit::Random;
+use nalgebra::Point3;
+
+use super::case::Case;
+use super::options::Effort;
+
+/// All cases of that effort.
+pub fn all(effort: Effort) -> Vec<Case> {
+    let mut cases = materials::cases();
+    cases.extend(shapes::cases());
+    cases.extend(places::cases());
+    cases.extend(time::cases(effort));
+    cases.retain(|case| case.quick || effort != Effort::Quick);
+    cases
+}
+
+/// A deformation: stretched, twisted about the z axis, and each vertex moved at random by a tenth of an element.
+fn deformed() -> impl FnMut(Point3<f64>) -> Point3<f64> {
+    let mut random = Random::new(1);
+    move |x| {
+        let (sin, cos) = (0.3 * x.z).sin_cos();
+        let twisted = Point3::new(cos * x.x - sin * x.y, sin * x.x + cos * x.y, x.z);
+        let stretched = Point3::new(1.3 * twisted.x, 0.8 * twisted.y, 1.1 * twisted.z);
+        stretched + random.vector() * 0.1
+    }
+}

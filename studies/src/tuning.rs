@@ -1,0 +1,162 @@
+//! `cutis tune` on the demo, and a full run of the tuned scene. The study fails if the run differs from the prediction.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Context;
+use clap::Parser;
+use serde_json::Value;
+
+use crate::kit::{
+    Checks, Failure, Page, Program, Provenance, Table, number, number_at, optional, percent, results, root,
+    target_dir,
+};
+
+/// Tunes the demo and compares a full run with the prediction.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "tuning", bin_name = "cargo xtask study tuning")]
+pub struct Options {
+    /// Write the tables of docs/results/tuning.md.
+    #[arg(long)]
+    pub write: bool,
+}
+
+const SCENE: &str = "fixtures/scenes/demo.toml";
+/// Largest relative difference of time and opening from the prediction.
+const TOLERANCE: f64 = 0.2;
+/// Tables of the page.
+pub const TABLES: [&str; 5] = ["provenance", "prediction", "settings", "omissions", "checks"];
+
+/// Tunes, runs and compares. Returns whether all checks hold.
+///
+/// # Errors
+/// The program fails, or a file cannot be written.
+pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    let page = options.write.then(|| Page::open("tuning", &TABLES)).transpose()?;
+    let provenance = Provenance::start(if options.write { "tuning --write" } else { "tuning" });
+    let program = Program::build()?;
+    let folder = target_dir()?.join("studies/tuning");
+    fs::create_dir_all(&folder)?;
+    // A path relative to the root, so that the calibration holds no path of this machine.
+    let copy = folder.strip_prefix(root()).unwrap_or(&folder).join("demo-tuned.toml");
+    println!("cutis tune {SCENE}");
+    let document = program.run(|command| {
+        command.args(["tune", SCENE, "--json", "--force", "--out"]).arg(&copy);
+    })?;
+    let tuning: Value = serde_json::from_slice(&document).context("the calibration is not JSON")?;
+    let picked = &tuning["picked"];
+    let predicted = TunedRun {
+        ms: number_at(picked, "/ms_per_frame")?,
+        growth_mm: number_at(picked, "/wounds/0/growth_mm")?,
+    };
+    let found = TunedRun::of_run(&program, &copy, &folder.join("run"), &[])?;
+    let one_substep = ["solver.substeps=1".to_owned()];
+    let control = TunedRun::of_run(&program, &copy, &folder.join("control"), &one_substep)?;
+
+    let mut checks = Checks::default();
+    let within = percent(TOLERANCE);
+    checks.add(format!("time and opening of the run are within {within}"), found.is_near(&predicted));
+    checks.control(format!("one substep is not within {within}"), !control.is_near(&predicted));
+    let mut prediction = Table::new([setting(picked).as_str(), "ms/frame", "growth of the opening, mm"]);
+    for (name, TunedRun { ms, growth_mm }) in
+        [("predicted", &predicted), ("full run", &found), ("control: one substep", &control)]
+    {
+        prediction.add([name.to_owned(), format!("{ms:.1}"), format!("{growth_mm:.4}")]);
+    }
+    writeln!(out, "{}", prediction.markdown())?;
+    checks.print(out)?;
+    if let Some(mut page) = page.filter(|_| checks.pass()) {
+        page.set("provenance", &provenance.markdown())?;
+        page.set("prediction", &prediction.markdown())?;
+        page.set("settings", &settings(&tuning))?;
+        page.set("omissions", &omissions(&tuning).markdown())?;
+        page.set("checks", &checks.summary())?;
+        page.save(&results())?;
+    }
+    Ok(checks.pass())
+}
+
+/// Time of a frame and growth of the opening.
+struct TunedRun {
+    ms: f64,
+    growth_mm: f64,
+}
+
+impl TunedRun {
+    fn of_run(program: &Program, scene: &Path, out: &Path, set: &[String]) -> Result<Self, Failure> {
+        let set = [set, &["output={report=true}".to_owned()]].concat();
+        let report = program.scene(scene, &set, &[], out)?;
+        let growth_mm = number_at(&report, "/wound/final_mm")? - number_at(&report, "/wound/initial_mm")?;
+        Ok(Self { ms: number_at(&report, "/frames/ms_mean")?, growth_mm })
+    }
+
+    fn is_near(&self, other: &Self) -> bool {
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() <= TOLERANCE;
+        near(self.ms, other.ms) && near(self.growth_mm, other.growth_mm)
+    }
+}
+
+/// The measured settings, the reference, and the number of settings that were not finished.
+fn settings(tuning: &Value) -> String {
+    let reference = &tuning["reference"];
+    let finest = reference["substeps"].as_array().and_then(|runs| runs.last()).and_then(Value::as_u64);
+    let mut table = Table::new(["setting", "ms/frame", "error", "growth of the opening, mm", "note"]);
+    let mut unfinished = 0;
+    for candidate in tuning["candidates"].as_array().into_iter().flatten() {
+        if candidate["abandoned"].is_string() {
+            unfinished += 1;
+            continue;
+        }
+        table.add([
+            setting(candidate),
+            optional(candidate["ms_per_frame"].as_f64(), number),
+            optional(candidate["error"].as_f64(), percent),
+            optional(candidate["wounds"][0]["growth_mm"].as_f64(), number),
+            if candidate["own"] == true { "setting of the scene".into() } else { String::new() },
+        ]);
+    }
+    let warnings = tuning["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    let warnings: String = warnings.map(|warning| format!("\n> {warning}\n")).collect();
+    format!(
+        "{}\nReference: {} substeps of one iteration in `f64`, extrapolated, with an error of at most {}. \
+         {unfinished} settings were not measured to the end. Warnings of the program:\n{warnings}",
+        table.markdown(),
+        finest.unwrap_or_default(),
+        optional(reference["error"].as_f64(), percent),
+    )
+}
+
+/// Cost and effect of each part of the scene.
+fn omissions(tuning: &Value) -> Table {
+    let mut table = Table::new([
+        "omitted part",
+        "saved ms/frame",
+        "saved MB",
+        "change of displacements",
+        "growth of the opening, mm",
+    ]);
+    for omission in tuning["omissions"].as_array().into_iter().flatten() {
+        table.add([
+            omission["what"].as_str().unwrap_or_default().into(),
+            optional(omission["saved_ms_per_frame"].as_f64(), number),
+            optional(omission["saved_bytes"].as_f64(), |bytes| format!("{:.1}", bytes / 1e6)),
+            optional(omission["change"].as_f64(), percent),
+            optional(omission["wounds"][0]["growth_mm"].as_f64(), number),
+        ]);
+    }
+    table
+}
+
+/// Formulation, substeps × iterations, and over-relaxation if there is any.
+fn setting(candidate: &Value) -> String {
+    let setting = &candidate["setting"];
+    let relaxation = setting["relaxation"].as_f64().filter(|relaxation| *relaxation != 1.0);
+    format!(
+        "{} {} × {}{}",
+        setting["formulation"].as_str().unwrap_or_default(),
+        setting["substeps"],
+        setting["iterations"],
+        relaxation.map_or_else(String::new, |relaxation| format!(", ω {relaxation}"))
+    )
+}
