@@ -1,6 +1,8 @@
-//! Studies: what was measured, one module for each page of `docs/results`. `cargo xtask study NAME` runs one.
+//! Studies: what was measured, one module for each page of `docs/results`. `cargo xtask study NAME`
+//! runs one.
 //!
-//! The figures are for readers. What must hold after every change is in `tests/`, which uses the problems of this crate.
+//! The figures are for readers. What must hold after every change is in `tests/`, which uses the
+//! problems of this crate.
 
 pub mod accuracy;
 pub mod cantilever;

@@ -1,5 +1,5 @@
-//! The main job on the phantom and on real scans, with skin tension and without it. The study fails if a wound does not open,
-//! does not settle, or opens without skin tension.
+//! The main job on the phantom and on real scans, with skin tension and without it. The study fails
+//! if a wound does not open, does not settle, or opens without skin tension.
 
 use std::fs;
 use std::io::Write;
@@ -220,7 +220,8 @@ fn compare_thread_counts(
         let more = ["run.checkpoint_every=1000", "solver.substeps=5", "output={report=true}", change];
         let set = [set, &more.map(str::to_owned)].concat();
         program.scene(&scene(name), &set, &["--frames", THREAD_FRAMES], &out)?;
-        // Without the header, whose fingerprint differs between the scenes, and without the checksum.
+        // Without the header, whose fingerprint differs between the scenes, and without the
+        // checksum.
         let bytes = fs::read(out.join("checkpoint.bin"))?;
         Ok(bytes[52..bytes.len() - 32].to_vec())
     };

@@ -1,5 +1,5 @@
-//! Cost and error of a region of interest and of a graded lattice, compared with the whole body, on the phantom and on a real
-//! abdomen.
+//! Cost and error of a region of interest and of a graded lattice, compared with the whole body, on
+//! the phantom and on a real abdomen.
 
 use std::io::Write;
 
@@ -26,7 +26,8 @@ const COMPARED: usize = 2;
 /// Tables of the page.
 pub const TABLES: [&str; 4] = ["provenance", "demo", "abdomen-incision", "checks"];
 
-/// Region and grading of each variant, as TOML. The first is the whole body, then the regions by size.
+/// Region and grading of each variant, as TOML. The first is the whole body, then the regions by
+/// size.
 const VARIANTS: [(Option<&str>, Option<&str>); 15] = [
     (None, None),
     (Some("{ around_mm = 20 }"), None),
@@ -75,7 +76,8 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         for (region, grading) in VARIANTS {
             variants.push(Variant::of(region, grading, &simulate((region, grading), &[])?)?);
         }
-        // A second run in the opposite order, since other programs may slow down parts of the first.
+        // A second run in the opposite order, since other programs may slow down parts of the
+        // first.
         for (&choice, variant) in VARIANTS.iter().zip(&mut variants).rev() {
             let again = simulate(choice, &["--frames", TIMED_FRAMES])?;
             variant.ms_min = variant.ms_min.min(number_at(&again, "/frames/ms_min")?);

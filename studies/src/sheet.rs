@@ -1,31 +1,33 @@
-//! A sheet of springs and skin triangles on the equilateral lattice, whose moduli are known in closed form.
+//! A sheet of springs and skin triangles on the equilateral lattice, whose moduli are known in
+//! closed form.
 //!
-//! Springs of stiffness `k` between neighbors give the sheet `E = 2k/√3`, `ν = 1/3`, `K₂ = (√3/2)k`, `μ = (√3/4)k`
-//! (all in N/m); an area stiffness `k_A` on each triangle adds `k_A·A0` to `K₂`.
+//! Springs of stiffness `k` between neighbors give the sheet `E = 2k/√3`, `ν = 1/3`, `K₂ =
+//! (√3/2)k`, `μ = (√3/4)k` (all in N/m); an area stiffness `k_A` on each triangle adds `k_A·A0` to
+//! `K₂`.
 
 use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-/// Half the height of a row of triangles of unit side, times two: the distance of two rows.
+/// Distance of two rows of vertices: the height of a triangle with sides of length 1.
 pub const ROW: f64 = 0.866_025_403_784_438_6;
 
 /// Vertices, springs and triangles of a sheet in the plane z = 0, in units of the spacing.
 pub struct Sheet {
-    /// Columns and rows counted from the middle; `(i + ½(j mod 2), j·√3/2)`.
+    /// Positions `(i + ½(j mod 2), j·√3/2)` with column `i` and row `j` from the middle.
     pub positions: Vec<Point3<f64>>,
-    /// Row and column of each vertex.
+    /// Column and row of each vertex.
     pub places: Vec<[i64; 2]>,
-    /// Two vertices each.
+    /// Springs, two vertices each.
     pub springs: Vec<[u32; 2]>,
-    /// Three vertices each.
+    /// Triangles, three vertices each.
     pub triangles: Vec<[u32; 3]>,
-    /// Whether each vertex is held: the outermost columns and rows.
+    /// True for fixed vertices: the outermost columns and rows.
     pub held: Vec<bool>,
 }
 
 impl Sheet {
-    /// A sheet of `nx` columns and as many rows as make it about as high as wide (an even number).
+    /// A sheet of `nx` columns. The number of rows is even and makes it about as high as wide.
     pub fn new(nx: i64) -> Self {
         let ny = ((nx as f64 * 2.0 / 3f64.sqrt()).floor() as i64 + 1) / 2 * 2;
         let mut numbers = HashMap::new();
@@ -57,7 +59,7 @@ impl Sheet {
         Self { positions, places, springs, triangles, held }
     }
 
-    /// Cuts a slit of half-length `a` between the rows 0 and 1.
+    /// Cuts a slit of half-length `a` between rows 0 and 1.
     pub fn cut(mut self, a: f64) -> Self {
         let crosses = |&u: &u32, &v: &u32| {
             let (x, y) = (u as usize, v as usize);
@@ -70,7 +72,8 @@ impl Sheet {
         self
     }
 
-    /// Mean opening of the slit in its middle: displacement of the upper lip less that of the lower one.
+    /// Mean opening of the slit in its middle: displacement of the upper lip minus displacement of
+    /// the lower lip.
     pub fn opening(&self, positions: &[Point3<f64>]) -> f64 {
         let lip = |row: i64| {
             let near = |&v: &usize| self.places[v][1] == row && self.positions[v].x.abs() <= 0.51;

@@ -1,4 +1,5 @@
-//! `cutis tune` on the demo, and a full run of the tuned scene. The study fails if the run differs from the prediction.
+//! `cutis tune` on the demo, and a full run of the tuned scene. The study fails if the run differs
+//! from the prediction.
 
 use std::fs;
 use std::io::Write;

@@ -1,4 +1,5 @@
-//! The quick part of the stability study: stiff and extreme cases meet their requirements at three length scales.
+//! The quick part of the stability study: stiff and extreme cases meet their requirements at three
+//! length scales.
 
 use cutis_studies::stability::{self, Effort, Failure, SCALES, Trial, case::Case, cases};
 use cutis_test_kit::gpu;
@@ -30,7 +31,8 @@ fn extreme_cases_end_as_they_must_in_double_precision() {
     check(|keep| stability::run_reference(&cases, &[1e-3], keep));
 }
 
-/// One case of each sort at the scale where an absolute length would show, since a software adapter is slow.
+/// One case of each sort at the scale where an absolute length would show, since a software adapter
+/// is slow.
 #[test]
 fn extreme_cases_end_as_they_must_on_a_gpu() {
     const ON_GPU: [&str; 11] = [

@@ -1,4 +1,4 @@
-"""The lattice body as a hyperelastic solid, by finite elements with scikit-fem: nothing of Cutis is used here.
+"""The lattice body as a hyperelastic solid, by finite elements with scikit-fem. It uses no code of Cutis.
 
 Linear tetrahedra with the energy density (J per m³ at rest, F the deformation gradient)
 
@@ -16,15 +16,15 @@ from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementTetP1, ElementVector, Functional, LinearForm, MeshTet, asm, condense
 from skfem.helpers import ddot, det, grad, inv, sym_grad, trace, transpose
 
-# Newton ends when the norm of the force left is this share of the norm of the load.
+# Newton's method ends when the norm of the residual force is this share of the norm of the load.
 TOLERANCE = 1e-9
 MOST_ITERATIONS = 200
-# A step is taken if the energy falls by this share of what its slope promises (Armijo).
+# A step is accepted if the energy falls by this share of the linear prediction (Armijo).
 DESCENT = 1e-4
 
 
 class Beam:
-    """A mesh whose held vertices do not move: `points` (vertices × 3, m), `tets` (× 4), `held` (bool per vertex)."""
+    """A mesh with fixed vertices: `points` (vertices × 3, m), `tets` (× 4), `held` (bool per vertex)."""
 
     def __init__(self, points, tets, held):
         mesh = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tets.T))
@@ -74,7 +74,7 @@ def internal_stiffness(u, v, w):
 
 
 def solve(matrix, right):
-    """A sparse direct solve for a symmetric matrix: an order of elimination that fits it, pivots on the diagonal."""
+    """Solves a sparse symmetric system directly, with a symmetric ordering and pivots on the diagonal."""
     order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     return splu(matrix.tocsc(), **order).solve(right)
 
@@ -93,13 +93,13 @@ class Solid:
         return f, edges, np.linalg.norm(edges, axis=0)
 
     def energy(self, u, share=1.0):
-        """Elastic energy and that of the given share of the load, J."""
+        """Elastic energy plus the energy of a share of the load, J."""
         f, _, lengths = self.shape(u)
         density = self.youngs / 12 * ((lengths - 1) ** 2).sum(axis=0) + self.bulk / 2 * (det(f) - 1) ** 2
         return asm(integral, self.basis, density=density) - share * self.load @ u
 
     def gradient(self, u, share=1.0):
-        """Its derivative with respect to the coefficients, N."""
+        """The derivative of the energy with respect to the coefficients, N."""
         f, edges, lengths = self.shape(u)
         pull = self.youngs / 6 * (1 - 1 / lengths) * edges
         stress = np.einsum("ik...,jk...->ij...", pull, self.beam.directions)
@@ -107,10 +107,10 @@ class Solid:
         return asm(internal_force, self.basis, stress=stress) - share * self.load
 
     def tangent(self, u):
-        """The second derivative, N/m."""
+        """The second derivative of the energy, N/m."""
         f, edges, lengths = self.shape(u)
         e, along = self.beam.directions, edges / lengths
-        # d²(½(|F e| − 1)²) by dF: along the edge in full, across it by what it is longer than at rest.
+        # d²(½(|F e| − 1)²) by dF: full along the edge, and across it by the relative extension.
         across = np.einsum("ij,k...->ijk...", np.eye(3), 1 - 1 / lengths)
         inner = across + np.einsum("ik...,jk...,k...->ijk...", along, along, 1 / lengths)
         moduli = self.youngs / 6 * np.einsum("acm...,bm...,dm...->abcd...", inner, e, e)
@@ -138,18 +138,18 @@ class Solid:
         return max(deviations)
 
     def settle(self, load_steps):
-        """The coefficients at the minimum of the energy, the load put on in equal steps."""
+        """The coefficients at the minimum of the energy. The load grows in equal steps."""
         u = np.zeros(self.basis.N)
         iterations = 0
         for share in np.linspace(0.0, 1.0, load_steps + 1)[1:]:
-            # The load is dead weight; only the last step has to be exact.
+            # The load is a dead load, so that only the last step has to be exact.
             tolerance = TOLERANCE if share == 1.0 else 1e-3
             u, needed = self.newton(u, share, tolerance)
             iterations += needed
         return u, iterations
 
     def newton(self, u, share, tolerance):
-        """The minimum near `u` under a share of the load."""
+        """The minimum of the energy near `u` under a share of the load."""
         free = self.beam.free
         limit = tolerance * np.linalg.norm(self.load[free])
         for iteration in range(MOST_ITERATIONS):
@@ -167,7 +167,7 @@ class Solid:
         raise ArithmeticError(f"not at rest after {MOST_ITERATIONS} iterations")
 
     def descent(self, u, residual):
-        """Newton's direction; where it points uphill, with a multiple of the unit matrix added until it does not."""
+        """Newton's direction. If it points uphill, a growing multiple of the unit matrix is added to the tangent."""
         matrix, right, _, inner = condense(self.tangent(u), -residual, x=np.zeros_like(u), D=self.beam.held)
         shift, size = 0.0, abs(matrix.diagonal()).mean()
         while True:

@@ -1,7 +1,6 @@
-"""Volumes as nibabel, SimpleITK and `cutis inspect` see them, brought to one form (RAS+ millimeters) and compared.
+"""Volumes as nibabel, SimpleITK and `cutis inspect` read them, converted to one form (RAS+ millimeters) and compared.
 
-A comparison returns what differs as text, an empty list when nothing does, so that a check can be shown a difference it
-must report."""
+A comparison returns its differences as texts, or an empty list, so that controls can test that it reports a difference."""
 
 import json
 import os
@@ -22,9 +21,9 @@ PROGRAM = os.environ.get("CUTIS_PROGRAM", "cutis")
 CHECKOUT = Path(__file__).resolve().parents[2]
 IN_CI = os.environ.get("CI", "") not in ("", "false")
 
-# A corner of a volume may lie this share of the smallest voxel spacing elsewhere: NIfTI stores single precision.
+# Largest distance of two corners over the smallest voxel spacing: NIfTI stores single precision.
 POSITION_SHARE = 1e-3
-# Extremes and the mean may differ by the rounding of a slope in double precision.
+# Largest relative difference of extremes and mean: the rounding of a slope in double precision.
 VALUE_SHARE = 1e-12
 
 MILLIMETERS = {"meter": 1000.0, "mm": 1.0, "micron": 0.001, "unknown": 1.0}
@@ -32,7 +31,7 @@ MILLIMETERS = {"meter": 1000.0, "mm": 1.0, "micron": 0.001, "unknown": 1.0}
 
 @dataclass
 class Seen:
-    """A volume as one program sees it."""
+    """A volume as one program reads it."""
 
     shape: tuple
     affine: np.ndarray  # 4 x 4, index to RAS+ mm
@@ -52,7 +51,7 @@ class Seen:
 
 
 def by_nibabel(path):
-    """nibabel leaves the unit of the file as it is; here it becomes mm."""
+    """Reads a file with nibabel and converts its unit to mm."""
     image = nibabel.load(path)
     if image.get_data_dtype().names is not None:
         raise ValueError("voxels are records")
@@ -65,7 +64,7 @@ def by_nibabel(path):
 
 
 def by_itk(path):
-    """SimpleITK indexes [k, j, i] and speaks LPS: the first two world axes change sign."""
+    """Reads a file with SimpleITK. It indexes [k, j, i] and uses LPS, so that the first two world axes change sign."""
     image = SimpleITK.ReadImage(str(path))
     if image.GetNumberOfComponentsPerPixel() > 1:
         raise ValueError("voxels are vectors")
@@ -85,7 +84,7 @@ def run_program(*words):
 
 
 def inspect(path):
-    """`cutis inspect`: what it sees and its report, or None and the process if it refuses."""
+    """Runs `cutis inspect`. Returns the volume and the report, or None and the process if it refuses the file."""
     process = run_program("inspect", path, "--json")
     if process.returncode != 0:
         return None, process
@@ -99,7 +98,7 @@ def inspect(path):
 
 
 def differences(ours, theirs, ignore=()):
-    """What differs between two views of one volume, as text. `ignore` names fields."""
+    """The differences between two readings of one volume, as texts. `ignore` names fields to skip."""
     found = []
 
     def compare(field, same):
@@ -119,7 +118,7 @@ def differences(ours, theirs, ignore=()):
 
 
 def same_place(ours, theirs):
-    """Whether all eight corners lie at the same millimeter."""
+    """True if all eight corners have the same world position."""
     if tuple(ours.shape) != tuple(theirs.shape):
         return False
     corners = np.array([[i, j, k, 1.0] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
@@ -136,7 +135,7 @@ def marked_voxel_mm(seen):
 
 
 def require_rejection(seen):
-    """Negative control: each single change of `seen` must be reported as a difference."""
+    """Control: each single change of `seen` must be reported as a difference."""
     spacing = np.linalg.norm(seen.affine[:3, :3], axis=0).min()
     shifted = seen.affine.copy()
     shifted[0, 3] += 0.01 * spacing
@@ -157,13 +156,13 @@ def require_rejection(seen):
 
 
 class Tally:
-    """Counts what passed and failed, and ends the program accordingly."""
+    """Counts passed and failed checks, and ends the program with the exit code."""
 
     def __init__(self, title):
         self.title, self.passed, self.failed = title, 0, 0
 
     def check(self, label, problems):
-        """Counts one check; `problems` is a list of texts, empty when it passed."""
+        """Counts one check. `problems` is a list of texts, empty if the check passed."""
         if problems:
             self.failed += 1
             for problem in problems:
@@ -177,7 +176,7 @@ class Tally:
 
 
 def data_folder():
-    """The folder of real test volumes, or None with a printed reason; in CI it must be there."""
+    """The folder of real test volumes. None if it is missing, with a printed reason; in CI that is an error."""
     folder = Path(os.environ.get("CUTIS_TEST_DATA") or CHECKOUT.parent / "shared" / "data")
     if folder.is_dir():
         return folder

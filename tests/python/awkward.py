@@ -1,7 +1,7 @@
-"""Odd and ordinary NIfTI files: `cutis inspect` sees what nibabel and SimpleITK see, and refuses by name what it must.
+"""Odd and ordinary NIfTI files: `cutis inspect` reads the same volume as nibabel and SimpleITK, or refuses the file.
 
-Where the programs are known to differ, the difference is data with a reason; a file that is accepted or refused against
-expectation fails, and so does a known difference that is gone."""
+Known differences between the programs are data with a reason. A check fails if a file is unexpectedly accepted or refused,
+or if a known difference no longer occurs."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from _compare import Tally, by_itk, by_nibabel, data_folder, differences, inspect, require_rejection
 
-# Files that must be refused, with exit code 2, and what the message has to mention besides the file.
+# Files that must be refused with exit code 2, and a word of the message.
 REFUSED = {
     "truncated.nii": "ends before the last voxel (SimpleITK fills the rest with zeros)",
     "truncated.nii.gz": "the compressed data ends early (SimpleITK fills the rest with zeros)",
@@ -17,7 +17,7 @@ REFUSED = {
     "4d_x3.nii.gz": "three volumes in one file: which one is meant?",
 }
 
-# Fields in which a reader differs from the NIfTI standard, and so from us.
+# Fields in which a reader differs from the NIfTI standard and from Cutis.
 NIBABEL_DIFFERS = {
     "no_form.nii.gz": ({"affine"}, "without sform and qform nibabel centers the volume and mirrors x; the standard scales only"),
 }
@@ -28,26 +28,26 @@ ITK_DIFFERS = {
     "f32_nan_padding.nii.gz": ({"nan_count"}, "ITK reads NaN as 0"),
 }
 
-# Files that one of the other programs refuses though we read them.
+# Files that another program refuses and Cutis reads.
 ITK_REFUSES = {
     "nifti2_i16.nii.gz": "SimpleITK is built without NIfTI-2",
     "nifti2_bigendian_i16.nii.gz": "SimpleITK is built without NIfTI-2",
     "sheared_sform_only.nii.gz": "ITK wants orthogonal axes",
 }
 
-# Files about which a warning must be given, and a word of it.
+# Files that must cause a warning, and a word of the warning.
 WARNED = {
     "q_s_conflict.nii.gz": "qform",
     "no_form.nii.gz": "",
     "f32_nan_padding.nii.gz": "NaN",
 }
 
-# Stated here because no other program reads it so: pixdim alone, from the origin.
+# No other program reads pixdim alone, so that the expected affine is written here.
 NO_FORM_AFFINE = np.diag([9.307692527770996, 9.375, 9.514286041259766, 1.0])
 
 
 def attempt(reader, path):
-    """What a program sees, or the reason why it refuses."""
+    """The volume as a program reads it, or the reason of its refusal."""
     try:
         return reader(path), None
     except Exception as error:  # each library has its own kinds
@@ -55,7 +55,7 @@ def attempt(reader, path):
 
 
 def compared(ours, theirs, known):
-    """Differences but for the known ones; a known one that is gone counts as a problem."""
+    """The unknown differences. A known difference that no longer occurs is a problem too."""
     fields, reason = known
     found = differences(ours, theirs)
     unexpected = [line for line in found if line.split(":")[0] not in fields]

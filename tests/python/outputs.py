@@ -1,4 +1,4 @@
-"""What `cutis` writes, read by nibabel and SimpleITK: same voxels, same millimeters, a header that both understand."""
+"""The outputs of `cutis`, read by nibabel and SimpleITK: equal voxels, equal positions, and a header that both accept."""
 
 import json
 import tempfile
@@ -21,7 +21,7 @@ from _compare import (
     same_place,
 )
 
-# Springs that are at rest: whatever moves in these scenes is moved by gravity alone.
+# Springs at rest, so that only gravity moves the body in these scenes.
 SCENE = """
 [volume]
 path = "{volume}"
@@ -41,7 +41,7 @@ volume = true
 report = true
 """
 
-# A handle upwards on the belly, all of it a chain that nothing fixes.
+# A handle pulls up a belly of ChainMail elements without fixed ones.
 CHAIN = """
 model = "chainmail"
 [volume]
@@ -60,7 +60,7 @@ volume = true
 report = true
 """
 
-# Inputs of other orientations, types and slopes, from the folder of test data.
+# Inputs with other orientations, types and slopes, from the folder of test data.
 OTHERS = ["awkward/orient_PIR.nii.gz", "awkward/oblique.nii.gz", "awkward/bigendian_i16.nii", "ct/leg_sts013_64x55x58.nii.gz"]
 
 REPORT_KEYS = {
@@ -88,7 +88,7 @@ def run_or_fail(*words):
 
 
 def header_problems(path):
-    """NIfTI-1, int16, no scaling, mm, qform and sform alike."""
+    """Checks the header: NIfTI-1, int16, no scaling, mm, equal qform and sform."""
     image = nibabel.load(path)
     header = image.header
     wanted = {
@@ -103,7 +103,7 @@ def header_problems(path):
 
 
 def readers_agree(path, label, tally):
-    """All three read the file alike, and put its brightest voxel at one place. Returns what nibabel sees."""
+    """Checks that all three programs read the same volume with the same brightest voxel. Returns the volume of nibabel."""
     ours, report = inspect(path)
     if ours is None:
         raise AssertionError(f"cutis refuses its own {label}: {report.stderr}")
@@ -118,7 +118,7 @@ def readers_agree(path, label, tally):
 
 
 def deformed(volume, folder, frames=0, gravity=0.0, dt_s=0.01):
-    """Runs the scene and gives the path of the deformed CT."""
+    """Runs the scene and returns the path of the deformed CT."""
     folder.mkdir()
     scene = folder / "scene.toml"
     scene.write_text(SCENE.format(volume=volume, frames=frames, gravity=gravity, dt_s=dt_s))
@@ -127,7 +127,7 @@ def deformed(volume, folder, frames=0, gravity=0.0, dt_s=0.01):
 
 
 def untouched_problems(before, after):
-    """A body that nothing moved comes back voxel for voxel, at the same place."""
+    """Checks that an unmoved body has the same voxels at the same position."""
     problems = [] if same_place(after, before) else ["shape or affine changed"]
     if before.values.shape == after.values.shape:
         changed = int((before.values != after.values).sum())
@@ -136,7 +136,7 @@ def untouched_problems(before, after):
 
 
 def shifted_problems(before, after):
-    """Tissue with tissue all around it has moved by one voxel along the first axis, value for value."""
+    """Checks that inner tissue has moved by one voxel along the first axis with equal values."""
     tissue = before.values > -449
     inner = tissue[1:-1, 1:-1, 1:-1].copy()
     for axis in range(3):
@@ -189,7 +189,7 @@ def check_demo(work, tally):
 
 
 def near(image, place, radius):
-    """Which voxels lie within a distance of a place, mm."""
+    """A mask of the voxels within a distance of a point, in mm."""
     indices = np.indices(image.values.shape).reshape(3, -1)
     places = image.affine[:3, :3] @ indices + image.affine[:3, 3:]
     apart = np.linalg.norm(places - np.array(place).reshape(3, 1), axis=0)
@@ -197,7 +197,7 @@ def near(image, place, radius):
 
 
 def changed_problems(before, after, handle, reach):
-    """What a handle pulled has changed beside it, and nothing has beyond its reach."""
+    """Checks that voxels near the handle have changed and that voxels beyond its reach have not."""
     changed = before.values != after.values
     beside, beyond = changed[near(before, handle, 30.0)], int(changed[~near(before, handle, reach)].sum())
     problems = [] if same_place(after, before) else ["shape or affine changed"]
@@ -206,7 +206,7 @@ def changed_problems(before, after, handle, reach):
 
 
 def unlike_schema(value, schema, whole, name="report"):
-    """Keys that a schema asks for and a document lacks, and those that it does not know."""
+    """Required keys that a document lacks, and keys that its schema does not know."""
     if "$ref" in schema:
         schema = whole["$defs"][schema["$ref"].rsplit("/", 1)[1]]
     for choice in schema.get("anyOf", []):
@@ -223,7 +223,7 @@ def unlike_schema(value, schema, whole, name="report"):
 
 
 def report_problems(path):
-    """A report as the schema has it, with what ChainMail did."""
+    """Checks that a report of ChainMail follows the schema."""
     report = json.loads(path.read_text())
     schema = json.loads(run_or_fail("scene", "report-schema").stdout)
     problems = unlike_schema(report, schema, schema)

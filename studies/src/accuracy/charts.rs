@@ -1,4 +1,5 @@
-//! Charts of a problem: error against time per frame. Each backend and method has a color, each number of substeps a line.
+//! Charts of a problem: error against time per frame. Each backend and method has a color, each
+//! number of substeps a line.
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! The Pareto front of time and error.
 
-/// Indices of the `points` (time, error) that no other point dominates, by ascending time. Points with a coordinate that is
-/// not a finite number above zero do not count.
+/// Indices of the `points` (time, error) that no other point dominates, by ascending time. Points
+/// with a coordinate that is not a finite number above zero do not count.
 pub fn pareto(points: &[[f64; 2]]) -> Vec<usize> {
     let valid = |n: &usize| points[*n].iter().all(|value| value.is_finite() && *value > 0.0);
     let mut order: Vec<usize> = (0..points.len()).filter(valid).collect();

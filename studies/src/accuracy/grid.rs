@@ -12,7 +12,8 @@ struct Limits {
     substeps: &'static [u32],
     /// Largest number of sweeps of a frame. Does not limit pairs with one iteration.
     sweeps: u32,
-    /// Larger numbers of iterations for some numbers of substeps, for E1 and E2 only: pairs of substeps and iterations.
+    /// Larger numbers of iterations for some numbers of substeps, for E1 and E2 only: pairs of
+    /// substeps and iterations.
     raised: &'static [(u32, u32)],
     /// Divides the numbers of iterations.
     times: u32,

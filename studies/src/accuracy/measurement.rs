@@ -6,11 +6,12 @@ use super::config::{Backend, Config, PBD};
 use super::errors::KindError;
 use crate::kit::{Row, number};
 
-/// A body is at rest if it moves by less than this share of its displacement in the second half of its frames.
+/// A body is at rest if it moves by less than this share of its displacement in the second half of
+/// its frames.
 pub const AT_REST: f64 = 0.05;
 
-/// The figures of one configuration. E1 and E2 are absent for PBD, which has no limit to compare with. Figures at rest are
-/// absent where a run to rest would take too many sweeps.
+/// The figures of one configuration. E1 and E2 are absent for PBD, which has no limit to compare
+/// with. Figures at rest are absent where a run to rest would take too many sweeps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Measurement {
     /// Name of the problem.
@@ -40,7 +41,8 @@ pub struct Measurement {
     pub e3: Option<f64>,
     /// E4: the largest error in `residuals`.
     pub e4: Option<f64>,
-    /// Motion in the second half of the frames over the displacement at the end. E3 and E4 contain this much error of time.
+    /// Motion in the second half of the frames over the displacement at the end. E3 and E4 contain
+    /// this much error of time.
     pub residual_motion: Option<f64>,
     /// Opening of the wound over the opening at the equilibrium.
     pub opening: Option<f64>,

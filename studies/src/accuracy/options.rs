@@ -6,11 +6,13 @@ use clap::Parser;
 
 use super::problems::NAMES;
 
-/// Measures error against run time. The reference is a direct solution in f64 that shares no code with the solver.
+/// Measures error against run time. The reference is a direct solution in f64 that shares no code
+/// with the solver.
 ///
-/// Each configuration (backend, formulation, substeps × iterations) of each problem is timed. In the same run its results are
-/// compared with the minimizer of the implicit step (E1), with a run of at least 64 times the substeps (E2), and with the
-/// equilibrium (E3, E4). The exit code is 0 if all checks hold, 1 if not, 2 for a wrong option.
+/// Each configuration (backend, formulation, substeps × iterations) of each problem is timed. In
+/// the same run its results are compared with the minimizer of the implicit step (E1), with a run
+/// of at least 64 times the substeps (E2), and with the equilibrium (E3, E4). The exit code is 0 if
+/// all checks hold, 1 if not, 2 for a wrong option.
 #[derive(Clone, Debug, Default, Parser)]
 #[command(name = "accuracy", bin_name = "cargo xtask study accuracy")]
 pub struct Options {

@@ -1,4 +1,5 @@
-//! Reference solutions of a problem: the minimizers of implicit steps, a run with many more substeps, and the equilibrium.
+//! Reference solutions of a problem: the minimizers of implicit steps, a run with many more
+//! substeps, and the equilibrium.
 
 use std::collections::BTreeMap;
 
@@ -43,7 +44,8 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Solves the problem for configurations with these numbers of substeps. Calls `progress` before each part.
+    /// Solves the problem for configurations with these numbers of substeps. Calls `progress`
+    /// before each part.
     ///
     /// # Errors
     /// A search does not converge, or a solver refuses the problem.
@@ -105,7 +107,8 @@ impl Reference {
         Ok(())
     }
 
-    /// The substep from the state at `instant`. A factor `longer` other than 1 makes the step too long, for a control.
+    /// The substep from the state at `instant`. A factor `longer` other than 1 makes the step too
+    /// long, for a control.
     ///
     /// # Errors
     /// The search does not converge.
@@ -132,8 +135,8 @@ impl Reference {
         }
     }
 
-    /// E1: error of the positions after one substep from the state at `instant`. NaN unless [`minimize`](Self::minimize) was
-    /// called for this number of substeps.
+    /// E1: error of the positions after one substep from the state at `instant`. NaN unless
+    /// [`minimize`](Self::minimize) was called for this number of substeps.
     pub fn e1(&self, found: &[Point3<f64>], instant: usize, substeps: u32) -> f64 {
         let step = self.steps.get(&(instant, substeps));
         step.map_or(f64::NAN, |step| self.error(found, &step.minimum, &step.start))
@@ -159,7 +162,8 @@ impl Reference {
         self.error(before, now, &self.rest)
     }
 
-    /// Effective stiffness over the stiffness of the material: against the handle if there is one, else against the load.
+    /// Effective stiffness over the stiffness of the material: against the handle if there is one,
+    /// else against the load.
     pub fn stiffness(&self, found: &[Point3<f64>]) -> f64 {
         match self.system.handles().first() {
             None => stiffness_under_load(found, &self.equilibrium, &self.rest, &self.free),

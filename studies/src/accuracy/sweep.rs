@@ -1,4 +1,5 @@
-//! All configurations of one problem, timed in turns and compared with the reference in the same run.
+//! All configurations of one problem, timed in turns and compared with the reference in the same
+//! run.
 
 use cutis_solver::Settings;
 use nalgebra::Point3;
@@ -11,7 +12,8 @@ use super::reference::Reference;
 use super::running::{Running, State};
 use crate::kit::larger;
 
-/// Frames of a configuration before the next one runs, so that the load of the machine affects all alike.
+/// Frames of a configuration before the next one runs, so that the load of the machine affects all
+/// alike.
 const ROUND: u32 = 5;
 /// Motion in a round over the displacement, below which a body is at rest and needs no more frames.
 const STILL: f64 = 1e-6;

@@ -86,7 +86,8 @@ impl Beam {
         })
     }
 
-    /// The system of the beam: for PBD if a stiffness is given, otherwise with the compliances of the material.
+    /// The system of the beam: for PBD if a stiffness is given, otherwise with the compliances of
+    /// the material.
     ///
     /// # Errors
     /// The material is not valid.

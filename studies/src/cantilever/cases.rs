@@ -67,8 +67,8 @@ impl BeamCase {
     }
 }
 
-/// Settings of real time, with frames of 1/60 s: XPBD with 1 to 50 substeps of 1 to 5 iterations, vertex block descent, and
-/// PBD with stiffness 1.
+/// Settings of real time, with frames of 1/60 s: XPBD with 1 to 50 substeps of 1 to 5 iterations,
+/// vertex block descent, and PBD with stiffness 1.
 pub fn real_time(damping_per_s: f64) -> Vec<Stepping> {
     let stepping = |formulation, substeps, iterations| Stepping {
         formulation,

@@ -19,7 +19,8 @@ const SHORT: (f64, u32) = (0.5, 5);
 const QUICK: (f64, u32) = (1.0, 5);
 /// The same in single precision, which does not resolve the effect of gravity in a shorter time.
 const SINGLE: (f64, u32) = (2.0, 30);
-/// Largest motion of a beam at rest in a frame over its displacement, in double and in single precision.
+/// Largest motion of a beam at rest in a frame over its displacement, in double and in single
+/// precision.
 const STILL: (f64, f64) = (1e-6, 1e-4);
 /// Largest work in real time (substeps × iterations), except for the coarse beam that sags by 10 %.
 const MOST_SWEEPS: u32 = 50;
@@ -49,7 +50,8 @@ struct CaseResults {
     converged: Vec<Run>,
     /// Runs of the solver in real time.
     real_time: Vec<Run>,
-    /// Displacement of the end by Newton's method with a deliberate fault, by the name of the fault.
+    /// Displacement of the end by Newton's method with a deliberate fault, by the name of the
+    /// fault.
     controls: BTreeMap<&'static str, [f64; 3]>,
 }
 

@@ -1,9 +1,10 @@
-//! P8: a beam that is fixed at one end and bends under its own weight, compared with an independent FEM.
+//! P8: a beam that is fixed at one end and bends under its own weight, compared with an independent
+//! FEM.
 //!
-//! The beam is square, four times as long as thick, on a `kuhn6` lattice of `cutis-mesh` along x; gravity is along −y. Where
-//! it comes to rest is a minimum of an energy, so that Newton's method (`cutis-newton`), finite elements (`tests/python`) and
-//! the solver with short substeps have to agree. With the few substeps of real time they differ, and the study measures how
-//! much.
+//! The beam is square, four times as long as thick, on a `kuhn6` lattice of `cutis-mesh` along x;
+//! gravity is along −y. Where it comes to rest is a minimum of an energy, so that Newton's method
+//! (`cutis-newton`), finite elements (`tests/python`) and the solver with short substeps have to
+//! agree. With the few substeps of real time they differ, and the study measures how much.
 
 mod beam;
 mod cases;

@@ -54,13 +54,14 @@ pub struct Rest {
     pub time_s: f64,
 }
 
-/// Angular frequency of the slowest vibration of a slender beam with the sag `sag_m`, 1/s: `3.516·√(g/8)/√sag` (Euler and
-/// Bernoulli).
+/// Angular frequency of the slowest vibration of a slender beam with the sag `sag_m`, 1/s:
+/// `3.516·√(g/8)/√sag` (Euler and Bernoulli).
 pub fn slowest_per_s(sag_m: f64) -> f64 {
     3.516 * (-GRAVITY_M_S2[1] / (8.0 * sag_m)).sqrt()
 }
 
-/// XPBD with substeps that are short compared with the fastest vibration of a cell, for a beam with the sag `sag_m`.
+/// XPBD with substeps that are short compared with the fastest vibration of a cell, for a beam with
+/// the sag `sag_m`.
 pub fn converged(sag_m: f64, substep_s: f64, iterations: u32) -> Stepping {
     let slowest = slowest_per_s(sag_m);
     let substeps = (1.0 / (slowest * substep_s)).ceil();
@@ -74,8 +75,8 @@ pub fn converged(sag_m: f64, substep_s: f64, iterations: u32) -> Stepping {
     }
 }
 
-/// Runs until the beam is at rest, or for `most_frames`. A beam at rest moves by at most `tolerance` times its displacement in
-/// a frame.
+/// Runs until the beam is at rest, or for `most_frames`. A beam at rest moves by at most
+/// `tolerance` times its displacement in a frame.
 ///
 /// # Errors
 /// The run diverges, or a device fails.

@@ -1,4 +1,5 @@
-//! Tables of the page, from the file that `tests/python/cantilever.py` writes: the results of Cutis and of the FEM.
+//! Tables of the page, from the file that `tests/python/cantilever.py` writes: the results of Cutis
+//! and of the FEM.
 
 use std::path::Path;
 
@@ -73,7 +74,8 @@ fn programs(cases: &[Value]) -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// Cells of a run: substeps × iterations, length of a substep, displacement, difference from the FEM, at rest.
+/// Cells of a run: substeps × iterations, length of a substep, displacement, difference from the
+/// FEM, at rest.
 fn run_cells(run: &Value, reference: &Vector3<f64>) -> Result<[String; 5], Failure> {
     let stepping = &run["stepping"];
     let substeps = stepping["substeps"].as_f64().unwrap_or(f64::NAN);

@@ -30,7 +30,8 @@ pub(super) struct Answer {
     pub(super) moved: usize,
     /// Mean displacement by ring, mm.
     pub(super) rings_mm: Vec<f64>,
-    /// Difference from the last answer over all vertices that moved in either: mean, 95 % and largest, mm.
+    /// Difference from the last answer over all vertices that moved in either: mean, 95 % and
+    /// largest, mm.
     pub(super) differs_mm: [f64; 3],
     displacements: Vec<Vector3<f64>>,
 }

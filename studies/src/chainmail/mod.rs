@@ -1,4 +1,5 @@
-//! ChainMail on whole scans, and compared with position-based dynamics on the same scan with the same drag.
+//! ChainMail on whole scans, and compared with position-based dynamics on the same scan with the
+//! same drag.
 
 mod compare;
 mod runs;
@@ -16,7 +17,8 @@ use crate::kit::{Checks, Failure, Page, Provenance, Row, Table, results, write_j
 use compare::Comparison;
 use runs::WholeRun;
 
-/// Compares ChainMail on scans with position-based dynamics. The exit code says whether all checks hold.
+/// Compares ChainMail on scans with position-based dynamics. The exit code says whether all checks
+/// hold.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "chainmail", bin_name = "cargo xtask study chainmail")]
 pub struct Options {

@@ -22,7 +22,8 @@ pub(super) fn run(scene: &str, set: &[Override], out: &Path) -> Result<Report, F
     Ok(cutis::run(&loaded, &RunOptions { out: out.into(), resume: false }, &Silent)?)
 }
 
-/// Runs a scene without outputs. Returns the report, the longest frame in ms, and the final positions in local meters.
+/// Runs a scene without outputs. Returns the report, the longest frame in ms, and the final
+/// positions in local meters.
 pub(super) fn positions(
     scene: &str,
     changes: &[Override],

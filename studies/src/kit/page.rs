@@ -1,4 +1,5 @@
-//! Pages of `docs/results`: prose written by hand, with tables between markers that a study replaces.
+//! Pages of `docs/results`: prose written by hand, with tables between markers that a study
+//! replaces.
 //!
 //! A marker is a line `<!-- table: NAME -->`; the table ends at the next line `<!-- end -->`.
 

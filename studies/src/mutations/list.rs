@@ -1,4 +1,5 @@
-//! Mutations of constraints, GPU passes and resampling: faults that people make, each an edit of one place.
+//! Mutations of constraints, GPU passes and resampling: faults that people make, each an edit of
+//! one place.
 
 /// One fault.
 pub struct Mutation {

@@ -1,4 +1,5 @@
-//! Mutations: deliberate faults, one at a time, in a copy of the last commit. At least one test must fail for each.
+//! Mutations: deliberate faults, one at a time, in a copy of the last commit. At least one test
+//! must fail for each.
 
 mod chainmail;
 mod list;

@@ -1,5 +1,5 @@
-//! Mutations for the stability suite: missing guards, descent in one direction or too far, a skin tension that is not convex,
-//! absolute lengths.
+//! Mutations for the stability suite: missing guards, descent in one direction or too far, a skin
+//! tension that is not convex, absolute lengths.
 
 use super::list::Suite::Stability;
 use super::list::{Mutation, mutation};

@@ -1,4 +1,4 @@
-//! Bodies for kernels and long runs: a lattice with any choice of kinds, in either formulation.
+//! Bodies for kernels and long runs: a lattice with any kinds of constraints in any formulation.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{
@@ -16,13 +16,13 @@ pub const STEP: f64 = 0.1;
 /// A kind of constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConstraintKind {
-    /// Along the edges.
+    /// Springs along the edges.
     Distance,
-    /// Of the tetrahedra.
+    /// Volumes of the tetrahedra.
     Volume,
-    /// On a part of the faces.
+    /// Skin tension on a part of the faces.
     SkinTension,
-    /// The same, in the paper's form; PBD only.
+    /// Skin tension in the form of the paper, for PBD only.
     SkinTensionPaper,
 }
 
@@ -30,28 +30,28 @@ impl ConstraintKind {
     /// All kinds.
     pub const ALL: [Self; 4] = [Self::Distance, Self::Volume, Self::SkinTension, Self::SkinTensionPaper];
 
-    /// Whether it can be run with a formulation.
+    /// True if the kind works with the formulation.
     pub fn fits(self, formulation: Formulation) -> bool {
         self != Self::SkinTensionPaper || formulation == Formulation::Pbd
     }
 }
 
-/// What a body is made of.
+/// Size and constraints of a body.
 #[derive(Clone, Debug)]
 pub struct Plan<'a> {
     /// Vertices along each axis.
     pub size: [usize; 3],
     /// Formulation of the stiffness.
     pub formulation: Formulation,
-    /// Kinds, in order.
+    /// Kinds of constraints, in order.
     pub kinds: &'a [ConstraintKind],
-    /// A stiffness for each constraint, or one for all.
+    /// True for a stiffness of each constraint, false for one stiffness of all.
     pub each: bool,
-    /// Whether the face at x = 0 is fixed; a body that is free has momentum.
+    /// True if the face at x = 0 is fixed. A free body has momentum.
     pub fixed: bool,
-    /// Whether two edges of the opposite face are dragged.
+    /// True if handles drag two edges of the opposite face.
     pub handles: bool,
-    /// Factor on the compliances; at 1 a substep of 1 ms takes about half of an error back.
+    /// Factor on the compliances. With 1, a substep of 1 ms removes about half of an error.
     pub softness: f64,
 }
 
@@ -59,7 +59,7 @@ impl Plan<'_> {
     /// The body at rest.
     ///
     /// # Errors
-    /// What the builder refuses.
+    /// The builder refuses the system.
     pub fn system(&self) -> Result<System<f32>, Failure> {
         let lattice = Kuhn::new(self.size, STEP);
         let count = lattice.positions.len();
@@ -69,7 +69,7 @@ impl Plan<'_> {
             false => 0.5 + (n % 7) as f64,
         };
         let masses: Vec<f64> = (0..count).map(inverse_mass).collect();
-        // Vertices that lie away from the origin by no round number, as real ones do.
+        // Offset by numbers that are not round, as in real bodies.
         let positions: Vec<Point3<f64>> =
             lattice.positions.iter().map(|p| p + Vector3::new(-0.43, 0.117, 0.0291)).collect();
         let faces: Vec<[u32; 3]> = lattice.tets.iter().map(|&[a, b, c, _]| [a, b, c]).step_by(5).collect();

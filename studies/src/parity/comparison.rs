@@ -1,4 +1,4 @@
-//! What a comparison found, what it had to find, and how that is told.
+//! A comparison: figures, verdict, and its row in the result.
 
 use std::collections::BTreeMap;
 
@@ -6,27 +6,27 @@ use serde::Serialize;
 
 use super::expected::ExpectedFailure;
 
-/// How close to the arithmetic a comparison is.
+/// A group of comparisons, from single operations to whole runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ring {
-    /// Value and gradients of a constraint on their own.
+    /// Value and gradients of a single constraint.
     Op,
     /// One pass on the device.
     Kernel,
     /// Whole runs.
     Scene,
-    /// What a long run must keep, on any device: momentum, energy.
+    /// Momentum and energy of a long run, on any device.
     Invariant,
-    /// What the device computes in `f32` and the CPU in `f64`: near, not equal. The same passes are equal to their `f32` twins
-    /// in the ring of kernels.
+    /// Passes in `f32` on the device and in `f64` on the CPU: near, not equal. In the ring of
+    /// kernels the same passes are equal to their `f32` twins.
     Oracle,
-    /// The largest lattice, once.
+    /// One step of the largest lattice.
     FullSize,
 }
 
 impl Ring {
-    /// As in the table and in JSON.
+    /// Name in tables and in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Op => "op",
@@ -42,108 +42,108 @@ impl Ring {
 /// The figures of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Figures {
-    /// Numbers, voxels or pixels that were compared.
+    /// Number of compared numbers, voxels or pixels.
     pub compared: u64,
-    /// Those that are not equal.
+    /// Number of those that are not equal.
     pub differing: u64,
-    /// The largest difference, as a multiple of what `of` says; null in JSON if it is not finite.
+    /// The largest difference in units of `of`. Null in JSON if it is not finite.
     pub worst: f64,
-    /// The largest that is allowed.
+    /// The largest allowed difference.
     pub tolerance: f64,
-    /// What `worst` is measured by.
+    /// Unit of `worst`.
     pub of: &'static str,
 }
 
-/// What a comparison found.
+/// Result of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// Whether the two sides agree as far as they have to. A control must not.
+    /// True if the two sides agree within the tolerance. A control must not agree.
     pub agrees: bool,
     /// The figures.
     pub figures: Figures,
 }
 
 impl Measured {
-    /// Where nothing was compared, nothing agrees.
+    /// A result. It does not agree if nothing was compared.
     pub fn new(agrees: bool, figures: Figures) -> Self {
         Self { agrees: agrees && figures.compared > 0, figures }
     }
 
-    /// A figure with a bound; NaN is beyond any.
+    /// A figure with a bound. NaN exceeds every bound.
     pub fn at_most(compared: u64, worst: f64, tolerance: f64, of: &'static str) -> Self {
         let differing = compared * u64::from(worst != 0.0);
         Self::new(worst <= tolerance, Figures { compared, differing, worst, tolerance, of })
     }
 }
 
-/// How a row ended.
+/// Verdict on a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// All is equal.
+    /// All numbers are equal.
     Exact,
-    /// All is near enough.
+    /// All differences are within the tolerance.
     Within,
-    /// A control was rejected, as it must be.
+    /// A control was rejected, as required.
     Rejected,
-    /// It failed, and that is known: see [`ExpectedFailure`].
+    /// The comparison failed as expected: see [`ExpectedFailure`].
     ExpectedFailure,
     /// The two sides do not agree.
     Failed,
-    /// A control passed: the comparison sees nothing.
+    /// A control passed: the comparison does not notice the fault.
     ControlPassed,
-    /// It passed, although it is expected to fail: the expectation has to go.
+    /// The comparison passed although it was expected to fail: the expectation must be removed.
     UnexpectedPass,
-    /// It could not be carried out.
+    /// The comparison ended with an error.
     Error,
 }
 
 impl Verdict {
-    /// Whether the command may end well in spite of it.
+    /// True if the command may succeed with this verdict.
     pub fn is_good(self) -> bool {
         matches!(self, Self::Exact | Self::Within | Self::Rejected | Self::ExpectedFailure)
     }
 }
 
-/// One row of the result.
+/// A comparison or a control, with its verdict.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Ring.
     pub ring: Ring,
-    /// What was compared.
+    /// Name of the comparison.
     pub name: String,
-    /// What is compared with the CPU.
+    /// The backend that is compared with the CPU.
     pub backend: &'static str,
     /// Name of the adapter.
     pub adapter: String,
-    /// In a control: what is wrong on purpose and had to be rejected.
+    /// The deliberate fault of a control.
     pub control: Option<String>,
-    /// How it ended.
+    /// Verdict.
     pub outcome: Verdict,
-    /// The figures; null where it could not be carried out.
+    /// Figures. Null after an error.
     pub figures: Option<Figures>,
     /// Further figures by name.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub details: BTreeMap<&'static str, f64>,
-    /// Why it failed, or is expected to.
+    /// Reason of a failure or of an expected failure.
     pub note: Option<String>,
 }
 
-/// What is compared: the row without its result.
+/// A comparison without its result.
 #[derive(Clone, Debug)]
 pub struct Subject<'a> {
     /// Ring.
     pub ring: Ring,
-    /// What is compared.
+    /// Name of the comparison.
     pub name: &'a str,
     /// Name of the adapter.
     pub adapter: &'a str,
-    /// What is wrong on purpose.
+    /// The deliberate fault of a control.
     pub control: Option<&'a str>,
 }
 
 impl Comparison {
-    /// The row of a comparison that found this, or could not be carried out.
+    /// Judges a result or an error.
     pub fn judge(
         subject: &Subject<'_>,
         found: Result<Measured, String>,
@@ -154,7 +154,7 @@ impl Comparison {
         let (outcome, note) = match (found, subject.control, known) {
             (Err(error), Some(_), _) | (Err(error), None, None) => (Verdict::Error, Some(error)),
             (Ok(found), Some(_), _) if found.agrees => {
-                (Verdict::ControlPassed, Some("something wrong on purpose went unseen".into()))
+                (Verdict::ControlPassed, Some("the fault was not noticed".into()))
             }
             (Ok(_), Some(_), _) => (Verdict::Rejected, None),
             (Ok(found), None, Some(reason)) if found.agrees => {
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_comparison_has_to_agree_and_a_control_must_not() {
+    fn a_comparison_must_agree_and_a_control_must_not() {
         let on_card = |control, found| outcome("distance", "card", control, found);
         assert_eq!(on_card(None, Ok(true)), Verdict::Exact);
         assert_eq!(on_card(None, Ok(false)), Verdict::Failed);
@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(known(Err(())), Verdict::ExpectedFailure);
         assert_eq!(known(Ok(true)), Verdict::UnexpectedPass);
         assert!(Verdict::ExpectedFailure.is_good());
-        // Only that row on that adapter, and never a control.
+        // Only for this comparison on this adapter, and never for a control.
         assert_eq!(outcome("distance", "odd card", None, Ok(false)), Verdict::Failed);
         assert_eq!(outcome("volume", "card", None, Ok(false)), Verdict::Failed);
         assert_eq!(outcome("volume", "odd card", Some("wrong"), Ok(true)), Verdict::ControlPassed);
@@ -227,14 +227,14 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_that_is_no_number_and_a_comparison_of_nothing_do_not_agree() {
+    fn nan_and_an_empty_comparison_do_not_agree() {
         assert!(!Measured::at_most(1, f64::NAN, 1.0, "extent").agrees);
         assert!(!Measured::at_most(0, 0.0, 1.0, "extent").agrees);
         assert!(Measured::at_most(1, 1.0, 1.0, "extent").agrees);
     }
 
     #[test]
-    fn a_row_has_the_keys_that_others_rely_on() {
+    fn a_comparison_has_the_documented_keys() {
         let subject = Subject { ring: Ring::Kernel, name: "n", adapter: "a", control: Some("wrong") };
         let row = Comparison::judge(&subject, Ok(Measured::at_most(3, f64::INFINITY, 1e-6, "extent")), &[]);
         let json = serde_json::to_value(&row).unwrap();

@@ -1,23 +1,24 @@
-//! How far two rows of numbers are apart, and whether that is allowed on an adapter.
+//! The difference of two sequences of numbers, and the largest allowed difference of an adapter.
 
 use cutis_gpu::{Adapter, AdapterKind};
 
 use super::comparison::{Figures, Measured};
 
-/// What hardware may differ by after a few frames, as a share of the body's extent: it may fuse a product with a sum.
+/// Largest difference on hardware after a few frames, as a share of the extent of the body.
+/// Hardware may fuse a product with a sum.
 pub const TOLERANCE: f64 = 1e-6;
 
-/// What an adapter is held to.
+/// Requirement for an adapter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Policy {
-    /// Every number is that of the CPU.
+    /// Every number equals the number of the CPU.
     Exact,
-    /// Numbers differ by at most this, over their extent.
+    /// Numbers differ by at most this share of their extent.
     Within(f64),
 }
 
 impl Policy {
-    /// Software rounds as the CPU does; hardware has [`TOLERANCE`].
+    /// Software adapters have to be exact; hardware has [`TOLERANCE`].
     pub fn of(adapter: &Adapter) -> Self {
         match adapter.kind {
             AdapterKind::Software => Self::Exact,
@@ -25,7 +26,7 @@ impl Policy {
         }
     }
 
-    /// The policy in words.
+    /// Description of the policy.
     pub fn describe(self) -> String {
         match self {
             Self::Exact => "every number equal".into(),
@@ -34,17 +35,18 @@ impl Policy {
     }
 }
 
-/// The difference of what a device found from what the CPU did.
+/// The difference between the results of a device and of the CPU.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Difference {
     compared: u64,
     differing: u64,
-    /// Largest difference over the extent; infinite for a number that is none.
+    /// Largest difference over the extent; infinite for NaN.
     worst: f64,
 }
 
 impl Difference {
-    /// Adds numbers whose differences are compared with `extent`. Numbers without a partner differ infinitely.
+    /// Adds two sequences of numbers with their extent. The difference of a missing number is
+    /// infinite.
     pub fn add(
         mut self,
         found: impl IntoIterator<Item = f32>,
@@ -61,7 +63,7 @@ impl Difference {
             };
             self.compared += 1;
             self.differing += u64::from(apart != 0.0);
-            // NaN is on neither side of any number.
+            // A comparison with NaN is false.
             self.worst = if apart <= self.worst {
                 self.worst
             } else if apart.is_nan() {
@@ -72,7 +74,7 @@ impl Difference {
         }
     }
 
-    /// Whether an adapter may differ so far.
+    /// Judges the difference by a policy.
     pub fn judged(self, policy: Policy) -> Measured {
         let Self { compared, differing, worst } = self;
         let (agrees, tolerance) = match policy {
@@ -84,7 +86,7 @@ impl Difference {
     }
 }
 
-/// The numbers of rows of four, without the fourth.
+/// The first three of every four numbers.
 pub fn triples(rows: &[[f32; 4]]) -> impl Iterator<Item = f32> {
     rows.iter().flat_map(|&[x, y, z, _]| [x, y, z])
 }
@@ -99,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn software_has_to_be_equal_and_hardware_near() {
+    fn software_must_be_equal_and_hardware_near() {
         let near = [1.0, 1.0 + f32::EPSILON];
         assert!(measured(&near, &near, Policy::Exact).agrees);
         assert!(!measured(&near, &[1.0, 1.0], Policy::Exact).agrees);
@@ -110,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_missing_or_not_there_at_all_never_agrees() {
+    fn nan_and_missing_numbers_never_agree() {
         for policy in [Policy::Exact, Policy::Within(TOLERANCE)] {
             assert!(!measured(&[f32::NAN], &[f32::NAN], policy).agrees);
             assert!(!measured(&[f32::NAN, 1.0], &[1.0, 1.0], policy).agrees);

@@ -1,23 +1,23 @@
-//! Failures that are known, with their reasons: data, so that one that is gone is noticed.
+//! Known failures with their reasons, as data: a known failure that passes fails the command.
 
 use super::comparison::Subject;
 
-/// A comparison that fails on an adapter, and why.
+/// A comparison that fails on an adapter, with the reason.
 #[derive(Clone, Copy, Debug)]
 pub struct ExpectedFailure {
-    /// Part of the adapter's name, upper or lower case alike.
+    /// Part of the name of the adapter; case does not matter.
     pub adapter: &'static str,
-    /// Part of the row's name.
+    /// Part of the name of the comparison.
     pub row: &'static str,
-    /// Why it fails, and where that is written.
+    /// Reason of the failure.
     pub reason: &'static str,
 }
 
-/// What is known to fail: nothing.
+/// The known failures: none.
 pub const EXPECTED: &[ExpectedFailure] = &[];
 
 impl ExpectedFailure {
-    /// Whether it speaks of this row. Controls are never expected to fail.
+    /// True if it applies to this comparison. It never applies to a control.
     pub fn is_about(&self, subject: &Subject<'_>) -> bool {
         subject.control.is_none()
             && subject.name.contains(self.row)

@@ -1,6 +1,8 @@
-//! The lattice of the paper's largest volume, all three kinds on it, built and stepped once within WebGPU's baseline limits.
+//! The lattice of the largest volume of the paper with three kinds of constraints: one step within
+//! the baseline limits of WebGPU.
 //!
-//! One body is in memory at a time: the device's positions are kept, its body is dropped, and the CPU gets one of its own.
+//! Only one body is in memory at a time. The body of the device is dropped before the body of the
+//! CPU is built.
 
 use std::time::Instant;
 
@@ -31,7 +33,7 @@ const SETTINGS: Settings = Settings {
     relaxation: 1.0,
 };
 
-/// Runs it.
+/// Runs the ring.
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     let name = format!("{} × {} × {} vertices, three kinds, one XPBD step", SIZE[0], SIZE[1], SIZE[2]);
     let gpu = bench.gpu.clone();
@@ -86,7 +88,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     bench.control(Ring::FullSize, &name, "velocities × 1.001", |_, policy| Ok(judged(&wrong, policy)))
 }
 
-/// A block that stands on its lowest layer and is thrown out of shape by its velocities, with skin all around.
+/// A block with skin on all sides. Its lowest layer is fixed, and its velocities deform it.
 fn system() -> Result<System<f32>, Failure> {
     let Kuhn { positions, edges, edge_colors, tets, tet_colors } = Kuhn::new(SIZE, STEP);
     let layer = SIZE[0] * SIZE[1];
@@ -147,7 +149,7 @@ fn gib(parts: &[MemoryPart]) -> f64 {
     parts.iter().map(|part| part.bytes).sum::<usize>() as f64 / GIB
 }
 
-/// The most memory that this process had, where the system says so.
+/// Peak memory of this process. `None` if the system does not report it.
 fn peak_gib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

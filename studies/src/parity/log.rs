@@ -1,47 +1,47 @@
-//! The rows on a terminal: a line each as they come, controls of a comparison together.
+//! The comparisons on the terminal: one line each, and one line for all controls of a comparison.
 
 use std::io::{self, IsTerminal, Write};
 
 use super::comparison::{Comparison, Figures, Measured, Ring, Subject, Verdict};
 use super::expected::ExpectedFailure;
 
-/// Takes the rows, prints and keeps them.
+/// Prints and keeps the comparisons.
 pub struct Log<'a> {
     out: &'a mut dyn Write,
     expected: &'a [ExpectedFailure],
     rows: Vec<Comparison>,
-    /// Rows that are printed; those after are controls of the same comparison.
+    /// Number of printed rows. The rest are a comparison and its controls.
     printed: usize,
-    /// Whether somebody looks at what is going on.
+    /// True if stderr is a terminal, for a line of progress.
     watched: bool,
 }
 
 impl<'a> Log<'a> {
-    /// An empty table; `expected` are the failures that are known.
+    /// An empty log with the known failures.
     pub fn new(out: &'a mut dyn Write, expected: &'a [ExpectedFailure]) -> Self {
         Self { out, expected, rows: Vec::new(), printed: 0, watched: io::stderr().is_terminal() }
     }
 
-    /// A line of text.
+    /// Prints a line of text.
     ///
     /// # Errors
-    /// The terminal's.
+    /// The output cannot be written.
     pub fn line(&mut self, text: &str) -> io::Result<()> {
         self.flush()?;
         writeln!(self.out, "{text}")
     }
 
-    /// Says on a terminal what is being worked on, until the next line.
+    /// Shows the present comparison on a terminal, until the next line.
     pub fn working_on(&self, what: &str) {
         if self.watched {
             eprint!("\r\x1b[K  … {what}");
         }
     }
 
-    /// Judges and adds a row.
+    /// Judges and adds a comparison.
     ///
     /// # Errors
-    /// The terminal's.
+    /// The output cannot be written.
     pub fn add(
         &mut self,
         subject: &Subject<'_>,
@@ -55,10 +55,10 @@ impl<'a> Log<'a> {
         Ok(&mut self.rows[at])
     }
 
-    /// Prints what is not printed yet.
+    /// Prints the rows that are not printed yet.
     ///
     /// # Errors
-    /// The terminal's.
+    /// The output cannot be written.
     pub fn flush(&mut self) -> io::Result<()> {
         if self.watched {
             eprint!("\r\x1b[K");
@@ -80,7 +80,7 @@ impl<'a> Log<'a> {
                 .filter_map(|row| row.figures.as_ref())
                 .min_by(|a, b| a.worst.total_cmp(&b.worst));
             let names: Vec<&str> = rejected.iter().filter_map(|row| row.control.as_deref()).collect();
-            let heading = format!("  {} controls REJECTED as they must be", rejected.len());
+            let heading = format!("  {} controls REJECTED as required", rejected.len());
             writeln!(
                 self.out,
                 "{:<10}{heading:<60} {}",
@@ -92,10 +92,11 @@ impl<'a> Log<'a> {
         self.out.flush()
     }
 
-    /// Prints the summary and gives the rows, with whether all is well: each of the `required` rings has a row, and none is bad.
+    /// Prints the summary. Returns the rows, and whether each of the `required` rings has a row and
+    /// every verdict is good.
     ///
     /// # Errors
-    /// The terminal's.
+    /// The output cannot be written.
     pub fn finish(mut self, required: &[Ring]) -> io::Result<(Vec<Comparison>, bool)> {
         self.flush()?;
         let count = |outcome| self.rows.iter().filter(|row| row.outcome == outcome).count();
@@ -135,7 +136,7 @@ impl<'a> Log<'a> {
     }
 }
 
-/// How a row ended, with its figures.
+/// The verdict with its figures.
 fn outcome(row: &Comparison) -> String {
     let figures = row.figures.as_ref();
     let apart = figures.map_or(String::new(), |f| {
@@ -149,7 +150,7 @@ fn outcome(row: &Comparison) -> String {
         Verdict::Within => figures.map_or(String::new(), |f| {
             format!("within   {} of {} × {}; {compared} compared", number(f.worst), number(f.tolerance), f.of)
         }),
-        Verdict::Rejected => "rejected, as it must be".into(),
+        Verdict::Rejected => "rejected, as required".into(),
         Verdict::ExpectedFailure => format!("fails as expected: {note}"),
         Verdict::Failed => format!("FAILED   {apart}"),
         Verdict::ControlPassed => format!("CONTROL PASSED, {note}"),
@@ -158,7 +159,7 @@ fn outcome(row: &Comparison) -> String {
     }
 }
 
-/// By how much the weakest of the controls was seen.
+/// The smallest difference of a control.
 fn least(figures: &Figures) -> String {
     format!("least: {} of {} ({} allowed)", number(figures.worst), figures.of, number(figures.tolerance))
 }
@@ -176,46 +177,46 @@ fn number(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// The text of a table with these rows (control, agrees), and whether all is well.
-    fn table(rows: &[(Option<&str>, bool)]) -> (String, bool) {
+    /// The text of a log with these rows (control, agrees), and whether it passes.
+    fn logged(rows: &[(Option<&str>, bool)]) -> (String, bool) {
         let mut text = Vec::new();
-        let mut table = Log::new(&mut text, &[]);
+        let mut log = Log::new(&mut text, &[]);
         for &(control, agrees) in rows {
             let worst = if agrees { 0.0 } else { 2e-3 };
             let subject = Subject { ring: Ring::Op, name: "springs", adapter: "card", control };
-            table.add(&subject, Ok(Measured::at_most(7, worst, 1e-6, "extent"))).unwrap();
+            log.add(&subject, Ok(Measured::at_most(7, worst, 1e-6, "extent"))).unwrap();
         }
-        let (kept, well) = table.finish(&[Ring::Op]).unwrap();
+        let (kept, well) = log.finish(&[Ring::Op]).unwrap();
         assert_eq!(kept.len(), rows.len());
         (String::from_utf8(text).unwrap(), well)
     }
 
     #[test]
     fn a_control_that_passes_fails_the_command() {
-        let (text, well) = table(&[(None, true), (Some("first"), false), (Some("second"), false)]);
+        let (text, well) = logged(&[(None, true), (Some("first"), false), (Some("second"), false)]);
         assert!(well);
         assert!(text.contains("exact    7 compared") && text.contains("2 controls REJECTED"), "{text}");
         assert!(text.contains("first; second") && text.contains("least: 0.002 of extent"), "{text}");
 
-        let (text, well) = table(&[(None, true), (Some("first"), false), (Some("second"), true)]);
+        let (text, well) = logged(&[(None, true), (Some("first"), false), (Some("second"), true)]);
         assert!(!well);
         assert!(text.contains("PARITY DOES NOT HOLD") && text.contains("1 misses"), "{text}");
         assert!(text.contains("op, springs, control second, card: CONTROL PASSED"), "{text}");
     }
 
     #[test]
-    fn a_row_that_fails_and_a_table_without_rows_fail_the_command() {
-        assert!(!table(&[(None, false), (Some("first"), false)]).1);
-        assert!(!table(&[]).1);
+    fn a_failed_comparison_and_an_empty_log_fail_the_command() {
+        assert!(!logged(&[(None, false), (Some("first"), false)]).1);
+        assert!(!logged(&[]).1);
     }
 
     #[test]
     fn a_ring_without_a_row_fails_the_command() {
         let mut text = Vec::new();
-        let mut table = Log::new(&mut text, &[]);
+        let mut log = Log::new(&mut text, &[]);
         let subject = Subject { ring: Ring::Op, name: "springs", adapter: "card", control: None };
-        table.add(&subject, Ok(Measured::at_most(7, 0.0, 0.0, "extent"))).unwrap();
-        assert!(!table.finish(&[Ring::Op, Ring::Scene]).unwrap().1);
+        log.add(&subject, Ok(Measured::at_most(7, 0.0, 0.0, "extent"))).unwrap();
+        assert!(!log.finish(&[Ring::Op, Ring::Scene]).unwrap().1);
         assert!(String::from_utf8(text).unwrap().contains("scene: no row"));
     }
 }

@@ -1,4 +1,5 @@
-//! Parity: the GPU backend against the CPU backend in `f32`, on every adapter of the machine, in three rings.
+//! Parity: the GPU backend against the CPU backend in `f32`, on every adapter of the machine, in
+//! three rings.
 //!
 //! | ring | compares | with |
 //! |---|---|---|
@@ -6,8 +7,9 @@
 //! | kernel | one pass of each kernel | the CPU backend, or the scalar twin |
 //! | scene | whole runs of the pipeline; conserved quantities of long runs | the same run on the CPU |
 //!
-//! Every comparison has controls: the same comparison with a deliberate fault. A control that passes is a failure, and so is
-//! an expected failure ([`EXPECTED`]) that passes. The [`Policy`] of an adapter is the largest allowed difference.
+//! Every comparison has controls: the same comparison with a deliberate fault. A control that
+//! passes is a failure, and so is an expected failure ([`EXPECTED`]) that passes. The [`Policy`] of
+//! an adapter is the largest allowed difference.
 
 mod bench;
 mod bodies;
@@ -41,11 +43,13 @@ use log::Log;
 /// Rings of a run. Each must have compared something.
 const RINGS: [Ring; 3] = [Ring::Op, Ring::Kernel, Ring::Scene];
 
-/// Compares, prints every comparison to `out`, and writes the file of [`Options::json`]. Returns whether every comparison has
-/// the required verdict. With [`Options::write`] it runs three times and writes the page instead.
+/// Compares, prints every comparison to `out`, and writes the file of [`Options::json`]. Returns
+/// whether every comparison has the required verdict. With [`Options::write`] it runs three times
+/// and writes the page instead.
 ///
 /// # Errors
-/// There is no adapter and that is not allowed, an adapter cannot be opened, or a file cannot be written.
+/// There is no adapter and that is not allowed, an adapter cannot be opened, or a file cannot be
+/// written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     if options.write {
         return page::write().map(|()| true);

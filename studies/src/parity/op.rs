@@ -1,9 +1,10 @@
-//! The inner ring: value and gradients of each constraint, on thousands of random shapes at 1 mm, 1 m and 1 km and on
-//! degenerate ones.
+//! The inner ring: value and gradients of each constraint on thousands of random shapes at 1 mm, 1
+//! m and 1 km, and on degenerate shapes.
 //!
-//! These are the checks of `cutis-conformance`: a device may be at most 4 times as far from `f64` as the CPU's `f32`, and on
-//! software every number has to be the CPU's. Controls: the shader with value or gradient off by 1e-3, with gradients swapped,
-//! with the exponent of infinity.
+//! These are the checks of `cutis-conformance`. The error of a device against `f64` may be at most
+//! 4 times the error of the CPU in `f32`. On software adapters every number has to equal the number
+//! of the CPU. The controls change the value or a gradient by 1e-3, swap gradients, or change the
+//! exponent of infinity.
 
 use cutis_conformance::{ConformanceError, Finding, Limit, Report, Subject, device};
 use cutis_constraints::{
@@ -47,8 +48,8 @@ fn examine<C: Constraint<N>, const N: usize>(
 
 const ALLOWED: &str = "what f64 allows";
 
-/// One row for what a check found, and one for each of its controls. `compared` says how many numbers the check looks at, and
-/// what its figures are.
+/// Adds a check and its controls. `compared` is the number of compared numbers and the unit of the
+/// figures.
 fn check(
     bench: &mut Bench<'_, '_>,
     name: &str,
@@ -71,7 +72,8 @@ fn check(
     Ok(())
 }
 
-/// The controls with their rows: on software each is looked at twice, within tolerance and for equality.
+/// The controls with their rows. On software a control has two rows: within the tolerance, and for
+/// equality.
 fn controls(rows: &[Finding]) -> Vec<(&str, Vec<&Finding>)> {
     let mut found: Vec<(&str, Vec<&Finding>)> = Vec::new();
     for row in rows.iter().filter(|row| row.is_control()) {
@@ -90,7 +92,8 @@ fn bound(row: &Finding) -> f64 {
     }
 }
 
-/// The rows of a report in one: figures over what is allowed, and the count of numbers that had to be equal.
+/// All rows of a report as one result: the largest figure over its bound, and the number of
+/// differing numbers.
 fn comparison(report: &Report, (compared, of): (usize, &'static str)) -> Measured {
     let rows = || report.findings.iter().filter(|row| !row.is_control());
     let differing: f64 = rows().filter(|row| bound(row) == 0.0).map(|row| row.value).sum();

@@ -8,10 +8,11 @@ use serde::Serialize;
 
 /// Compares the GPU backend with the CPU backend in `f32`, on every adapter of the machine.
 ///
-/// There are three rings: single constraints (op), single passes on the device (kernel), and whole runs (scene). On software
-/// adapters every number has to be equal. Hardware may fuse a product with a sum and has a tolerance. Every comparison has
-/// controls: the same comparison with a deliberate fault, which it must reject. The exit code is 0 if every comparison has the
-/// required verdict, 1 if not or without an adapter, 2 for a wrong option.
+/// There are three rings: single constraints (op), single passes on the device (kernel), and whole
+/// runs (scene). On software adapters every number has to be equal. Hardware may fuse a product
+/// with a sum and has a tolerance. Every comparison has controls: the same comparison with a
+/// deliberate fault, which it must reject. The exit code is 0 if every comparison has the required
+/// verdict, 1 if not or without an adapter, 2 for a wrong option.
 #[derive(Clone, Debug, Default, Parser, Serialize)]
 #[command(name = "parity", bin_name = "cargo xtask study parity")]
 pub struct Options {
@@ -21,11 +22,13 @@ pub struct Options {
     /// Also the demo at full size, which takes long on a software adapter.
     #[arg(long, conflicts_with = "quick")]
     pub full: bool,
-    /// Instead of the rings: one step of a lattice of 129 × 129 × 289 vertices with three kinds of constraints, within
-    /// WebGPU's baseline limits. Needs about 3 GiB of memory, on a software adapter for both sides together.
+    /// Instead of the rings: one step of a lattice of 129 × 129 × 289 vertices with three kinds of
+    /// constraints, within WebGPU's baseline limits. Needs about 3 GiB of memory, on a software
+    /// adapter for both sides together.
     #[arg(long, conflicts_with_all = ["quick", "full", "chunk_cap"])]
     pub full_size: bool,
-    /// Run with default limits, in small chunks and at full size, and write the tables of docs/results/parity.md.
+    /// Run with default limits, in small chunks and at full size, and write the tables of
+    /// docs/results/parity.md.
     #[arg(long, exclusive = true)]
     #[serde(skip)]
     pub write: bool,
@@ -40,7 +43,8 @@ pub struct Options {
     #[arg(long, value_name = "NAME|INDEX", value_parser = |text: &str| text.parse::<Select>())]
     #[serde(serialize_with = "as_text")]
     pub adapter: Option<Select>,
-    /// Largest number of items in a chunk, so that colors are split. Small chunks need many dispatches and take long.
+    /// Largest number of items in a chunk, so that colors are split. Small chunks need many
+    /// dispatches and take long.
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     pub chunk_cap: Option<usize>,
     /// Request exactly the default limits of WebGPU from the device.

@@ -1,4 +1,5 @@
-//! The page of the study: the comparison runs three times with different limits, each in a process of its own.
+//! The page of the study: the comparison runs three times with different limits, each in a process
+//! of its own.
 
 use std::fs;
 
@@ -37,7 +38,8 @@ pub fn write() -> Result<(), Failure> {
         let mut command = command(std::env::current_exe()?);
         command.arg("parity").args(options).arg("--json").arg(&path);
         if options.contains(&"--full-size") {
-            // With long dispatches the threads of the software driver are faster than the calling thread.
+            // With long dispatches the threads of the software driver are faster than the calling
+            // thread.
             command.env_remove("LP_NUM_THREADS");
         }
         execute(&mut command)?;
@@ -76,7 +78,8 @@ fn provenance(options: &[&str], found: &Value) -> String {
     line
 }
 
-/// A table of rings, a table of the comparisons that are not exact, and the details of the full-size run.
+/// A table of rings, a table of the comparisons that are not exact, and the details of the
+/// full-size run.
 fn tables(found: &Value) -> String {
     let rows = found["rows"].as_array().map(Vec::as_slice).unwrap_or_default();
     let mut rings =

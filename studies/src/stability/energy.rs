@@ -1,13 +1,14 @@
 //! The energy of a body, and its upper bound.
 //!
-//! A constraint that is too stiff for the substep acts as if it removed its error within one substep. Its compliance counts as
-//! at least `h²·Σ w|∇C|²` at the rest shape. PBD and a compliance of 0 therefore have a finite energy: the kinetic energy of
-//! removing the error in one substep. Vertex block descent steps implicitly, so there a compliance counts as it is. All sums
-//! are in `f64`, by [`evaluate`](cutis_solver::ConstraintSet::evaluate), from the stored parameters.
+//! A constraint that is too stiff for the substep acts as if it removed its error within one
+//! substep. Its compliance counts as at least `h²·Σ w|∇C|²` at the rest shape. PBD and a compliance
+//! of 0 therefore have a finite energy: the kinetic energy of removing the error in one substep.
+//! Vertex block descent steps implicitly, so there a compliance counts as it is. All sums are in
+//! `f64`, by [`evaluate`](cutis_solver::ConstraintSet::evaluate), from the stored parameters.
 //!
-//! Every projection rounds positions. An error of half a unit in the last place of a position is an error of the velocity of
-//! that much per substep. This random walk heats a body, and more so with shorter substeps. The energy that rounding can add
-//! counts as put in, and its share is reported.
+//! Every projection rounds positions. An error of half a unit in the last place of a position is an
+//! error of the velocity of that much per substep. This random walk heats a body, and more so with
+//! shorter substeps. The energy that rounding can add counts as put in, and its share is reported.
 
 use cutis_constraints::Scalar;
 use cutis_solver::{Formulation, Settings, Stiffness, System};
@@ -15,10 +16,12 @@ use nalgebra::{Point3, Vector3};
 
 use crate::kit::larger;
 
-/// Largest total energy over the energy put in, if a substep resolves the stiffness: it does not grow.
+/// Largest total energy over the energy put in, if a substep resolves the stiffness: it does not
+/// grow.
 pub const RESOLVED: f64 = 1.05;
-/// The same if a substep does not resolve the stiffness. The constraints of a vertex then move it one after the other within a
-/// substep. If they agree in direction, the kinetic energy is the square of a sum, and the budget is the sum of squares.
+/// The same if a substep does not resolve the stiffness. The constraints of a vertex then move it
+/// one after the other within a substep. If they agree in direction, the kinetic energy is the
+/// square of a sum, and the budget is the sum of squares.
 pub const UNRESOLVED: f64 = 10.0;
 
 /// Relative rounding error of a rest size, in units of the machine epsilon of the number type.
@@ -38,7 +41,8 @@ pub struct Energy {
 /// Measures the energy of one body.
 pub struct Meter {
     gravity: Vector3<f64>,
-    /// Effective compliance of each constraint of each kind. Infinite for a constraint without effect.
+    /// Effective compliance of each constraint of each kind. Infinite for a constraint without
+    /// effect.
     compliances: Vec<Vec<f64>>,
     /// Energy that rounding of positions may add in one substep, in J.
     pub heat: f64,
@@ -109,9 +113,9 @@ impl Meter {
     }
 }
 
-/// Energy that rounding may add in one substep. A coordinate is rounded once in prediction and once per projection of its
-/// vertex, each time by up to half a unit in the last place. The resulting velocities add up as in a random walk. A factor of
-/// 4 allows for correlated errors of neighbors.
+/// Energy that rounding may add in one substep. A coordinate is rounded once in prediction and once
+/// per projection of its vertex, each time by up to half a unit in the last place. The resulting
+/// velocities add up as in a random walk. A factor of 4 allows for correlated errors of neighbors.
 fn heat<T: Scalar>(system: &System<T>, settings: &Settings) -> f64 {
     let mut roundings = vec![1.0; system.vertices().len()];
     for set in system.kinds() {
@@ -145,7 +149,8 @@ impl History {
         self.entries.push((energy, work));
     }
 
-    /// Energy put in: the energy at the start, the work of the handles, and the work of gravity down to the lowest height.
+    /// Energy put in: the energy at the start, the work of the handles, and the work of gravity
+    /// down to the lowest height.
     fn budget(&self, work: f64) -> f64 {
         let Some((start, _)) = self.entries.first() else { return 0.0 };
         start.kinetic + start.elastic + start.gravity - self.lowest() + work
@@ -172,7 +177,8 @@ impl History {
         self.entries.iter().map(ratio).fold(0.0, larger)
     }
 
-    /// Index of the first sample from which the kinetic energy stays below `share` of the energy put in.
+    /// Index of the first sample from which the kinetic energy stays below `share` of the energy
+    /// put in.
     pub fn rests_from(&self, share: f64, rounding: f64) -> Option<usize> {
         let moves = |(energy, work): &(Energy, f64)| energy.kinetic > share * (self.budget(*work) + rounding);
         after_last(self.entries.iter().map(moves))

@@ -1,4 +1,5 @@
-//! Input validation: each wrong input is refused by a typed error that names the element, vertex or key.
+//! Input validation: each wrong input is refused by a typed error that names the element, vertex or
+//! key.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, SkinTension, Volume};

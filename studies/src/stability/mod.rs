@@ -1,7 +1,9 @@
-//! Stability: stiff and extreme cases on every backend and at several length scales, each with a requirement.
+//! Stability: stiff and extreme cases on every backend and at several length scales, each with a
+//! requirement.
 //!
-//! A trial ends `settled` (back at the rest shape, or at rest), `bounded` (all numbers finite, no energy out of nothing),
-//! `named` (a typed error names an element that cannot act), `refused` (a typed error refuses the input), or `FAILED`.
+//! A trial ends `settled` (back at the rest shape, or at rest), `bounded` (all numbers finite, no
+//! energy out of nothing), `named` (a typed error names an element that cannot act), `refused` (a
+//! typed error refuses the input), or `FAILED`.
 
 pub mod body;
 pub mod case;
@@ -35,10 +37,12 @@ pub const TABLES: [&str; 5] = ["provenance", "backends", "formulations", "worst"
 /// Cases in the table of the worst ones.
 const WORST: usize = 12;
 
-/// Runs the cases and prints a line per trial to `out`. Returns whether every trial met its requirement.
+/// Runs the cases and prints a line per trial to `out`. Returns whether every trial met its
+/// requirement.
 ///
 /// # Errors
-/// There is no adapter, unless the options allow that or do not ask for a GPU. A file cannot be written.
+/// There is no adapter, unless the options allow that or do not ask for a GPU. A file cannot be
+/// written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let page = options.write.then(|| Page::open("stability", &TABLES)).transpose()?;
     let mut provenance = Provenance::start(&options.command());

@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 use cutis_gpu::Select;
 
-/// Runs the stability suite: stiff and extreme cases on every backend, at length scales 1e-3, 1 and 1e3.
+/// Runs the stability suite: stiff and extreme cases on every backend, at length scales 1e-3, 1 and
+/// 1e3.
 ///
-/// Each case has a requirement for its end. The exit code is 0 if every trial meets it, 1 if not, 2 for a wrong option.
+/// Each case has a requirement for its end. The exit code is 0 if every trial meets it, 1 if not, 2
+/// for a wrong option.
 #[derive(Clone, Debug, Default, Parser)]
 #[command(name = "stability", bin_name = "cargo xtask study stability")]
 pub struct Options {
@@ -17,7 +19,8 @@ pub struct Options {
     /// All cases, one of them with a million steps.
     #[arg(long, conflicts_with = "quick")]
     pub full: bool,
-    /// Only these backends; by default `reference` (f64, one thread), `cpu` (f32) and `gpu` (f32, every adapter).
+    /// Only these backends; by default `reference` (f64, one thread), `cpu` (f32) and `gpu` (f32,
+    /// every adapter).
     #[arg(long, value_enum, value_delimiter = ',')]
     pub backend: Vec<BackendName>,
     /// Only this adapter: its index, or a part of its name.

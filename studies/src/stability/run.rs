@@ -106,7 +106,8 @@ fn error_of<T: Scalar>(solver: &mut dyn Solver<T>) -> Result<f64, Failure> {
     Ok(solver.system()?.residuals().iter().map(|residual| residual.max).fold(0.0, f64::max))
 }
 
-/// Work of the handles: the elastic energy that moving their vertices would add if all others stayed.
+/// Work of the handles: the elastic energy that moving their vertices would add if all others
+/// stayed.
 fn work_of_handles<T: Scalar>(system: &System<T>, meter: &Meter, from_s: f64, over_s: f64) -> f64 {
     if system.handles().is_empty() {
         return 0.0;

@@ -1,5 +1,5 @@
-//! The program of the studies as `cargo xtask study` starts it. This test also makes `cargo test` build the program, which
-//! later steps of `cargo xtask test` run.
+//! The program of the studies as `cargo xtask study` starts it. This test also makes `cargo test`
+//! build the program, which later steps of `cargo xtask test` run.
 
 use std::process::{Command, Output};
 

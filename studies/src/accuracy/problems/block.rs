@@ -1,4 +1,5 @@
-//! A block with soft springs and a hundred times stiffer volume: pulled by a handle, and hanging from one face.
+//! A block with soft springs and a hundred times stiffer volume: pulled by a handle, and hanging
+//! from one face.
 
 use cutis_coloring::Groups;
 use cutis_constraints::{Distance, Volume, distance_compliance, volume_compliance};

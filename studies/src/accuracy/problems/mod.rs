@@ -41,7 +41,8 @@ pub const NAMES: [&str; 6] = ["sheet", "incision", "abdomen", "block", "hanging"
 /// The problems of `--quick`.
 pub const QUICK: [&str; 3] = ["sheet", "incision", "hanging"];
 
-/// The problem of a name; a smaller one if `quick`. `None` if its scan is missing; the reason is printed.
+/// The problem of a name; a smaller one if `quick`. `None` if its scan is missing; the reason is
+/// printed.
 ///
 /// # Errors
 /// The builder refuses the problem, or the name is not in [`NAMES`].

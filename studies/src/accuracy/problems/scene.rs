@@ -1,4 +1,5 @@
-//! Problems from scene files: an incision in a phantom torso and in a real abdomen, and dragged skin.
+//! Problems from scene files: an incision in a phantom torso and in a real abdomen, and dragged
+//! skin.
 
 use std::path::PathBuf;
 
@@ -66,8 +67,8 @@ pub fn drag(spacing_mm: f64) -> Result<Problem, Failure> {
     Ok(problem)
 }
 
-/// A scene with a damping that brings the body to rest in 120 frames. With less the stiff modes go on, with more the soft
-/// ones are slow.
+/// A scene with a damping that brings the body to rest in 120 frames. With less the stiff modes go
+/// on, with more the soft ones are slow.
 fn from_scene(
     name: &'static str,
     what: String,

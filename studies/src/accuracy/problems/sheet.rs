@@ -12,7 +12,8 @@ const STRAIN: f64 = 0.002;
 /// Area stiffness of the triangles over the stiffness of the springs.
 const AREA_STIFFNESS: f64 = 1.0;
 
-/// A sheet of `nx` columns with a slit of a fifth of its width. Springs have 1 N/m, vertices 1 kg and a distance of 1 m.
+/// A sheet of `nx` columns with a slit of a fifth of its width. Springs have 1 N/m, vertices 1 kg
+/// and a distance of 1 m.
 ///
 /// # Errors
 /// The builder refuses the system; it does not.

@@ -1,4 +1,4 @@
-//! Vertex block descent: one iteration over all colors, there and back, from a body out of shape.
+//! Vertex block descent: one iteration, a symmetric sweep over all colors of a deformed body.
 
 use anyhow::bail;
 use cutis_conformance::Alteration;
@@ -15,20 +15,20 @@ use crate::parity::bodies::{ConstraintKind, Plan, STEP};
 use crate::parity::comparison::Ring;
 use crate::parity::difference::{Difference, triples};
 
-/// What is wrong with the device's iteration.
+/// The fault in the iteration of the device.
 #[derive(Clone, Copy)]
 enum Wrong {
     Nothing,
     Constraint(Alteration),
-    /// A part of the kernel `vertex_force`, and what stands there.
+    /// A part of the kernel `vertex_force`, and its replacement.
     VertexForce([&'static str; 2]),
-    /// The same of `descend`.
+    /// A part of the kernel `descend`, and its replacement.
     Descend([&'static str; 2]),
-    /// The colors are gone through one way only.
+    /// Both passes have the same order of colors.
     OneWay,
 }
 
-/// A body out of shape that moves, with one kind of constraint.
+/// A deformed, moving body with one kind of constraint.
 struct Body {
     simulation: Simulation<f32>,
     positions: Vec<Point3<f32>>,
@@ -97,7 +97,7 @@ impl Body {
         };
         let place = |(n, x): (usize, &Point3<f32>)| x + wave(n) * (0.2 * STEP as f32);
         let positions: Vec<_> = simulation.system().positions().iter().enumerate().map(place).collect();
-        // Those that do not move have no velocity either.
+        // Fixed vertices have no velocity.
         let moves = |n: usize| if simulation.system().vertices()[n].inverse_mass() > 0.0 { 1.0 } else { 0.0 };
         let velocities = (0..positions.len()).map(|n| wave(n + 3) * moves(n)).collect();
         Ok(Self { simulation, positions, velocities, extent: plan.extent() })
@@ -114,7 +114,7 @@ impl Body {
         }
     }
 
-    /// A frame of the reference, which is one iteration.
+    /// One frame of the reference, which has one iteration.
     fn on_cpu(&self) -> Result<Vec<[f32; 4]>, Failure> {
         let mut solver = SolverReference::new(self.simulation.system().clone(), *self.simulation.settings())?;
         solver.restore(&self.positions, &self.velocities, 0)?;
@@ -177,7 +177,7 @@ impl Body {
         Ok(gpu.read(&vertices, 0..vertices.len())?)
     }
 
-    /// A color's vertices, and the constraints on them.
+    /// The vertices of a color and their constraints.
     fn color(
         &self,
         gpu: &Gpu,
@@ -223,6 +223,6 @@ struct Color {
     chosen: BindGroup,
     /// Vertices of the color.
     len: usize,
-    /// Nothing where no constraint acts.
+    /// Empty if no constraint acts on the color.
     acting: Option<(BindGroup, usize)>,
 }

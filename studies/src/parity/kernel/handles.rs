@@ -1,4 +1,5 @@
-//! Kinematic vertices moved by handles, and the collection of chosen vertices: by the backend, on a body without constraints.
+//! Vertices moved by kinematic handles, and the readback of chosen vertices, on a body without
+//! constraints.
 
 use cutis_gpu::Gpu;
 use cutis_solver::{Formulation, Settings, Solver, SolverReference};
@@ -34,7 +35,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     gather(bench)
 }
 
-/// In the second frame one of two handles is on its way and one is about to arrive.
+/// In the second frame, one of two handles is moving and the other reaches its target.
 fn kinematic(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     let name = "kinematic: two handles in the third of three substeps";
     let measure = |gpu: &Gpu, policy, settings, frames| {

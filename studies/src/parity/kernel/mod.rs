@@ -1,4 +1,4 @@
-//! The middle ring: one pass of each kernel, run on its own.
+//! The middle ring: single passes of each kernel.
 
 mod descent;
 mod handles;
@@ -24,7 +24,10 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     relax::run(bench)
 }
 
-/// A shader's source with one part, which must occur, replaced by another.
+/// The source of a shader with one part replaced.
+///
+/// # Errors
+/// The part does not occur.
 fn replaced(source: &str, from: &str, to: &str) -> Result<String, Failure> {
     match source.contains(from) {
         true => Ok(source.replace(from, to)),

@@ -1,4 +1,5 @@
-//! A picture by ray marching: in single precision on the device, in double on the CPU, so that no adapter is exact.
+//! A picture by ray marching, in single precision on the device and in double precision on the CPU.
+//! No adapter is exact.
 
 use cutis_gpu::Gpu;
 use cutis_render::{Image, Side, View, raymarch, raymarch_gpu};
@@ -7,7 +8,8 @@ use cutis_volume::phantom::Phantom;
 use crate::parity::bench::{Bench, Effort, Failure};
 use crate::parity::comparison::{Figures, Measured, Ring};
 
-/// Mean difference of a channel, of 255, that single precision may make: ten times what it makes on Mesa's software driver.
+/// Largest mean difference of a channel (0 to 255) due to single precision: ten times the
+/// difference on the software driver of Mesa.
 const MEAN: f64 = 0.002;
 
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {

@@ -74,7 +74,7 @@ fn compare<C: Constraint<N>, const N: usize>(
     Ok(())
 }
 
-/// Per workgroup the sum of squares and the largest value over rest size.
+/// Sum of squares and largest value over rest size of each workgroup.
 fn twin<C: Constraint<N>, const N: usize>(
     vertices: &[[f32; 4]],
     set: &dyn ConstraintSet<f32>,

@@ -1,6 +1,7 @@
-//! ChainMail's relaxation: where every element is, and the counts, after sweeps on the device and on the CPU.
+//! Relaxation of ChainMail: positions of all elements and counts, after sweeps on the device and on
+//! the CPU.
 //!
-//! It computes in whole numbers, so that every adapter has to be equal, whatever it is held to otherwise.
+//! It computes in whole numbers, so that every adapter has to be exact.
 
 use anyhow::bail;
 use std::cell::RefCell;
@@ -12,14 +13,14 @@ use super::replaced;
 use crate::parity::bench::{Bench, Failure};
 use crate::parity::comparison::{Figures, Measured, Ring};
 
-/// Elements along each axis: rows of an odd length, several workgroups.
+/// Elements along each axis: an odd number in a row, and several workgroups.
 const SHAPE: [usize; 3] = [37, 22, 9];
-/// More than are submitted at once.
+/// Number of sweeps: more than one submission has.
 const SWEEPS: u32 = 70;
-/// What is grabbed, and stays grabbed while the rest relaxes.
+/// Elements that stay grabbed while the others relax.
 const GRABBED: [[usize; 3]; 2] = [[20, 20, 4], [3, 2, 1]];
 
-/// What is wrong on purpose, as changes of the kernel.
+/// Deliberate faults, as changes of the kernel.
 const WRONG: [(&str, &str, &str); 8] = [
     ("the other half", "+ j + half.odd", "+ j + 1u - half.odd"),
     ("means rounded upwards", "2u * size + count - 1u", "2u * size + count"),
@@ -68,7 +69,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     })
 }
 
-/// Elements that are elsewhere, by the largest coordinate in steps; the counts have to be equal too.
+/// Compares the positions by the largest difference of a coordinate in steps, and the counts.
 fn compared(found: (&Chain, Relaxation), expected: (&Chain, Relaxation)) -> Measured {
     let ((chain, done), (of_cpu, of_cpu_done)) = (found, expected);
     let (mut differing, mut worst) = (0, 0.0_f64);
@@ -82,7 +83,8 @@ fn compared(found: (&Chain, Relaxation), expected: (&Chain, Relaxation)) -> Meas
     Measured::new(agrees, Figures { compared, differing, worst, tolerance: 0.0, of: "a step of the grid" })
 }
 
-/// Four materials in layers and grains, with holes, a cut and fixed elements, after drags of which one contradicts what is fixed.
+/// Four materials in layers and grains, with holes, a cut and fixed elements. One of the drags
+/// contradicts the fixed elements.
 fn body() -> Result<Chain, Failure> {
     let soft = Material { shear: [0.4, 0.2, 0.3], ..Material::isotropic(0.6, 1.7, 0.0, 0.0) };
     let across =

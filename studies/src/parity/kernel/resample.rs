@@ -1,7 +1,8 @@
 //! One slab of a resampled volume: owners, marks, values and counts, against the scalar twin.
 //!
-//! On hardware a rounding may give a voxel at a face to the tet beside it and move a value by 1, so that a share of voxels may
-//! differ; the contents are noise, so that a shift by a fiftieth of a voxel changes nearly all.
+//! On hardware, rounding may assign a voxel at a face to the neighboring tet, and change a value by
+//! 1, so that a share of the voxels may differ. The volume is noise, so that a shift by a fiftieth
+//! of a voxel changes nearly all of them.
 
 use cutis_gpu::Gpu;
 use cutis_resample::{ResamplerGpu, ResamplerOptions, SlabState, Warp};
@@ -15,9 +16,9 @@ use cutis_test_kit::Kuhn;
 
 /// Slices of the slab.
 const SLAB: usize = 9;
-/// The slab that is compared.
+/// The compared slab.
 const NUMBER: usize = 1;
-/// On hardware: share of voxels whose owner or value may be another.
+/// Largest share of voxels with another owner or value on hardware.
 const SHARE: f64 = 1e-3;
 /// Voxel size in mm.
 const VOXEL_MM: [f64; 3] = [0.9765625, 0.7, 1.1];
@@ -54,8 +55,8 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Voxels with another owner or another value; on hardware a value may be off by 1, and a count by the share of all voxels
-/// that may differ.
+/// Compares owners and values. On hardware a value may differ by 1, and a count by the allowed
+/// share of all voxels.
 fn compared(found: &SlabState, expected: &SlabState, policy: Policy) -> Measured {
     let least = if policy == Policy::Exact { 1 } else { 2 };
     let voxels = expected.owners.len().max(found.owners.len());
@@ -75,7 +76,7 @@ fn compared(found: &SlabState, expected: &SlabState, policy: Policy) -> Measured
 }
 
 impl Scene {
-    /// Noise, and a lattice in it that is bent; a few tets are cut out.
+    /// Noise, and a bent lattice without a few tets.
     fn new() -> Result<Self, Failure> {
         let affine = Affine::from_spacing(VOXEL_MM, [-13.0, 4.0, 100.0 / 3.0])?;
         let grid = Grid { shape: [37, 41, 29], affine };

@@ -1,4 +1,5 @@
-//! One sweep over all colors of a kind: PBD, XPBD, and XPBD a second time with the multipliers of the first.
+//! One sweep over all colors of a kind: PBD, XPBD, and a second iteration of XPBD with the
+//! multipliers of the first.
 
 use std::ops::Range;
 
@@ -15,24 +16,24 @@ use crate::parity::bodies::{ConstraintKind, Plan, STEP};
 use crate::parity::comparison::Ring;
 use crate::parity::difference::{Difference, triples};
 
-/// What one sweep leaves: vertices, and a multiplier for each constraint where they are kept.
+/// Result of a sweep: vertices, and a multiplier for each constraint if they are kept.
 type Swept = (Vec<[f32; 4]>, Vec<f32>);
 
-/// What is wrong with the device's sweep.
+/// The fault in the sweep of the device.
 #[derive(Clone, Copy)]
 enum Wrong {
     Nothing,
     Shader(Alteration),
     /// A color is skipped.
     Skipped,
-    /// The last constraint of each color is.
+    /// The last constraint of each color is skipped.
     Short,
 }
 
-/// A body out of shape, with one kind of constraint.
+/// A deformed body with one kind of constraint.
 struct Body {
     simulation: Simulation<f32>,
-    /// Vertices moved from where the constraints are at rest.
+    /// Vertices away from the rest shape.
     vertices: Vec<Vertex<f32>>,
     extent: f64,
 }
@@ -202,7 +203,7 @@ impl Body {
         Ok((gpu.read(&vertices, 0..vertices.len())?, found))
     }
 
-    /// The constraints of each dispatch: colors, split where they are too large.
+    /// The constraints of each dispatch: colors, split if they are too large.
     fn chunks(&self, gpu: &Gpu, wrong: Wrong) -> Vec<Range<usize>> {
         let set = &*self.simulation.system().kinds()[0];
         let most = gpu.chunk_len(size_of::<f32>() * set.arity().max(set.param_count()));

@@ -1,4 +1,5 @@
-//! The passes over vertices: prediction, velocity update, both in one; and the look at finiteness.
+//! The passes over vertices: prediction, velocity update, both in one, and the check for finite
+//! numbers.
 
 use cutis_gpu::{Binding, Buffer, Gpu, GpuError};
 use cutis_shaders::solver;
@@ -13,7 +14,7 @@ use crate::parity::bodies::Plan;
 use crate::parity::comparison::{Measured, Ring};
 use crate::parity::difference::{Difference, triples};
 
-/// No vertex: all are finite.
+/// Result of the check if all vertices are finite.
 const NONE: u32 = u32::MAX;
 
 pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
@@ -21,7 +22,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     check(bench)
 }
 
-/// Vertices that fly freely, some of them fixed.
+/// Free and fixed vertices without constraints.
 fn system() -> Result<System<f32>, Failure> {
     let (formulation, kinds) = (Formulation::Xpbd, &[][..]);
     Plan { size: [13, 11, 9], formulation, kinds, each: false, fixed: true, handles: false, softness: 1.0 }
@@ -30,17 +31,18 @@ fn system() -> Result<System<f32>, Failure> {
 
 fn settings(substeps: u32) -> Settings {
     let gravity_m_s2 = [0.31, -9.81, 1.7];
-    // A large step, so that a thousandth of what gravity does is seen on hardware too.
+    // A large step, so that a thousandth of the effect of gravity shows on hardware too.
     Settings { dt_s: 0.3, substeps, gravity_m_s2, damping_per_s: 0.7, ..Settings::default() }
 }
 
-/// Velocities to begin with, in m/s.
+/// Initial velocities in m/s.
 fn velocities(count: usize) -> Vec<Vector3<f32>> {
     let wave = |n: usize| (n as f32 * 0.37).sin();
     (0..count).map(|n| Vector3::new(wave(n), -2.0 * wave(n + 1), 0.7 * wave(2 * n))).collect()
 }
 
-/// `predict`, `finish_and_predict` and `finish`: one frame of one and of three substeps without constraints.
+/// `predict`, `finish_and_predict` and `finish`: one frame of one and of three substeps without
+/// constraints.
 fn integrate(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     for substeps in [1, 3] {
         let middle = if substeps == 1 { "" } else { "finish and predict, " };
@@ -125,9 +127,9 @@ fn check(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     };
     bench.compare(Ring::Kernel, name, |gpu, _| measure(gpu, &solver::vertices()))?;
     for (what, from, to) in [
-        ("a coordinate is not looked at", "is_finite(x.y)", "is_finite(x.x)"),
+        ("a coordinate is not checked", "is_finite(x.y)", "is_finite(x.x)"),
         (
-            "the last such vertex",
+            "the last vertex that is not finite",
             "atomicMin(&status.vertex, first + i)",
             "atomicStore(&status.vertex, first + i + 1u)",
         ),
@@ -139,7 +141,7 @@ fn check(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the passes work on, with the numbers of their bindings.
+/// Buffers of the passes, in the order of their bindings.
 struct Buffers {
     vertices: Buffer<[f32; 4]>,
     previous: Buffer<[f32; 4]>,
@@ -167,7 +169,8 @@ impl Buffers {
         })
     }
 
-    /// Runs an entry point, which uses the bindings `used`, over all vertices, in parts where they are too many.
+    /// Runs an entry point with the bindings `used` over all vertices, in parts if there are too
+    /// many.
     fn run(&self, gpu: &Gpu, source: &str, entry: &str, used: &[u32]) -> Result<(), GpuError> {
         let kernel = gpu.kernel(entry, source, entry)?;
         let count = self.vertices.len();

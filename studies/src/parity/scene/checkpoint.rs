@@ -1,4 +1,4 @@
-//! The state in a checkpoint, as far as it is compared: its layout is described in `crates/cutis/src/run/checkpoint.rs`.
+//! The compared state of a checkpoint. `crates/cutis/src/run/checkpoint.rs` describes the layout.
 
 use std::path::Path;
 
@@ -7,9 +7,9 @@ use anyhow::bail;
 use crate::parity::bench::Failure;
 
 const MAGIC: &[u8] = b"CUTISCP2";
-/// Magic, fingerprint, frame, number of vertices.
+/// Length of magic, fingerprint, frame, and number of vertices.
 const HEADER: usize = 8 + 32 + 4 + 8;
-/// The checksum behind the state.
+/// Length of the checksum after the state.
 const SEAL: usize = 32;
 
 /// Positions in local meters and velocities in m/s, x, y, z of each vertex in turn.
@@ -19,10 +19,10 @@ pub struct State {
 }
 
 impl State {
-    /// The state that a run left.
+    /// Reads the final state of a run.
     ///
     /// # Errors
-    /// No such file, or one of another layout.
+    /// The file does not exist or has another layout.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = std::fs::read(path)?;
         let numbers = bytes.len().checked_sub(HEADER + SEAL).filter(|n| n % 24 == 0);

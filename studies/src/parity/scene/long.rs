@@ -1,7 +1,9 @@
-//! Long runs: rounding grows from step to step, so that on hardware only what a run must preserve can be held.
+//! Long runs: rounding errors grow from step to step, so that on hardware only conserved quantities
+//! are compared.
 //!
-//! A free body without outer forces keeps its momentum, and its energy does not grow. (Its angular momentum is kept only as far
-//! as the step is short, on the CPU as well.) On software every position has to be the CPU's all the same.
+//! A free body without outer forces keeps its momentum, and its energy does not grow. Its angular
+//! momentum changes with the length of a step, on the CPU as well. On software adapters every
+//! position has to equal the position of the CPU.
 
 use cutis_constraints::{Constraint, Distance, DistanceMaterial, Eval, Real};
 use cutis_gpu::Gpu;
@@ -36,13 +38,14 @@ const SETTINGS: Settings = Settings {
     relaxation: 1.0,
 };
 
-/// Change of the momentum over the sum of `m|v|` at the start. Rounding makes 5e-6 in 60 frames and 3e-5 in 600; a gradient off
-/// by a thousandth 1e-3.
+/// Largest change of the momentum over the sum of `m|v|` at the start. Rounding causes 5e-6 in 60
+/// frames and 3e-5 in 600. A gradient with an error of a thousandth causes 1e-3.
 const MOMENTUM: f64 = 2e-4;
-/// Energy over that at the start. XPBD with a large step loses energy; it must not gain any.
+/// Largest energy over the energy at the start. XPBD with a large step loses energy and must not
+/// gain any.
 const ENERGY: f64 = 1.001;
 
-/// What a run is looked at for.
+/// Result of a run.
 struct RunResult {
     vertices: Vec<[f32; 4]>,
     start: (Momentum, Energy),
@@ -84,7 +87,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     })
 }
 
-/// A step from velocities of a turning, breathing body without momentum.
+/// Runs a body that rotates and pulsates, without momentum.
 fn ran(solver: &mut dyn Solver<f32>, frames: usize) -> Result<RunResult, Failure> {
     let of = |vertex: &Vertex<f32>| {
         let p = vertex.position();
@@ -115,12 +118,12 @@ impl RunResult {
     }
 }
 
-/// Springs that are wrong in the shader, and right in Rust.
+/// Springs with a fault in the shader and none in Rust.
 struct WrongSprings<const WHAT: u8>;
 
-/// One end is pulled by a thousandth more than the other.
+/// The gradient of one end is larger by a thousandth.
 const LOPSIDED: u8 = 0;
-/// The springs want to be a fifth longer.
+/// The rest lengths are larger by a fifth.
 const OVERLONG: u8 = 1;
 
 macro_rules! springs {
@@ -164,7 +167,7 @@ impl<const WHAT: u8> Constraint<2> for WrongSprings<WHAT> {
     }
 }
 
-/// The body of such springs.
+/// The body with the faulty springs.
 fn wrong<const WHAT: u8>(gpu: &Gpu) -> Result<SolverGpu, Failure> {
     let whole = PLAN.system()?;
     let positions = whole.positions();

@@ -1,4 +1,5 @@
-//! The outer ring: whole runs of the pipeline on both backends, and long runs by what they must preserve.
+//! The outer ring: whole runs of the pipeline on both backends, and conserved quantities of long
+//! runs.
 
 mod cases;
 mod checkpoint;

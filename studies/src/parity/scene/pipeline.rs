@@ -1,4 +1,5 @@
-//! A run of the whole pipeline on both backends: positions, velocities, openings of the wounds, deformed volume.
+//! A run of the whole pipeline on both backends: positions, velocities, openings of the wounds,
+//! deformed volume.
 
 use anyhow::{Context, anyhow, bail};
 use cutis::scene::BackendChoice;
@@ -12,8 +13,8 @@ use crate::parity::bench::{Bench, Failure};
 use crate::parity::comparison::{Figures, Measured, Ring};
 use crate::parity::difference::{Difference, Policy};
 
-/// Largest share of voxels whose value may differ by more than 1, if a device resamples in single precision and the CPU in
-/// double. These voxels are at faces that two tets share. Measured: 3e-5.
+/// Largest share of voxels whose value may differ by more than 1, if a device resamples in single
+/// precision and the CPU in double. These voxels are at faces that two tets share. Measured: 3e-5.
 const SHARE: f64 = 3e-4;
 
 /// The compared results of a run.

@@ -1,4 +1,5 @@
-//! Materials: compliances from 0 to 1e6, all stiffnesses of PBD, amplifications and mass ratios up to 1e6.
+//! Materials: compliances from 0 to 1e6, all stiffnesses of PBD, amplifications and mass ratios up
+//! to 1e6.
 
 use cutis_test_kit::Random;
 use nalgebra::Point3;
@@ -78,8 +79,8 @@ fn compliance_cases(cases: &mut Vec<Case>, law: Law, end: End, quick: bool) {
     add(", 8 iterations", end, Run { iterations: 8, ..Run::default() });
 }
 
-/// A free sheet with stretched skin, and a sheet fixed at its border at a hundred times its area. No substep resolves the
-/// stiffness of skin that is stretched so far.
+/// A free sheet with stretched skin, and a sheet fixed at its border at a hundred times its area.
+/// No substep resolves the stiffness of skin that is stretched so far.
 fn amplifications() -> Vec<Case> {
     let mut cases = Vec::new();
     for amplification in [0.0, 1.0, 1e3, 1e6] {

@@ -21,7 +21,8 @@ pub fn all(effort: Effort) -> Vec<Case> {
     cases
 }
 
-/// A deformation: stretched, twisted about the z axis, and each vertex moved at random by a tenth of an element.
+/// A deformation: stretched, twisted about the z axis, and each vertex moved at random by a tenth
+/// of an element.
 fn deformed() -> impl FnMut(Point3<f64>) -> Point3<f64> {
     let mut random = Random::new(1);
     move |x| {

@@ -39,7 +39,8 @@ fn collapsed(cases: &mut Vec<Case>, law: Law) {
     add("a point", flattened(law, 0), End::Named);
     add("a line", flattened(law, 1), End::Named);
     add("a plane", flattened(law, 2), End::Recovers(0.05));
-    // A soft body may stay tangled, since the energy of springs and volumes has other minima. Descent ends in the nearest.
+    // A soft body may stay tangled, since the energy of springs and volumes has other minima.
+    // Descent ends in the nearest.
     let unfolds = match law {
         Law::SOFT => End::Bounded,
         Law::Vbd(_) => End::Rests,

@@ -31,7 +31,8 @@ fn steps(cases: &mut Vec<Case>, law: Law) {
         let run = Run { h, substeps, samples, ..Run::default() };
         let case = Case::new(format!("substeps of {h:e} s, {}", law.name()), body, end).run(run);
         let case = Case { quick: h == 1.0, ..case };
-        // In single precision, a spring moves a vertex by less than the last place of a position within 1e-5 s.
+        // In single precision, a spring moves a vertex by less than the last place of a position
+        // within 1e-5 s.
         cases.push(if h < 1e-4 { case.unresolved() } else { case });
     }
 }
@@ -47,7 +48,8 @@ fn forces(cases: &mut Vec<Case>, law: Law) {
     let mut body = Body::block(BLOCK, law);
     let last = body.rest.len() as u32 - 1;
     body.handles.push(Handle { vertices: vec![last], move_m: [20.0, 15.0, 10.0], over_s: 0.0 });
-    // A stiff solid that is torn through itself stays tangled, because each step decreases the energy.
+    // A stiff solid that is torn through itself stays tangled, because each step decreases the
+    // energy.
     let end = if law == Law::STIFF_DESCENT { End::Rests } else { End::Recovers(0.05) };
     cases.push(Case::new(format!("a corner torn off by ten body sizes at once, {of}"), body, end).quick());
 }
@@ -61,10 +63,12 @@ fn many_steps(cases: &mut Vec<Case>, law: Law, effort: Effort) {
     let mut body = Body::tetrahedron(law).placed(deformed());
     let mut random = Random::new(8);
     body.velocities.iter_mut().for_each(|v| *v = random.vector());
-    // No momentum: in an hour the body would drift away by thousands of its sizes, and lose precision.
+    // No momentum: in an hour the body would drift away by thousands of its sizes, and lose
+    // precision.
     let mean = body.velocities.iter().sum::<Vector3<f64>>() / body.velocities.len() as f64;
     body.velocities.iter_mut().for_each(|v| *v -= mean);
-    // Steps of descent that are not converged do not keep the angular momentum of a free body: undamped, it spins ever faster.
+    // Steps of descent that are not converged do not keep the angular momentum of a free body:
+    // undamped, it spins ever faster.
     let (damping_per_s, damped) = if law.is_implicit() { (10.0, "") } else { (0.0, " undamped") };
     let run = Run { damping_per_s, substeps: 4, samples: 25, frames, ..Run::default() };
     let name = format!("{} steps{damped}, {}", 25 * 4 * frames, law.name());
