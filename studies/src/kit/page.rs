@@ -11,6 +11,8 @@ use anyhow::{Context, ensure};
 use super::{Failure, results};
 
 const END: &str = "<!-- end -->";
+/// Columns of a line of prose.
+const WIDTH: usize = 100;
 
 /// A page with its markers.
 #[derive(Clone, Debug)]
@@ -65,7 +67,8 @@ impl Page {
     /// The page has no such table.
     pub fn set(&mut self, table: &str, content: &str) -> Result<(), Failure> {
         let range = self.range(table)?;
-        self.text.replace_range(range, &format!("\n{}\n\n", content.trim()));
+        let lines: Vec<String> = content.trim().lines().map(wrapped).collect();
+        self.text.replace_range(range, &format!("\n{}\n\n", lines.join("\n")));
         Ok(())
     }
 
@@ -80,6 +83,26 @@ impl Page {
         println!("written: {}", path.display());
         Ok(path)
     }
+}
+
+/// A line of prose, broken at spaces to at most 100 columns. A line of a table stays as it is.
+fn wrapped(line: &str) -> String {
+    if line.starts_with('|') {
+        return line.into();
+    }
+    let mut text = String::new();
+    let mut column = 0;
+    for word in line.split_inclusive(' ') {
+        let length = word.trim_end().chars().count();
+        if column > 0 && column + length > WIDTH {
+            text.truncate(text.trim_end().len());
+            text.push('\n');
+            column = 0;
+        }
+        text += word;
+        column += word.chars().count();
+    }
+    text
 }
 
 #[cfg(test)]
@@ -104,6 +127,14 @@ mod tests {
         let again = page.text.clone();
         page.set("a", "| new |").unwrap();
         assert_eq!(page.text, again, "a second run with the same figures changes nothing");
+    }
+
+    #[test]
+    fn prose_is_wrapped_and_tables_are_not() {
+        let table = format!("| {} |", "x ".repeat(80));
+        assert_eq!(wrapped(&table), table);
+        let text = wrapped(&"word ".repeat(41));
+        assert_eq!(text.lines().map(|line| line.trim_end().len()).collect::<Vec<_>>(), [99, 99, 4]);
     }
 
     #[test]
