@@ -25,7 +25,7 @@ pub enum Alteration {
 
 impl Alteration {
     /// All alterations of a constraint over `arity` vertices.
-    pub fn all(arity: usize) -> Vec<Self> {
+    pub(crate) fn all(arity: usize) -> Vec<Self> {
         let gradients = (0..arity).map(Self::Gradient);
         let swaps = (1..arity).map(|i| Self::Swapped(i - 1, i));
         std::iter::once(Self::Value).chain(gradients).chain(swaps).collect()
@@ -45,7 +45,7 @@ impl Alteration {
 
     /// The evaluation with this error.
     #[inline(always)]
-    pub fn apply<T: Real, const N: usize>(self, mut eval: Eval<T, N>) -> Eval<T, N> {
+    pub(crate) fn apply<T: Real, const N: usize>(self, mut eval: Eval<T, N>) -> Eval<T, N> {
         let factor = T::constant(FACTOR);
         match self {
             Self::Value => eval.c *= factor,

@@ -54,12 +54,12 @@ mod test_body;
 
 pub use alteration::{Alteration, FACTOR};
 pub use error::ConformanceError;
-
 pub use report::{Finding, Limit, Report, Verdict};
-pub use subject::{Case, SCALES, Subject};
+pub use subject::{Case, Subject};
 
 use cutis_constraints::Constraint;
 use cutis_gpu::Gpu;
+use subject::SCALES;
 
 /// Runs all checks that need no device.
 ///

@@ -9,7 +9,7 @@ use crate::random::Random;
 use crate::shapes;
 
 /// Length scales of the samples in m.
-pub const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
+pub(crate) const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
 /// Samples per material and scale.
 const SAMPLES: usize = 100;
 
@@ -132,12 +132,12 @@ pub struct Case<const N: usize> {
 
 impl<const N: usize> Case<N> {
     /// The parameters in another number type.
-    pub fn params<C: Constraint<N>, T: Scalar>(&self) -> C::Params<T> {
+    pub(crate) fn params<C: Constraint<N>, T: Scalar>(&self) -> C::Params<T> {
         Params::from_fn(|k| T::constant(self.params[k]))
     }
 
     /// The positions in another number type.
-    pub fn positions<T: Scalar>(&self) -> [Point3<T>; N] {
+    pub(crate) fn positions<T: Scalar>(&self) -> [Point3<T>; N] {
         self.x.map(|p| p.map(T::constant))
     }
 
