@@ -190,15 +190,15 @@ pub enum MeshError {
     IncisionWithoutLips {
         /// Number of the incision, from 0.
         incision: usize,
-        /// Skin vertices on the left lip.
+        /// Number of skin vertices on the left lip.
         left: usize,
-        /// Skin vertices on the right lip.
+        /// Number of skin vertices on the right lip.
         right: usize,
     },
     /// A mesh has too many cells for the 32-bit offsets of the file format.
     #[error("{path}: {cells} cells are too many for 32-bit offsets")]
     TooManyCells {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Number of cells.
         cells: usize,
@@ -206,13 +206,13 @@ pub enum MeshError {
     /// A `.vtp` file can hold only triangles.
     #[error("{path}: a surface file cannot hold tetrahedra; write a .vtu file")]
     NotASurface {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// A point array for a mesh file does not have one value per point.
     #[error("{path}: the array `{array}` has {found} values; the mesh has {expected} points")]
     PointData {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Name of the array.
         array: String,
@@ -224,9 +224,9 @@ pub enum MeshError {
     /// A name of an array has characters that a mesh file does not allow.
     #[error("{path}: `{name}` is not a valid name of an array; use letters, digits, `_`, `-` and `.`")]
     ArrayName {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The name.
+        /// The invalid name.
         name: String,
     },
     /// A mesh file could not be created, or a volume could not be sampled on a lattice.
@@ -235,7 +235,7 @@ pub enum MeshError {
     /// A mesh file could not be written.
     #[error("cannot write {path}: {source}")]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The error of the operating system.
         source: std::io::Error,

@@ -127,8 +127,8 @@ impl TissueMask {
     /// flag per lattice point, in grid order.
     ///
     /// [`TetMesh::inactive`] describes the tissue that is not in the mesh, and the mesh vertices
-    /// outside the region, which must be fixed. Memory and time depend only on the region, except
-    /// for flags per lattice point.
+    /// outside the region, which must be fixed. Only the tets of the region are listed, so the size
+    /// of the mesh depends on the region.
     ///
     /// # Errors
     /// As [`TissueMask::mesh`], and [`MeshError::RegionEmpty`] if no vertex of the body is inside.

@@ -25,7 +25,7 @@ pub enum VolumeError {
     /// The operating system reported an error, or a gzip stream is damaged.
     #[error("cannot {action} {path}: {source}")]
     Io {
-        /// The file that the user named.
+        /// Path given by the user.
         path: PathBuf,
         /// The failed action: `read`, `write` or `create`.
         action: &'static str,
@@ -35,7 +35,7 @@ pub enum VolumeError {
     /// The file name does not end in a NIfTI extension.
     #[error("{path}: expected a file name that ends in {expected}")]
     Extension {
-        /// The file that the user named.
+        /// Path given by the user.
         path: PathBuf,
         /// The accepted extensions.
         expected: &'static str,
@@ -43,15 +43,15 @@ pub enum VolumeError {
     /// A `.hdr` file has no `.img` file next to it, or the other way round.
     #[error("{path} is one half of a NIfTI pair, but the other half {partner} is missing")]
     MissingPartner {
-        /// The file that the user named.
+        /// Path given by the user.
         path: PathBuf,
-        /// The missing file.
+        /// Path of the missing file.
         partner: PathBuf,
     },
     /// The file does not begin with a NIfTI header.
     #[error("{path} is not a NIfTI file: {reason}")]
     NotNifti {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Why the file is not NIfTI.
         reason: &'static str,
@@ -59,7 +59,7 @@ pub enum VolumeError {
     /// A header field holds an invalid value.
     #[error("{path}: header field {field} is {value}, expected {expected}")]
     Header {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Name of the field in the NIfTI standard.
         field: &'static str,
@@ -73,7 +73,7 @@ pub enum VolumeError {
         "{path}: voxel type {dtype} (code {code}) is not a CT: expected one integer or real number per voxel"
     )]
     VoxelType {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Name of the voxel type.
         dtype: &'static str,
@@ -83,7 +83,7 @@ pub enum VolumeError {
     /// The file holds a time series or several channels.
     #[error("{path} holds {count} volumes (dim {dim:?}): expected one; extract the one to use first")]
     SeveralVolumes {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Number of volumes.
         count: u64,
@@ -95,7 +95,7 @@ pub enum VolumeError {
         "{path} is truncated: the header promises {expected_bytes} bytes of voxels, but the file has {found_bytes}"
     )]
     Truncated {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Number of voxels times bytes per voxel.
         expected_bytes: u64,
@@ -105,7 +105,7 @@ pub enum VolumeError {
     /// The volume does not fit into the memory of this machine.
     #[error("{path}: {shape:?} voxels are more than this machine can hold")]
     TooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Voxels per axis.
         shape: [u64; 3],
@@ -115,17 +115,17 @@ pub enum VolumeError {
         "{path}: values from {min} to {max} HU do not fit into int16 (-32768 to 32767 HU); is this a CT in Hounsfield units?"
     )]
     Range {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Lowest value, HU.
+        /// Lowest value in HU.
         min: f64,
-        /// Highest value, HU.
+        /// Highest value in HU.
         max: f64,
     },
     /// A voxel is plus or minus infinity.
     #[error("{path}: voxel {index:?} is {value}: expected finite values (NaN counts as air)")]
     Infinite {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Index of the first infinite voxel.
         index: [usize; 3],
@@ -135,7 +135,7 @@ pub enum VolumeError {
     /// NIfTI-1 cannot hold this shape.
     #[error("{path}: shape {shape:?} cannot be written: NIfTI-1 holds 1 to 32767 voxels per axis")]
     WriteShape {
-        /// The file to write.
+        /// Path of the file to write.
         path: PathBuf,
         /// Voxels per axis.
         shape: [usize; 3],
@@ -146,7 +146,7 @@ pub enum VolumeError {
          resample to an orthogonal grid first"
     )]
     Sheared {
-        /// The file to write.
+        /// Path of the file to write.
         path: PathBuf,
         /// Largest |cosine| between two index axes.
         cosine: f64,
@@ -154,11 +154,11 @@ pub enum VolumeError {
     /// A [`nifti::Writer`](crate::nifti::Writer) received more or fewer voxels than its grid has.
     #[error("{path}: the grid has {expected} voxels, but {found} were written")]
     Pushed {
-        /// The file to write.
+        /// Path of the file to write.
         path: PathBuf,
-        /// Voxels of the grid.
+        /// Number of voxels of the grid.
         expected: usize,
-        /// Voxels received.
+        /// Number of voxels received.
         found: usize,
     },
     /// A phantom has no voxels along an axis, too many along an axis, or too many for the memory.
@@ -174,9 +174,9 @@ pub enum VolumeError {
     /// A range of slices is not within the volume.
     #[error("slices {start}..{end} do not exist: the volume has {count}")]
     SliceRange {
-        /// First slice.
+        /// First requested slice.
         start: usize,
-        /// One past the last slice.
+        /// One past the last requested slice.
         end: usize,
         /// Number of slices of the volume.
         count: usize,

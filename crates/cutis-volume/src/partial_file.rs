@@ -40,11 +40,6 @@ impl PartialFile {
         }
     }
 
-    /// The path that the file will have.
-    pub fn target(&self) -> &Path {
-        &self.target
-    }
-
     /// Flushes the file to the disk and renames it to the target, replacing any old file.
     ///
     /// # Errors

@@ -42,7 +42,7 @@ impl<'a> Source<'a> {
         let observed = Observed { path: path.into(), file: io::Cursor::new(magic).chain(file), observer };
         let buffered = BufReader::with_capacity(PORTION, observed);
         let stream = match compressed {
-            true => Stream::Gzip(MultiGzDecoder::new(buffered)),
+            true => Stream::Gzip(Box::new(MultiGzDecoder::new(buffered))),
             false => Stream::Plain(buffered),
         };
         Ok(Self { path: path.into(), stream, compressed, len, at: 0 })
@@ -141,7 +141,7 @@ impl<'a> Source<'a> {
 
 enum Stream<'a> {
     Plain(BufReader<Observed<'a>>),
-    Gzip(MultiGzDecoder<BufReader<Observed<'a>>>),
+    Gzip(Box<MultiGzDecoder<BufReader<Observed<'a>>>>),
 }
 
 impl Read for Stream<'_> {
