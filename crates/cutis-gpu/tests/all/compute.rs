@@ -74,6 +74,7 @@ fn a_kernel_reads_a_volume() {
         let shape = [7, 5, 3];
         let voxels: Vec<i16> = (0..105).map(|i| (i * 611 - 32_000) as i16).collect();
         let volume = gpu.texture_3d("volume", shape, &voxels).unwrap();
+        assert_eq!(volume.shape(), shape);
         let out = gpu.zeroed::<i32>("out", voxels.len()).unwrap();
         let params = gpu.uniform("params", &[7, 5, 3, -1000]).unwrap();
         let kernel = gpu.kernel("shift", SUM, "shift").unwrap();
