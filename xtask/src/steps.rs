@@ -119,7 +119,7 @@ fn licenses(workspace: &Workspace) -> Result<()> {
     tools::require_cargo_deny(workspace)?;
     for manifest in workspace.manifests() {
         let mut command = workspace.cargo("deny");
-        command.arg("--manifest-path").arg(manifest).args(["check", "--config", "deny.toml"]);
+        command.arg("--manifest-path").arg(manifest).args(["--config", "deny.toml", "check"]);
         execute(command.args(["--hide-inclusion-graph", "bans", "licenses", "sources"]))?;
     }
     Ok(())
