@@ -78,12 +78,16 @@ const LAYERS: &[Layer] = &[
     Layer { name: "cutis-cli", level: 6, may_use: AnyBelow },
 ];
 
-/// The test kit. Product crates may use it for their own tests.
-const TEST_KIT: &str = "cutis-test-kit";
+/// Crates that help with tests. The tests of a product crate may use them.
+const TEST_HELPERS: &[&str] = &["cutis-test-kit", "cutis-resample-twin"];
 
-/// Tests, studies and their kit. They may use any crate, no product crate depends on them, and they
-/// are not published.
-const UNPUBLISHED: &[&str] = &["cutis-resample-twin", "cutis-studies", TEST_KIT, "cutis-tests"];
+/// Tests and studies. They may use any crate, and no product crate uses them.
+const TESTS_AND_STUDIES: &[&str] = &["cutis-studies", "cutis-tests"];
+
+/// Whether the crate is for tests and studies, which are not published.
+fn is_unpublished(name: &str) -> bool {
+    TEST_HELPERS.contains(&name) || TESTS_AND_STUDIES.contains(&name)
+}
 
 /// The facts about a workspace member that the rule needs.
 #[derive(Debug)]
@@ -128,12 +132,10 @@ pub fn packages(metadata: &Value) -> Result<Vec<Package>> {
 /// Finds arrows that do not point down, crates without a row, and rows without a crate.
 pub fn check(packages: &[Package]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for package in
-        packages.iter().filter(|package| UNPUBLISHED.contains(&package.name.as_str()) && package.publish)
-    {
+    for package in packages.iter().filter(|package| is_unpublished(&package.name) && package.publish) {
         findings.push(Finding::failure(&package.name, 0, "must not be published: set `publish = false`"));
     }
-    for package in packages.iter().filter(|package| !UNPUBLISHED.contains(&package.name.as_str())) {
+    for package in packages.iter().filter(|package| !is_unpublished(&package.name)) {
         let Some(from) = find(&package.name) else {
             findings.push(Finding::failure(&package.name, 0, "has no row in the table of layers"));
             continue;
@@ -146,8 +148,9 @@ pub fn check(packages: &[Package]) -> Vec<Finding> {
             }
         }
         for dependency in &package.dev_dependencies {
-            if UNPUBLISHED.contains(&dependency.as_str()) && dependency != TEST_KIT {
-                let message = format!("the tests use `{dependency}`; only `{TEST_KIT}` is for all crates");
+            if TESTS_AND_STUDIES.contains(&dependency.as_str()) {
+                let message =
+                    format!("the tests use `{dependency}`; only {TEST_HELPERS:?} are for all crates");
                 findings.push(Finding::failure(&package.name, 0, message));
             }
         }
@@ -244,29 +247,29 @@ mod tests {
     }
 
     #[test]
-    fn only_tests_may_use_the_test_kit() {
+    fn only_tests_may_use_the_test_helpers() {
         let mut packages = with("cutis-mesh", &[]);
         let mesh = packages.iter().position(|package| package.name == "cutis-mesh").unwrap();
         packages.push(Package {
-            name: TEST_KIT.to_owned(),
+            name: TEST_HELPERS[0].to_owned(),
             publish: false,
             dependencies: Vec::new(),
             dev_dependencies: Vec::new(),
         });
-        packages[mesh].dev_dependencies = vec![TEST_KIT.to_owned()];
+        packages[mesh].dev_dependencies = vec![TEST_HELPERS[0].to_owned()];
         assert_eq!(check(&packages), []);
         packages[mesh].dev_dependencies = vec!["cutis-studies".to_owned()];
         assert_eq!(check(&packages).len(), 1);
         packages[mesh].dev_dependencies.clear();
-        packages[mesh].dependencies = vec![TEST_KIT.to_owned()];
+        packages[mesh].dependencies = vec![TEST_HELPERS[0].to_owned()];
         assert_eq!(check(&packages).len(), 1);
     }
 
     #[test]
     fn no_product_crate_uses_unpublished_crates() {
-        let mut packages = with("cutis", &[UNPUBLISHED[0]]);
+        let mut packages = with("cutis", &[TESTS_AND_STUDIES[0]]);
         packages.push(Package {
-            name: UNPUBLISHED[0].to_owned(),
+            name: TESTS_AND_STUDIES[0].to_owned(),
             publish: false,
             dependencies: vec!["cutis".to_owned()],
             dev_dependencies: Vec::new(),
