@@ -9,6 +9,7 @@ mod gpu;
 mod identity;
 mod left_out;
 mod paper_form;
+mod outputs;
 mod problems;
 mod random_scenes;
 mod region;
