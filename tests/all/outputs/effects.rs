@@ -15,21 +15,21 @@ fn with(set: &[(&str, &str)]) -> Finished {
     run(&[&COMMON, set].concat())
 }
 
-/// Largest displacement, in mm, of the skin within a distance of the incision and beyond another one.
+/// Mean displacement, in mm, of the skin within 15 mm of the incision's line and beyond 60 mm.
 fn near_and_far(run: &Finished) -> [f64; 2] {
     let mesh = Vtu::of_bytes(&run.files["skin.vtu"]);
-    let mut largest = [0.0_f64; 2];
+    let mut found = [(0.0, 0.0); 2];
     for (now, moved) in mesh.points.iter().zip(mesh.vectors("displacement_mm")) {
         // LPS: the incision is at x = −20, y = −40.
-        let across = ((now[0] - moved[0] + 20.0).powi(2) + (now[1] - moved[1] + 40.0).powi(2)).sqrt();
+        let across = (now[0] - moved[0] + 20.0).hypot(now[1] - moved[1] + 40.0);
         let length = moved.iter().map(|m| m * m).sum::<f64>().sqrt();
-        if across < 15.0 {
-            largest[0] = largest[0].max(length);
-        } else if across > 60.0 {
-            largest[1] = largest[1].max(length);
+        for (n, is_there) in [across < 15.0, across > 60.0].into_iter().enumerate() {
+            if is_there {
+                found[n] = (found[n].0 + length, found[n].1 + 1.0);
+            }
         }
     }
-    largest
+    found.map(|(sum, count)| sum / count)
 }
 
 /// Skin is at rest but near the incision, where it is tight: it moves there, and hardly elsewhere.
@@ -38,7 +38,7 @@ fn values_near_an_incision_hold_near_it() {
     let at_rest = ("constraints.stc.rest_area_scale", "1.0");
     let tight = "{ radius_mm = 30.0, rest_area_factor = 0.6 }";
     let [near, far] = near_and_far(&with(&[at_rest, ("constraints.stc.near_incision", tight)]));
-    assert!(near > 1.0 && far < 0.25 * near, "{near} mm near the incision, {far} mm far from it");
+    assert!(near > 0.3 && far < 0.25 * near, "{near} mm near the incision, {far} mm far from it");
     let still = near_and_far(&with(&[at_rest]));
     assert!(still[0] < 1e-3 && still[1] < 1e-3, "{still:?}: skin at rest does not move");
     // The factor holds at the segment and fades to 1 at the radius: a wider radius pulls more.

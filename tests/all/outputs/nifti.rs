@@ -17,6 +17,18 @@ pub struct Nifti {
     pub codes: [i16; 2],
 }
 
+/// The rows of a qform: rotation by the quaternion (b, c, d), voxel sizes, direction of the third axis, and offset.
+fn qform([b, c, d]: [f64; 3], spacing: [f64; 3], third: f64, offset: [f64; 3]) -> [[f64; 4]; 3] {
+    let a = (1.0 - b * b - c * c - d * d).max(0.0).sqrt();
+    let quaternion = nalgebra::Quaternion::new(a, b, c, d);
+    let rotation = nalgebra::UnitQuaternion::from_quaternion(quaternion).to_rotation_matrix();
+    let scale = [spacing[0], spacing[1], third * spacing[2]];
+    [0, 1, 2].map(|row| {
+        let column = |n: usize| if n < 3 { rotation[(row, n)] * scale[n] } else { offset[row] };
+        [0, 1, 2, 3].map(column)
+    })
+}
+
 impl Nifti {
     /// World position of a voxel in mm.
     pub fn at(&self, voxel: usize) -> [f64; 3] {
@@ -77,16 +89,18 @@ impl Nifti {
             let length = rows.iter().map(|row| row[axis] * row[axis]).sum::<f64>().sqrt();
             assert!((length - f64::from(spacing[axis])).abs() < 1e-4, "pixdim and sform differ");
         }
+        let codes = [short(252), short(254)];
+        if codes[0] > 0 {
+            let [quaternion, offset] = [256, 268].map(|at| [0, 1, 2].map(|n| f64::from(float(at + 4 * n))));
+            let found = qform(quaternion, spacing.map(f64::from), f64::from(float(76)), offset);
+            for (q, s) in found.iter().flatten().zip(rows.iter().flatten()) {
+                assert!((q - s).abs() < 1e-3, "qform {found:?} and sform {rows:?}");
+            }
+        }
         let start = float(108) as usize;
         let voxels: Vec<i16> =
             raw[start..].chunks_exact(2).map(|pair| i16::from_le_bytes([pair[0], pair[1]])).collect();
         assert_eq!(voxels.len(), shape.iter().product::<usize>());
-        Self {
-            shape,
-            rows,
-            voxels,
-            scaling: [float(112), float(116)].map(f64::from),
-            codes: [short(252), short(254)],
-        }
+        Self { shape, rows, voxels, scaling: [float(112), float(116)].map(f64::from), codes }
     }
 }
