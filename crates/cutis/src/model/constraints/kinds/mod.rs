@@ -1,6 +1,6 @@
 //! The table of constraint kinds that a scene can name.
 //!
-//! This is the one list of them. A kind is one row of [`constraint_kinds!`] and one file of this
+//! This is the one list of them. A kind is one row of `constraint_kinds!` and one file of this
 //! folder, with its section of the scene, the range of its values and the way it is built. The
 //! scene format, the plan, the reports, `--without` and `cutis tune` follow from the row.
 
@@ -139,7 +139,7 @@ impl ConstraintsSection {
     }
 
     /// Removes a kind by its key, so that the scene no longer names it.
-    /// Returns false for a name that is no key of [`constraint_kinds`].
+    /// Returns false for a name that is not a key of [`constraint_kinds()`].
     pub fn remove(&mut self, kind: &str) -> bool {
         let row = KINDS.iter().find(|row| row.key == kind);
         row.inspect(|row| (row.remove)(self)).is_some()
