@@ -44,7 +44,8 @@ const WORST: usize = 12;
 /// There is no adapter, unless the options allow that or do not ask for a GPU. A file cannot be
 /// written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
-    let page = options.write.then(|| Page::open("stability", &TABLES)).transpose()?;
+    let page =
+        (options.write || options.out.is_some()).then(|| Page::open("stability", &TABLES)).transpose()?;
     let mut provenance = Provenance::start(&options.command());
     let wanted = |name: &str| options.case.as_ref().is_none_or(|part| name.contains(part.as_str()));
     let mut cases = cases::all(options.effort());
@@ -87,7 +88,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         page.set("formulations", &tables::summary(&trials, "formulation", tables::formulation).markdown())?;
         page.set("worst", &tables::worst(&trials, WORST).markdown())?;
         page.set("refused", &tables::refused(&trials).markdown())?;
-        page.save(&results())?;
+        page.save(&options.out.clone().unwrap_or_else(results))?;
     }
     Ok(failed == 0)
 }

@@ -35,6 +35,9 @@ pub struct Options {
     /// Write the tables of docs/results/stability.md.
     #[arg(long, conflicts_with_all = ["quick", "backend", "adapter", "scale", "case"])]
     pub write: bool,
+    /// Write the page with its tables into this folder.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "write")]
+    pub out: Option<PathBuf>,
     /// Write all trials and the provenance to this file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
