@@ -41,7 +41,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     fs::create_dir_all(&folder)?;
     // A path relative to the root, so that the calibration holds no path of this machine.
     let copy = folder.strip_prefix(root()).unwrap_or(&folder).join("demo-tuned.toml");
-    println!("cutis tune {SCENE}");
+    eprintln!("cutis tune {SCENE}");
     let document = program.run(|command| {
         command.args(["tune", SCENE, "--json", "--force", "--out"]).arg(&copy);
     })?;

@@ -80,7 +80,7 @@ impl Page {
         fs::create_dir_all(folder)?;
         let path = folder.join(&self.name).with_extension("md");
         fs::write(&path, &self.text).with_context(|| path.display().to_string())?;
-        println!("written: {}", path.display());
+        eprintln!("written: {}", path.display());
         Ok(path)
     }
 }

@@ -53,7 +53,7 @@ impl Program {
         out: &Path,
     ) -> Result<Value, Failure> {
         let name = scene.file_stem().unwrap_or_default().to_string_lossy();
-        println!("{name} {} {}", set.join(" "), options.join(" "));
+        eprintln!("{name} {} {}", set.join(" "), options.join(" "));
         self.run(|command| {
             command.arg("run").arg(scene).args(options).arg("--out").arg(out);
             command.args(set.iter().flat_map(|change| ["--set", change]));

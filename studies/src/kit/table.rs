@@ -113,8 +113,8 @@ mod tests {
 
     #[test]
     fn numbers_have_three_digits() {
-        let texts = [0.0, 271.8, 27.18, 2.718, 0.2718, 0.02718, 2.7e-5, 2e6, f64::NAN].map(number);
-        assert_eq!(texts, ["0", "272", "27.2", "2.72", "0.272", "0.0272", "2.7e-5", "2.0e6", "NaN"]);
+        let texts = [0.0, 314.2, 31.42, 3.456, 0.3142, 0.03142, 2.7e-5, 2e6, f64::NAN].map(number);
+        assert_eq!(texts, ["0", "314", "31.4", "3.46", "0.314", "0.0314", "2.7e-5", "2.0e6", "NaN"]);
         assert_eq!((percent(0.5), optional(None, percent)), ("50.0 %".into(), "–".into()));
     }
 }
