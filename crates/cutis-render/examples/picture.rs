@@ -1,6 +1,7 @@
 //! Draws a phantom from the front and in three slices, and writes the pictures as one PNG file into
 //! the folder for temporary files.
 #![forbid(unsafe_code)]
+#![expect(clippy::print_stdout, reason = "the example prints its result")]
 
 use std::error::Error;
 

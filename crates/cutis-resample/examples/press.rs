@@ -1,6 +1,7 @@
 //! Presses a dent into the belly of a phantom: meshes its tissue, moves the vertices, and resamples
 //! the volume through the deformed mesh. Prints what happened to the voxels.
 #![forbid(unsafe_code)]
+#![expect(clippy::print_stdout, reason = "the example prints its result")]
 
 use std::error::Error;
 

@@ -2,7 +2,7 @@
 
 use cutis_chainmail::ChainError;
 
-use super::look::{Line, Look};
+use super::look::Line;
 use super::plate::{DRAG, Panel, Sample, plate};
 use super::specimen::{IS_SOFT, SOFT, Specimen};
 
