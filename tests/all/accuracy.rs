@@ -1,5 +1,5 @@
-//! Error against run time: the checks of the quick study hold. Single substeps converge, bodies
-//! settle in their equilibria, and controls are refused.
+//! Error against run time. In the quick measurement single substeps converge, bodies settle in
+//! their equilibria, and the negative controls fail.
 
 use cutis_studies::accuracy::{self, Options};
 

@@ -1,4 +1,5 @@
-//! Scenes that are well formed but cannot be met by their volume: a typed error that names the place, and nobody's panic.
+//! Well-formed scenes that do not fit their volume end with a typed error that names the cause, and
+//! never with a panic.
 
 use std::path::Path;
 
@@ -7,7 +8,7 @@ use cutis::{Error, Scene, Silent};
 
 use crate::scenes::{SMALL, folder, overrides, run_in};
 
-/// The error of a scene, which must be the scene's fault.
+/// Runs a scene that must fail, and returns its error. The error must blame the scene.
 pub fn refused(set: &[(&str, &str)]) -> Error {
     let loaded = Scene::load(&folder().join(SMALL), &overrides(set));
     let checked = loaded.and_then(|loaded| cutis::check(&loaded, &Silent));
@@ -17,7 +18,7 @@ pub fn refused(set: &[(&str, &str)]) -> Error {
 }
 
 #[test]
-fn what_the_body_cannot_do_is_said_with_file_and_section() {
+fn impossible_scenes_are_refused_with_file_and_section() {
     let cases: [(&str, &str, &[&str]); 20] = [
         (
             "incision",
@@ -57,7 +58,8 @@ fn what_the_body_cannot_do_is_said_with_file_and_section() {
     }
 }
 
-/// Numbers at the end of their range may fail, but are never a panic and never leave a volume with non-finite places.
+/// Numbers at the end of their range may end with an error. They never cause a panic or non-finite
+/// positions.
 #[test]
 fn extreme_numbers_end_with_a_result_or_an_error() {
     let extreme = [
@@ -92,7 +94,7 @@ fn extreme_numbers_end_with_a_result_or_an_error() {
             Err(error) => assert!(!error.to_string().is_empty(), "{key} = {value}"),
         }
     }
-    // The number of projections of a plan does not overflow.
+    // The plan's number of projections does not overflow.
     let huge = [
         ("solver.substeps", "4294967295"),
         ("solver.iterations", "4294967295"),
@@ -103,7 +105,7 @@ fn extreme_numbers_end_with_a_result_or_an_error() {
 }
 
 #[test]
-fn volumes_that_cannot_be_used_are_named() {
+fn unusable_volumes_are_named() {
     let here = tempfile::tempdir().unwrap();
     let path = |name: &str| here.path().join(name).to_str().unwrap().to_owned();
     let ball = phantom::sphere([16; 3], [4.0; 3], 20.0, 40).unwrap();
@@ -130,7 +132,7 @@ fn volumes_that_cannot_be_used_are_named() {
 }
 
 #[test]
-fn scene_files_that_cannot_be_read_are_named() {
+fn unreadable_scene_files_are_named() {
     let here = tempfile::tempdir().unwrap();
     let file = |name: &str, bytes: &[u8]| {
         std::fs::write(here.path().join(name), bytes).unwrap();
@@ -157,7 +159,7 @@ fn scene_files_that_cannot_be_read_are_named() {
         );
         assert!(text.len() < 5000, "{} bytes of message", text.len());
     }
-    // A file that never ends.
+    // This file never ends.
     if Path::new("/dev/zero").exists() {
         let text = Scene::load(Path::new("/dev/zero"), &[]).unwrap_err().to_string();
         assert!(text.contains("/dev/zero") && text.contains("longer"), "{text}");

@@ -1,5 +1,5 @@
-//! Every key of a scene refuses what it cannot use, naming file, key and value. The keys come from the scene reference, so
-//! that a new one is tested the day it is added.
+//! Every key of a scene refuses invalid values with a message that names file, key and value. The
+//! keys come from the scene reference, so every new key is tested at once.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use cutis::{Error, LoadedScene, Scene};
 
 use crate::scenes::overrides;
 
-/// A scene that has every section, so that any key can be set alone.
+/// A scene with every section, so that each key can be set on its own.
 const EVERYTHING: &str = r#"
 model = "chainmail"
 [volume]
@@ -44,7 +44,8 @@ fn parse(set: &[(&str, &str)]) -> Result<LoadedScene, Error> {
     Scene::parse(EVERYTHING, Path::new("every.toml"), Path::new(""), &overrides(set))
 }
 
-/// `(key as --set takes it, key as a message names it, kind of value)` of every row of the reference.
+/// For every row of the reference: the key as `--set` takes it, the key as messages name it, and
+/// the type of its value.
 fn keys() -> Vec<(String, String, String)> {
     let mut keys = Vec::new();
     let (mut path, mut name) = (String::new(), String::new());
@@ -66,13 +67,13 @@ fn keys() -> Vec<(String, String, String)> {
     keys
 }
 
-/// Fails unless setting `key` is refused with a message that names file, key and value.
+/// Fails unless the value of `key` is refused with a message that names file, key and value.
 fn refused(key: &str, name: &str, value: &str) -> Result<(), String> {
     let Err(error) = parse(&[(key, value)]) else { return Err(format!("{key} = {value} was accepted")) };
     let Error::SceneKey { key: found, .. } = &error else {
         return Err(format!("{key} = {value}: {error:?}"));
     };
-    // A wrong value inside a list or a table may be named by its own key.
+    // The message may name a wrong value inside a list or a table by its own key.
     if !found.starts_with(name) && !name.starts_with(found.as_str()) {
         return Err(format!("{key} = {value}: names {found}: {error}"));
     }
@@ -89,14 +90,14 @@ fn the_scene_with_everything_is_valid_and_has_every_section() {
     let keys = keys();
     assert!(keys.len() > 60, "{} keys: the reference is not read", keys.len());
     for (key, _, kind) in keys.iter().filter(|(_, _, kind)| kind == "number") {
-        // 1 is in the range of every number but the share of `paper` and the like.
+        // 1 is a valid number for every key, but `1` is not a preset name.
         let set = parse(&[(key, "1.0")]);
         assert!(set.is_ok() || key.starts_with("lattice."), "{key} ({kind}): {:?}", set.err());
     }
 }
 
 #[test]
-fn no_number_may_be_nan_or_infinite_and_no_value_of_another_type() {
+fn nan_infinity_and_wrong_types_are_refused() {
     let mut failures = Vec::new();
     for (key, name, kind) in keys() {
         let values: &[&str] = match kind.as_str() {
@@ -175,7 +176,7 @@ fn numbers_out_of_range_are_refused() {
         rows.filter_map(|(key, value)| refused(key, &name(key), value).err()).collect();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 
-    // The value is in the message, as a person would write it.
+    // The message shows the value as a person would write it.
     for (key, value, shown) in [
         ("solver.dt_s", "-1.5", "-1.5"),
         ("solver.dt_s", "-1e300", "-1e300"),
@@ -189,7 +190,7 @@ fn numbers_out_of_range_are_refused() {
 }
 
 #[test]
-fn values_that_do_not_go_together_are_refused() {
+fn contradicting_values_are_refused() {
     let cases: [(&[(&str, &str)], &str); 6] = [
         (&[("volume.path", "ct.nii")], "volume"),
         (&[("volume", "{}")], "volume"),
@@ -228,14 +229,14 @@ fn unknown_keys_are_refused_everywhere() {
 }
 
 #[test]
-fn overrides_that_lead_nowhere_are_refused() {
+fn overrides_of_missing_parents_are_refused() {
     for key in
         ["", ".", "incision.1.depth_mm", "incision.x.depth_mm", "incision.-1", "solver.dt_s.x", "run..frames"]
     {
         let error = parse(&[(key, "1")]).unwrap_err();
         assert!(matches!(error, Error::SceneKey { .. }), "{key}: {error:?}");
     }
-    // Long enough to overflow the stack of a recursive descent.
+    // This key is long enough to overflow the stack of a recursive parser.
     let long = vec!["a"; 100_000].join(".");
     let error = parse(&[(&long, "1")]).unwrap_err().to_string();
     assert!(error.contains("parts") && error.len() < 1000, "{error}");

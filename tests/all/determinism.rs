@@ -1,11 +1,11 @@
-//! The result does not depend on the number of threads, nor on which CPU backend ran, bit for bit.
+//! Results are bit-identical for any number of threads and for both CPU backends.
 
 use crate::scenes::{Run, SMALL, real, scene};
 
 const OUTPUT: (&str, &str) = ("output", "{ volume = true, surface = true }");
 
 #[test]
-fn small_phantom_for_any_number_of_threads() {
+fn the_small_phantom_is_the_same_for_any_number_of_threads() {
     for formulation in ["xpbd", "pbd"] {
         let run = |set: &[(&str, &str)]| {
             let common = [
@@ -30,15 +30,15 @@ fn small_phantom_for_any_number_of_threads() {
         let reference = run(&[("solver.backend", "reference")]);
         assert_eq!(reference.report.backend.name, "reference");
         assert!(one.state() == reference.state(), "{formulation}: the reference backend differs");
-        // The comparison sees one substep more.
+        // Negative control: one more substep changes the result.
         let control = run(&[("solver.substeps", "11")]);
         assert!(one.state() != control.state() && one.bytes("skin.vtu") != control.bytes("skin.vtu"));
     }
 }
 
 #[test]
-fn real_abdomen_for_any_number_of_threads() {
-    let Some(volume) = real("abdomen_ts_64x53x58.nii.gz") else { return };
+fn a_real_abdomen_is_the_same_for_any_number_of_threads() {
+    let Some(volume) = real("ct/abdomen_ts_64x53x58.nii.gz") else { return };
     let run = |threads| {
         let set = [
             ("volume.path", volume.as_str()),

@@ -1,4 +1,4 @@
-//! Where nothing moves, the CT that comes out is the CT that went in, voxel for voxel and at the same millimeters.
+//! A body that does not move gives the input CT back, with the same voxels at the same positions.
 
 use cutis::volume::{AIR_HU, Volume, phantom::Phantom};
 
@@ -40,9 +40,9 @@ fn skin_tension_changes_the_volume() {
     assert!(found.voxels() != original().voxels());
 }
 
-/// What an incision takes away becomes air, near the incision and nowhere else.
+/// Tissue that an incision removes becomes air. All other voxels keep their values.
 #[test]
-fn a_cut_that_does_not_move_only_takes_tissue_away() {
+fn a_cut_that_does_not_move_only_removes_tissue() {
     let (original, found) = (original(), deformed(&[VOLUME_ONLY, ("run.frames", "0")]));
     let pairs = original.voxels().iter().zip(found.voxels());
     let changed: Vec<usize> = pairs.enumerate().filter(|(_, (a, b))| a != b).map(|(n, _)| n).collect();

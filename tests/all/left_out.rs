@@ -1,4 +1,4 @@
-//! A scene pays only for what it names: what it leaves out is neither stored, nor computed, nor written, and is said.
+//! Parts that a scene does not name are not stored, computed or written, and the report lists them.
 
 use cutis::constraints::{Constraint, Distance, SkinTension, Volume};
 use cutis::{LoadedScene, Plan, Silent};
@@ -9,7 +9,7 @@ fn plan(loaded: &LoadedScene) -> Plan {
     cutis::check(loaded, &Silent).unwrap()
 }
 
-/// Bytes of one part of the plan, if it is there.
+/// Bytes of one part of the plan, if the plan has it.
 fn bytes(plan: &Plan, part: &str) -> Option<usize> {
     plan.memory.iter().find(|p| p.part == part).map(|p| p.bytes)
 }
@@ -18,14 +18,15 @@ fn says(lines: &[String], topic: &str) -> bool {
     lines.iter().any(|line| line.starts_with(&format!("{topic}:")))
 }
 
-/// What a kind needs: indices, parameters and compliance of each constraint, and where each color ends.
+/// Bytes that a kind needs: indices, parameters and compliance of each constraint, and the end of
+/// each color.
 fn needed<const N: usize, C: Constraint<N>>(count: usize, colors: usize) -> usize {
     count * (N * size_of::<u32>() + size_of::<C::Params<f32>>() + size_of::<f32>())
         + (colors + 1) * size_of::<u32>()
 }
 
 #[test]
-fn a_kind_costs_its_own_bytes_and_no_others() {
+fn a_kind_needs_only_its_own_bytes() {
     let full = scene(SMALL, &[]);
     let whole = plan(&full);
     let kinds = [
@@ -72,7 +73,7 @@ fn a_handle_is_stored_only_if_there_is_one() {
     assert!(bytes(&without, "handles").is_none() && says(&without.left_out, "handle"));
 }
 
-/// The skin is looked for only if tension, an incision, a surface or a picture needs it.
+/// The skin is detected only if tension, an incision, a surface or a picture needs it.
 #[test]
 fn the_skin_is_detected_only_if_needed() {
     let bare = [
@@ -112,7 +113,7 @@ fn only_named_outputs_are_written() {
             assert_eq!(says(&run.report.left_out, topic), !output.contains(key), "{output}: {topic}");
         }
     }
-    // No section at all: everything but the tissue mesh.
+    // Without an output section everything but the tissue mesh is written.
     let all = [
         "after.png",
         "before.png",
@@ -124,6 +125,6 @@ fn only_named_outputs_are_written() {
         "slice.png",
     ];
     assert_eq!(run(&[]).names(), all);
-    // A checkpoint only if it is asked for.
+    // Checkpoints are written only on request.
     assert_eq!(run(&[("output", "{}"), ("run.checkpoint_every", "1")]).names(), ["checkpoint.bin"]);
 }

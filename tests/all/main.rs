@@ -1,4 +1,5 @@
-//! The one integration test binary: the whole pipeline end to end, and problems whose answers are known.
+//! All integration tests in one binary: the whole pipeline end to end, and problems with known
+//! answers.
 
 mod accuracy;
 mod bad_scenes;
@@ -8,8 +9,8 @@ mod determinism;
 mod gpu;
 mod identity;
 mod left_out;
-mod paper_form;
 mod outputs;
+mod paper_form;
 mod problems;
 mod random_scenes;
 mod region;

@@ -1,4 +1,4 @@
-//! Whatever bytes a scene file or an override holds, reading it ends with a scene or a typed error.
+//! Reading a scene file or an override with random bytes ends with a scene or a typed error.
 
 use std::path::Path;
 
@@ -70,7 +70,8 @@ fn parse(text: &str, overrides: &[Override]) -> Result<LoadedScene, Error> {
     Scene::parse(text, Path::new("random.toml"), Path::new(""), overrides)
 }
 
-/// A scene that is accepted is one that a report can hold; one that is refused is the input's fault and says where.
+/// An accepted scene can be written to a report and read back. An error must blame the input and
+/// name its place.
 fn ends_well(result: Result<LoadedScene, Error>) -> Result<(), TestCaseError> {
     match result {
         Ok(loaded) => {
@@ -84,7 +85,7 @@ fn ends_well(result: Result<LoadedScene, Error>) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// The keys of a scene, some of its lists' entries, text below them, and text that is no key.
+/// Keys of a scene, entries of its lists, deeper keys, and random text.
 fn key() -> impl Strategy<Value = String> {
     let known = || select(&KEYS[..]).prop_map(String::from);
     prop_oneof![
@@ -94,7 +95,7 @@ fn key() -> impl Strategy<Value = String> {
     ]
 }
 
-/// Values in and out of range, and text that is none.
+/// Valid and invalid values, and random text.
 fn value() -> impl Strategy<Value = String> {
     prop_oneof![
         select(&VALUES[..]).prop_map(String::from),
@@ -111,7 +112,7 @@ proptest! {
         ends_well(parse(&String::from_utf8_lossy(&bytes), &[]))?;
     }
 
-    /// Pieces put in, taken out and doubled anywhere.
+    /// Text is inserted, deleted or repeated anywhere.
     #[test]
     fn a_damaged_scene_is_no_panic(
         damage in proptest::collection::vec((any::<Index>(), any::<Index>(), select(&PIECES[..]), 0..4_u8), 1..6),
@@ -140,7 +141,7 @@ proptest! {
     }
 }
 
-/// The generators above reach both ends.
+/// The generators above produce accepted and refused scenes.
 #[test]
 fn some_overrides_are_accepted_and_some_refused() {
     let set = |key: &str, value: &str| parse(DEMO, &[Override { key: key.into(), value: value.into() }]);

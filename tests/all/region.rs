@@ -1,4 +1,5 @@
-//! A region or a graded lattice leaves out what is far from the action, and only that.
+//! A region of interest or a graded lattice saves work far from the action and changes little near
+//! it.
 
 use cutis::volume::{Volume, nifti, phantom::Phantom};
 use cutis::{Error, Plan, Scene, Silent};
@@ -16,7 +17,8 @@ fn growth(run: &Run) -> f64 {
 }
 
 fn small(set: &[(&str, &str)]) -> Run {
-    // Of a tension that the substeps can follow: a graded lattice changes how fast the skin swings, and so what is lost of more.
+    // The substeps can follow this tension. With higher tension the loss would depend on the
+    // lattice.
     let modulus = ("constraints.stc.area_modulus_n_per_m", "5");
     let common = [FINER, modulus, ("run.frames", "20"), ("output", "{ report = true }")];
     Run::of(&scene(SMALL, &[&common, set].concat()))
@@ -48,7 +50,7 @@ fn refusal(set: &[(&str, &str)]) -> (String, String) {
 }
 
 #[test]
-fn a_region_costs_what_it_holds() {
+fn a_region_costs_only_its_own_vertices() {
     let (whole, part) = (plan(&[]), plan(&[(REGION, "{ around_mm = 30 }")]));
     let (sizes, all) = (&part.sizes, &whole.sizes);
     assert_eq!(
@@ -59,13 +61,13 @@ fn a_region_costs_what_it_holds() {
     assert!(sizes.fixed_vertices > 0 && part.projections * 2 < whole.projections);
     assert_eq!((all.frozen_vertices, all.frozen_tets), (0, 0));
     assert!(line(&whole, "region").is_none() && line(&whole, "grading").is_none());
-    // What it says to save is what it saves.
+    // The reported savings are the real ones.
     let said = line(&part, "region").unwrap();
     let words: Vec<&str> = said.split(' ').collect();
     let saved: f64 = words[words.iter().position(|word| *word == "MB").unwrap() - 1].parse().unwrap();
     let right = (bytes(&whole) - bytes(&part)) as f64 / 1e6;
     assert!((saved - right).abs() < 0.06 + 0.02 * right, "{said}: {right}");
-    // The skin is that of the whole body: the region made none.
+    // The skin is that of the whole body. The region adds none.
     assert!(sizes.skin_triangles < all.skin_triangles);
 
     let graded = plan(&[(GRADING, "{ around_mm = 25 }")]);
@@ -78,9 +80,9 @@ fn a_region_costs_what_it_holds() {
     );
 }
 
-/// A region that holds the whole body is no region; a smaller one errs the more the smaller it is.
+/// A region around the whole body changes nothing. The error grows as the region shrinks.
 #[test]
-fn the_opening_tends_to_that_of_the_whole_body() {
+fn the_opening_converges_to_that_of_the_whole_body() {
     let whole = small(&[]);
     let all = small(&[(REGION, "{ around_mm = 1000 }")]);
     let frames = |run: &Run| String::from_utf8(run.bytes("frames.csv")).unwrap();
@@ -93,7 +95,7 @@ fn the_opening_tends_to_that_of_the_whole_body() {
     let parts = ["22", "40", "80"].map(|r| small(&[(REGION, &format!("{{ around_mm = {r} }}"))]));
     let errors = parts.each_ref().map(|part| (growth(part) / growth(&whole) - 1.0).abs());
     assert!(errors[0] > errors[2] && errors[2] < 0.05, "{errors:?}");
-    // Tension pulls all over the skin: tissue moves next to where a region ends.
+    // Tension acts on all of the skin, so tissue moves near the border of the region.
     let at_border = parts.each_ref().map(|part| part.report.border_displacement_mm.unwrap());
     let largest = parts.each_ref().map(|part| part.report.max_displacement_mm);
     assert!(at_border.iter().zip(largest).all(|(&at_border, most)| at_border > 0.0 && at_border <= most));
@@ -109,14 +111,14 @@ fn volume_of(set: &[(&str, &str)]) -> Volume {
     nifti::read(run.path("deformed.nii.gz")).unwrap().volume
 }
 
-/// Beyond the region, and the cells at its border, each voxel is the one that came in.
+/// Beyond the region and the cells at its border every voxel is unchanged.
 #[test]
-fn what_is_frozen_comes_back_bit_for_bit() {
+fn frozen_tissue_is_unchanged_bit_for_bit() {
     let original = Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap();
     let (around, step) = (30.0, 7.0);
     let far = |n: usize| {
         let p = original.grid().mm(original.grid().point(n));
-        // From the segment, 20 mm deep at y = 110 and below, and as far above as the belly is high.
+        // The incision is 20 mm deep at y = 110.
         let d = |v: f64, low: f64, high: f64| (low - v).max(v - high).max(0.0);
         let s = Point3::new(p.x - 30.0, d(p.y, 70.0, 130.0), d(p.z, -50.0, 50.0));
         s.coords.norm() > around + 2.0 * step * 3f64.sqrt()
@@ -129,9 +131,9 @@ fn what_is_frozen_comes_back_bit_for_bit() {
     };
     let (near, beyond) = changed(&volume_of(&[(REGION, "{ around_mm = 30 }")]));
     assert!(near > 500 && beyond == 0, "{near} {beyond}");
-    // The control: the whole body moves there.
+    // Negative control: without a region these voxels change.
     assert!(changed(&volume_of(&[])).1 > 100);
-    // And a body at rest comes back whole, through a region and a graded lattice.
+    // A body at rest is unchanged with a region and with a graded lattice.
     for zone in [REGION, GRADING] {
         let uncut = [("incision", "[]"), (zone, "{ min_mm = [-60, 0, -60], max_mm = [60, 200, 60] }")];
         let still = [("constraints.stc.rest_area_scale", "1.0")];
@@ -159,13 +161,13 @@ fn outputs_show_the_whole_patient() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_by_name() {
+fn invalid_regions_are_refused_by_name() {
     let handle = ("handle", "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5] }]");
     let elsewhere = "{ min_mm = [-60, -60, -60], max_mm = [-20, 60, 60] }";
     let nothing = "{ min_mm = [500, 500, 500], max_mm = [510, 510, 510] }";
     let beside_handle = "{ min_mm = [-40, 20, -100], max_mm = [100, 200, 100] }";
     let uncut = ("incision", "[]");
-    /// Overrides, the key that is blamed, and a part of the message.
+    /// Overrides, the key that the error names, and a part of its message.
     type Refused<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
     let cases: [Refused<'_>; 8] = [
         (&[(REGION, "{ around_mm = 4 }")], REGION, "incision[0]"),
@@ -188,7 +190,7 @@ fn what_does_not_fit_is_refused_by_name() {
             }
         }
     }
-    // What the message asks for is enough.
+    // The change that the message suggests is enough.
     let (_, text) = refusal(&[(REGION, "{ around_mm = 4 }")]);
     let enough = text.rsplit(' ').next().unwrap();
     plan(&[(REGION, &format!("{{ around_mm = {enough} }}"))]);
@@ -210,9 +212,10 @@ fn what_does_not_fit_is_refused_by_name() {
     }
 }
 
-/// A resumed run in a region is the whole one; threads change nothing; another region is another scene.
+/// A resumed run in a region equals an uninterrupted one for any number of threads. A checkpoint of
+/// another region is refused.
 #[test]
-fn checkpoints_and_threads() {
+fn regions_resume_and_run_on_any_number_of_threads() {
     let loaded = |frames: &str, threads: &str, around: &str| {
         let zone = format!("{{ around_mm = {around} }}");
         let set = [

@@ -1,4 +1,5 @@
-//! A run that is interrupted and resumed is the run that was not, bit for bit; a checkpoint that does not fit is refused.
+//! A resumed run is bit-identical to an uninterrupted one. A checkpoint that does not fit is
+//! refused.
 
 use std::path::Path;
 
@@ -6,7 +7,7 @@ use cutis::{Error, LoadedScene};
 
 use crate::scenes::{SMALL, frames, run_in, scene};
 
-/// A wound that opens while a handle, still moving at frame 5, drags the belly.
+/// A wound that opens while a handle drags the belly. The handle still moves at frame 5.
 fn dragged(frames: &str) -> LoadedScene {
     scene(
         SMALL,
@@ -20,7 +21,7 @@ fn dragged(frames: &str) -> LoadedScene {
 }
 
 #[test]
-fn five_and_five_frames_are_ten() {
+fn five_frames_and_five_more_equal_ten() {
     let [whole, halves] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let whole_report = run_in(whole.path(), &dragged("10"), false).unwrap();
     run_in(halves.path(), &dragged("5"), false).unwrap();
@@ -41,7 +42,7 @@ fn five_and_five_frames_are_ten() {
     assert_eq!(wound(&whole_report), wound(&resumed_report));
 }
 
-/// Resuming a finished run computes nothing and writes the same outputs.
+/// Resuming a finished run computes no frame and writes the same outputs.
 #[test]
 fn resuming_at_the_end_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Scenes that are shipped can be used, and the page about them says what the program says.
+//! The scenes of the repository are valid, and the scene reference is up to date.
 
 use std::path::Path;
 
@@ -21,13 +21,14 @@ fn the_template_and_the_demo_are_valid() {
     let template = Scene::parse(cutis::scene::template(), Path::new("template"), Path::new(""), &[]).unwrap();
     let demo = cutis::demo(&[]).unwrap();
     for loaded in [template, demo] {
-        // What a report holds of a scene is a scene.
+        // A scene that is written to a report can be read back.
         let text = serde_json::to_string(&loaded.scene).unwrap();
         assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), loaded.scene);
     }
 }
 
-/// A relative path starts at the scene file; one from the command line at the current folder.
+/// Paths in a scene file are relative to it. Paths on the command line are relative to the current
+/// folder.
 #[test]
 fn paths_start_where_they_are_written() {
     let scene = folder().join("abdomen-incision.toml");

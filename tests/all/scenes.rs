@@ -1,4 +1,5 @@
-//! What the end-to-end tests share: fixture scenes with overrides, the real volumes, a run in a folder of its own.
+//! Helpers of the end-to-end tests: fixture scenes with overrides, real volumes, and runs in
+//! temporary folders.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,7 @@ use tempfile::TempDir;
 /// The small phantom with an incision.
 pub const SMALL: &str = "phantom-small.toml";
 
-/// Folder of the scenes that tests, benches and users share.
+/// Folder of the example scenes.
 pub fn folder() -> PathBuf {
     concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/scenes").into()
 }
@@ -26,46 +27,39 @@ pub fn scene(name: &str, set: &[(&str, &str)]) -> LoadedScene {
     Scene::load(&folder().join(name), &overrides(set)).unwrap()
 }
 
-/// A real volume, or `None` with a printed reason; in CI its absence is a failure.
+/// Path of a file of the test data, such as `ct/head.nii.gz`. `None` if it is missing.
 pub fn real(name: &str) -> Option<String> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let data = PathBuf::from(std::env::var_os("CUTIS_TEST_DATA").unwrap_or_else(|| beside.into()));
-    let path = data.join("ct").join(name);
-    if path.is_file() {
-        return Some(path.to_str().unwrap().to_owned());
-    }
-    assert!(std::env::var_os("CI").is_none(), "there is no {}", path.display());
-    eprintln!("skipped: there is no {} (set CUTIS_TEST_DATA)", path.display());
-    None
+    cutis_test_kit::scans::find(name).map(|path| path.to_str().unwrap().to_owned())
 }
 
-/// A finished run and its folder, which goes when this is dropped.
+/// A finished run and its folder, which is deleted on drop.
 pub struct Run {
     pub report: Report,
     folder: TempDir,
 }
 
 impl Run {
-    /// Runs a scene in a fresh folder.
+    /// Runs a scene in a new folder.
     pub fn of(loaded: &LoadedScene) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let report = run_in(folder.path(), loaded, false).unwrap();
         Self { report, folder }
     }
 
-    /// The bytes of one of its files.
+    /// The bytes of a file of the run.
     pub fn bytes(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.folder.path().join(name)).unwrap()
     }
 
-    /// The CT that it wrote.
+    /// The deformed CT of the run.
     pub fn deformed(&self) -> Volume {
         let read = nifti::read(self.path("deformed.nii.gz")).unwrap();
         assert!(read.warnings.is_empty(), "{:?}", read.warnings);
         read.volume
     }
 
-    /// The state without the checkpoint's header, which names the scene, and its seal.
+    /// The state in the checkpoint, without the header, which names the scene, and without the
+    /// checksum.
     pub fn state(&self) -> Vec<u8> {
         let bytes = self.bytes("checkpoint.bin");
         bytes[40..bytes.len() - 32].to_vec()
@@ -80,23 +74,23 @@ impl Run {
         values.chunks_exact(3).map(Point3::from_slice).collect()
     }
 
-    /// Path of its folder.
+    /// Path of the run folder.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Path of one of its files.
+    /// Path of a file of the run.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Names of its files, sorted.
+    /// Sorted names of the run's files.
     pub fn names(&self) -> Vec<String> {
         names(self.folder.path())
     }
 }
 
-/// Runs a scene in a folder, from its checkpoint if `resume`.
+/// Runs a scene in a folder. With `resume` it starts from the checkpoint.
 pub fn run_in(folder: &Path, loaded: &LoadedScene, resume: bool) -> Result<Report, Error> {
     cutis::run(loaded, &RunOptions { out: folder.into(), resume }, &Silent)
 }
@@ -119,7 +113,7 @@ pub fn column(run: &Run, name: &str) -> Vec<f64> {
     rows[1..].iter().map(|row| row.split(',').nth(place).unwrap().parse().unwrap()).collect()
 }
 
-/// Names of the files in a folder, sorted.
+/// Sorted names of the files in a folder.
 pub fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();

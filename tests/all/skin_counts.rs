@@ -1,4 +1,4 @@
-//! The skin of solids whose surface is known, from the file on the disk to the report.
+//! The skin of solids with known surfaces, from the file to the report.
 
 use cutis::mesh::{SkinMode, SkinReport, Split};
 use cutis::volume::{Volume, nifti, phantom, sample::LatticeSize};
@@ -31,9 +31,9 @@ fn a_sphere_has_one_closed_skin() {
     }
 }
 
-/// Only the outer sphere is skin; the other rules find the hollow and the ball in it as well.
+/// Only the outer sphere is skin. The other rules also find the hollow and the inner ball.
 #[test]
-fn a_sphere_within_a_sphere_shows_the_outer_one_alone() {
+fn only_the_outer_of_two_nested_spheres_is_skin() {
     let nested = phantom::nested_spheres([48, 48, 48], [1.5; 3], [32.0, 22.0, 12.0], 40).unwrap();
     let solid = phantom::sphere([48, 48, 48], [1.5; 3], 32.0, 40).unwrap();
     let exterior = skin(&nested, SkinMode::Exterior, LatticeSize::Native);

@@ -20,13 +20,13 @@ fn check(run: impl FnOnce(&mut dyn FnMut(Trial) -> Result<(), Failure>) -> Resul
 }
 
 #[test]
-fn extreme_cases_end_as_they_must() {
+fn extreme_cases_end_as_expected() {
     let cases = cases::all(Effort::Quick);
     check(|keep| stability::run_cpu(&cases, &SCALES, keep));
 }
 
 #[test]
-fn extreme_cases_end_as_they_must_in_double_precision() {
+fn extreme_cases_end_as_expected_in_double_precision() {
     let cases = cases::all(Effort::Quick);
     check(|keep| stability::run_reference(&cases, &[1e-3], keep));
 }

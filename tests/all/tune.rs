@@ -1,5 +1,5 @@
-//! What a calibration promises is what a run of the tuned scene does: its error, measured here against a finer reference of the
-//! test's own, its opening, and its time.
+//! A run of a tuned scene has the predicted error, opening and time. The error is measured against
+//! a finer reference of this test.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use nalgebra::Point3;
 
 use crate::scenes::{self, SMALL, run_in};
 
-/// The small phantom, on a coarser lattice and for a shorter time, in which it comes to rest.
+/// The small phantom on a coarser lattice, for a shorter time in which it still comes to rest.
 fn scene(set: &[(&str, &str)]) -> LoadedScene {
     let quick = [
         ("lattice.spacing_mm", "14"),
@@ -28,7 +28,7 @@ fn options(out: PathBuf, demand: Demand) -> TuneOptions {
     TuneOptions { demand, out, overwrite: false, minutes: 0.3, omissions: false }
 }
 
-/// Takes as long as it needs.
+/// Options without a time limit.
 fn tuned(loaded: &LoadedScene, folder: &Path, demand: Demand) -> (Tuning, LoadedScene) {
     let options = TuneOptions { minutes: 30.0, ..options(folder.join("tuned.toml"), demand) };
     let tuning = cutis::tune(loaded, &options, &Silent).unwrap();
@@ -36,7 +36,7 @@ fn tuned(loaded: &LoadedScene, folder: &Path, demand: Demand) -> (Tuning, Loaded
     (tuning, tuned)
 }
 
-/// Positions in the checkpoint of a folder, local meters.
+/// Positions in the checkpoint of a folder, in local meters.
 fn state(folder: &Path) -> Vec<Point3<f64>> {
     let bytes = std::fs::read(folder.join("checkpoint.bin")).unwrap();
     let values: Vec<f64> = bytes[52..bytes.len() - 32]
@@ -46,7 +46,8 @@ fn state(folder: &Path) -> Vec<Point3<f64>> {
     values[..values.len() / 2].chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect()
 }
 
-/// The whole course of a scene in double precision, with its own formulation and many substeps: rest, end, and what can move.
+/// A run in double precision with the scene's formulation and many substeps: rest positions, final
+/// positions, and movable vertices.
 fn reference(loaded: &LoadedScene, substeps: u32) -> [Vec<Point3<f64>>; 2] {
     let built = cutis::build_system(loaded).unwrap();
     let system = built.system.to_f64();
@@ -71,7 +72,7 @@ fn rms(a: &[Point3<f64>], b: &[Point3<f64>]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / a.len() as f64).sqrt()
 }
 
-/// Times of the same work differ by this factor where other tests begin and end meanwhile.
+/// Times of the same work may differ by this factor while other tests run.
 const BUSY: f64 = 3.0;
 
 fn near(found: f64, promised: f64) -> bool {
@@ -79,7 +80,7 @@ fn near(found: f64, promised: f64) -> bool {
 }
 
 #[test]
-fn a_run_of_the_tuned_scene_confirms_what_was_promised() {
+fn a_run_of_the_tuned_scene_confirms_the_prediction() {
     let folder = tempfile::tempdir().unwrap();
     let loaded = scene(&[]);
     let (tuning, tuned) = tuned(&loaded, folder.path(), Demand::Error(0.06));
@@ -87,7 +88,7 @@ fn a_run_of_the_tuned_scene_confirms_what_was_promised() {
     let promised = picked.error.unwrap();
     assert!(promised + tuning.reference.error <= 0.06 && tuning.reference.error <= 0.006, "{tuning:?}");
 
-    // Nothing but the setting differs.
+    // Only the settings differ.
     let mut expected = loaded.scene.clone();
     expected.solver = tuned.scene.solver.clone();
     assert_eq!(tuned.scene, expected);
@@ -107,11 +108,12 @@ fn a_run_of_the_tuned_scene_confirms_what_was_promised() {
     let wound = report.wound.clone().unwrap();
     let growth = wound.final_mm - wound.initial_mm;
     assert!((growth - picked.wounds[0].growth_mm).abs() < 1e-6, "{growth} {picked:?}");
-    // The control: the scene as it was is not what was promised.
+    // Negative control: the original scene does not meet the prediction.
     let (_, before) = run(&loaded);
     assert!(!near(before, promised), "{before} {promised}");
 
-    // Time: what is promised is what the trial took, and what runs take, as far as a machine that runs other tests beside can tell.
+    // The predicted time is that of the trial and of real runs, within the noise of other tests on
+    // this machine.
     let promised = picked.ms_per_frame.unwrap();
     let trial = tuning.stages.iter().find(|stage| stage.name == format!("try {}", picked.setting)).unwrap();
     let frames = f64::from(tuning.frames);
@@ -125,7 +127,7 @@ fn a_run_of_the_tuned_scene_confirms_what_was_promised() {
 }
 
 #[test]
-fn a_budget_is_kept_and_the_front_is_one() {
+fn the_budget_is_kept_and_the_front_is_pareto_optimal() {
     let folder = tempfile::tempdir().unwrap();
     let loaded = scene(&[("run.frames", "8")]);
     let (tuning, _) = tuned(&loaded, folder.path(), Demand::Default);
@@ -146,9 +148,9 @@ fn a_budget_is_kept_and_the_front_is_one() {
     assert!(affordable.filter_map(|c| c.error).all(|error| error >= picked.error.unwrap()));
 }
 
-/// The cost report is that of a run of the tuned scene, and not of the scene as it was.
+/// The cost report describes a run of the tuned scene and not of the original one.
 #[test]
-fn the_cost_report_is_that_of_the_picked_setting() {
+fn the_cost_report_describes_the_picked_setting() {
     let folder = tempfile::tempdir().unwrap();
     let own = [("run.frames", "2"), ("solver.formulation", "\"vbd\""), ("solver.substeps", "4")];
     let loaded = scene(&own);
@@ -163,7 +165,7 @@ fn the_cost_report_is_that_of_the_picked_setting() {
 }
 
 #[test]
-fn what_can_be_left_out_is_measured() {
+fn the_ablation_measures_every_optional_part() {
     let folder = tempfile::tempdir().unwrap();
     let outputs = "{ surface = true, volume = true, report = true }";
     let loaded = scene(&[("run.frames", "4"), ("output", outputs)]);
@@ -194,7 +196,7 @@ fn what_can_be_left_out_is_measured() {
 }
 
 #[test]
-fn what_cannot_be_tuned_is_refused_before_the_work() {
+fn scenes_that_cannot_be_tuned_are_refused_early() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("tuned.toml");
     let refused = |set: &[(&str, &str)], demand: Demand, words: &[&str]| {
@@ -213,7 +215,7 @@ fn what_cannot_be_tuned_is_refused_before_the_work() {
 }
 
 #[test]
-fn a_demand_that_nothing_meets_is_told_and_writes_nothing() {
+fn a_target_that_no_setting_meets_is_reported_and_writes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let loaded = scene(&[("run.frames", "2")]);
     let options = options(folder.path().join("tuned.toml"), Demand::BudgetMs(1e-6));
@@ -224,7 +226,7 @@ fn a_demand_that_nothing_meets_is_told_and_writes_nothing() {
     assert!(tuning.candidates.iter().any(|candidate| candidate.own && candidate.error.is_some()));
     assert!(!error.to_string().contains("could afford") && tuning.reference.needs_minutes.is_none());
 
-    // A reference that there is no time for to be finer than the scene.
+    // The time limit allows no reference that is finer than the scene.
     let loaded = scene(&[("run.frames", "2"), ("solver.substeps", "400")]);
     let tuning = cutis::tune(&loaded, &TuneOptions { minutes: 1e-6, ..options }, &Silent).unwrap();
     assert_eq!(tuning.reference.substeps, [4, 8, 16]);
@@ -235,11 +237,12 @@ fn a_demand_that_nothing_meets_is_told_and_writes_nothing() {
 }
 
 #[test]
-fn a_setting_that_is_the_best_there_was_time_for_says_what_would_do() {
+fn a_time_limit_that_is_too_short_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let loaded = scene(&[("run.frames", "2"), ("solver.substeps", "2")]);
     let options = options(folder.path().join("tuned.toml"), Demand::Default);
-    // No time but for what is run in any case: three levels of the reference, and the scene's own setting.
+    // The time limit only allows the required runs: three levels of the reference and the scene's
+    // own setting.
     let hurried = TuneOptions { minutes: 1e-6, omissions: false, ..options };
     let tuning = cutis::tune(&loaded, &hurried, &Silent).unwrap();
     let picked = tuning.picked.as_ref().unwrap();

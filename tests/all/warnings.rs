@@ -1,4 +1,4 @@
-//! What the program says without being asked, and refuses before the work: each once with its cause and once without.
+//! Warnings and early errors. Each is tested with its cause and without it.
 
 use cutis::{Error, Silent};
 
@@ -10,7 +10,7 @@ fn warns(set: &[(&str, &str)], words: &str) -> bool {
 }
 
 #[test]
-fn skin_that_the_substeps_cannot_follow() {
+fn skin_that_is_too_stiff_for_the_substeps_causes_a_warning() {
     let stiff = ("constraints.stc.area_modulus_n_per_m", "1000.0");
     assert!(warns(&[stiff], "stiffer than 10 substeps"));
     assert!(!warns(&[stiff, ("solver.substeps", "1000")], "stiffer than"));
@@ -19,7 +19,7 @@ fn skin_that_the_substeps_cannot_follow() {
 }
 
 #[test]
-fn slits_narrower_than_a_step_and_bodies_that_nothing_holds() {
+fn narrow_slits_and_free_bodies_cause_warnings() {
     assert!(warns(&[("incision[0].width_mm", "2.0")], "incision[0].width_mm = 2"));
     assert!(!warns(&[("incision.0.width_mm", "12.0")], "width_mm"));
     assert!(warns(&[("fixed", "{}")], "nothing is fixed"));
@@ -39,7 +39,7 @@ fn an_override_of_one_output_keeps_the_others() {
 
 #[test]
 fn a_sheared_ct_is_refused_before_the_simulation() {
-    let Some(path) = real("../awkward/sheared_sform_only.nii.gz") else { return };
+    let Some(path) = real("awkward/sheared_sform_only.nii.gz") else { return };
     let error =
         cutis::check(&scene(SMALL, &[("volume", &format!("{{ path = '{path}' }}"))]), &Silent).unwrap_err();
     assert!(matches!(&error, Error::SceneKey { key, .. } if key == "output.volume"), "{error}");

@@ -1,15 +1,15 @@
-//! Skin tension, and nothing else, opens the wound, and the wound comes to rest.
+//! Only skin tension opens the wound, and the wound comes to rest.
 
 use cutis::report::Wound;
 
 use crate::scenes::{Run, SMALL, column, real, scene};
 
-/// The mean opening of the wound, frame by frame, mm.
+/// Mean opening of the wound in each frame, mm.
 fn gapes(run: &Run) -> Vec<f64> {
     column(run, "gape_0_mean_mm")
 }
 
-/// Largest change over the last ten frames, relative to the last.
+/// Largest change over the last ten frames, relative to the final opening.
 fn unrest(gapes: &[f64]) -> f64 {
     let last = gapes[gapes.len() - 1];
     gapes[gapes.len() - 11..].iter().map(|gape| (gape / last - 1.0).abs()).fold(0.0, f64::max)
@@ -29,7 +29,7 @@ fn tension_opens_the_wound_which_settles() {
     assert!(wound.final_mm - wound.initial_mm > 1.0, "{wound:?}");
     assert!(wound.mid_mm - wound.initial_mid_mm > 1.0, "{wound:?}");
     assert!(unrest(&gapes) < 0.01, "{gapes:?}");
-    // While it opens, it is not at rest: the measure can tell.
+    // Negative control: the wound is not at rest while it opens.
     assert!(unrest(&gapes[..12]) > 0.01, "{gapes:?}");
 }
 
@@ -44,10 +44,11 @@ fn without_tension_the_wound_stays_as_it_is() {
     }
 }
 
-/// The wound of an independent program, on a real abdomen: within 20 % at both stiffnesses.
+/// On a real abdomen the opening agrees with an independent program within 20 % at both
+/// stiffnesses.
 #[test]
-fn opens_like_the_reference_in_three_dimensions() {
-    let Some(volume) = real("abdomen_ts_64x53x58.nii.gz") else { return };
+fn the_wound_opens_like_the_reference_in_three_dimensions() {
+    let Some(volume) = real("ct/abdomen_ts_64x53x58.nii.gz") else { return };
     let common = [REPORT, ("volume.path", volume.as_str()), ("run.frames", "24")];
     let soft = [
         ("constraints.distance.youngs_modulus_pa", "5e3"),

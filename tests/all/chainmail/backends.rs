@@ -1,11 +1,13 @@
-//! Whatever runs a chain, the bits are the same.
+//! A chain gives the same bits on any number of threads and on a GPU.
+
+use cutis_test_kit::gpu::on_each_adapter;
 
 use super::*;
-use crate::gpu::{gpu, run_on, share_differing};
+use crate::gpu::{run_on, share_differing};
 
 const FILES: [&str; 3] = ["checkpoint.bin", "deformed.nii.gz", "skin.vtu"];
 
-/// Cuts at two times, a handle that is followed, and one that is not.
+/// Two cuts at different times, one handle that tissue can follow, and one that it cannot.
 fn busy(set: &[(&str, &str)]) -> LoadedScene {
     let incisions =
         "[{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 25, width_mm = 9, at_s = 0.25 },
@@ -33,33 +35,35 @@ fn any_number_of_threads_gives_the_same_bits() {
         assert!(FILES.iter().all(|file| one.bytes(file) == other.bytes(file)), "{backend} {threads}");
         assert_eq!(other.report.chainmail, told, "{backend} {threads}");
     }
-    // The comparison sees one sweep less in each frame.
+    // Negative control: one sweep less per frame changes the result.
     let control = run(&[("chainmail.relax_per_frame", "3")]);
     assert!(one.state() != control.state() && one.bytes("skin.vtu") != control.bytes("skin.vtu"));
 }
 
-/// On any device: all numbers are whole.
+/// This holds on any device, because ChainMail computes with integers.
 #[test]
 fn a_gpu_gives_the_same_bits() {
-    let Some(gpu) = gpu() else { return };
-    let (loaded, folder) = (busy(&[]), tempfile::tempdir().unwrap());
-    let cpu = Run::of(&loaded);
-    let report = run_on(&gpu, folder.path(), &loaded, false).unwrap();
-    assert_eq!((report.backend.name.as_str(), &report.chainmail), ("gpu", &cpu.report.chainmail));
-    assert_eq!(report.device_memory.len(), 1);
-    let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
-    for file in ["checkpoint.bin", "skin.vtu"] {
-        assert!(cpu.bytes(file) == read(file), "{file}");
-    }
-    // Which voxel belongs to which tetrahedron is looked up in single precision there.
-    let found = nifti::read(folder.path().join("deformed.nii.gz")).unwrap().volume;
-    assert!(share_differing(cpu.deformed().voxels(), found.voxels()) < 1e-4);
-    // Half of the run there, half of it here; with nothing to be resampled the device relaxes and does nothing else.
-    let other = tempfile::tempdir().unwrap();
-    let mut half = first(3, &loaded);
-    half.scene.output.volume = false;
-    let report = run_on(&gpu, other.path(), &half, false).unwrap();
-    assert!(report.device.is_some_and(|device| device.submits > 0));
-    scenes::run_in(other.path(), &loaded, true).unwrap();
-    assert!(std::fs::read(other.path().join("checkpoint.bin")).unwrap() == cpu.bytes("checkpoint.bin"));
+    on_each_adapter(|gpu| {
+        let (loaded, folder) = (busy(&[]), tempfile::tempdir().unwrap());
+        let cpu = Run::of(&loaded);
+        let report = run_on(gpu, folder.path(), &loaded, false).unwrap();
+        assert_eq!((report.backend.name.as_str(), &report.chainmail), ("gpu", &cpu.report.chainmail));
+        assert_eq!(report.device_memory.len(), 1);
+        let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
+        for file in ["checkpoint.bin", "skin.vtu"] {
+            assert!(cpu.bytes(file) == read(file), "{file}");
+        }
+        // The GPU looks up the tetrahedron of a voxel in single precision.
+        let found = nifti::read(folder.path().join("deformed.nii.gz")).unwrap().volume;
+        assert!(share_differing(cpu.deformed().voxels(), found.voxels()) < 1e-4);
+        // Half of the run is on the GPU and half on the CPU. Without resampling the device only relaxes
+        // the chain.
+        let other = tempfile::tempdir().unwrap();
+        let mut half = first(3, &loaded);
+        half.scene.output.volume = false;
+        let report = run_on(gpu, other.path(), &half, false).unwrap();
+        assert!(report.device.is_some_and(|device| device.submits > 0));
+        scenes::run_in(other.path(), &loaded, true).unwrap();
+        assert!(std::fs::read(other.path().join("checkpoint.bin")).unwrap() == cpu.bytes("checkpoint.bin"));
+    });
 }

@@ -1,4 +1,4 @@
-//! Incisions, at the start and later.
+//! Incisions of a chain at the start of a run and later.
 
 use std::collections::HashSet;
 
@@ -7,7 +7,7 @@ use crate::scenes::column;
 
 const REPORT: (&str, &str) = ("output", "{ report = true }");
 
-/// Links that a scene has before its incisions and not after them.
+/// Number of links that the incisions of a scene cut.
 fn lost(loaded: &LoadedScene) -> Vec<([usize; 2], usize)> {
     let mut whole = loaded.clone();
     whole.scene.incision.clear();
@@ -15,14 +15,14 @@ fn lost(loaded: &LoadedScene) -> Vec<([usize; 2], usize)> {
     Twin::of(&whole).links.into_iter().filter(|link| !left.contains(link)).collect()
 }
 
-/// The widest that links across the cut are drawn, mm.
+/// Largest extension of a link across the cut, mm.
 fn widest(ended: &Ended, lost: &[([usize; 2], usize)]) -> f64 {
     let across = lost.iter().filter(|(_, axis)| *axis == 0);
     across.map(|&([a, b], _)| ended.by[b].x - ended.by[a].x).fold(0.0, f64::max)
 }
 
 #[test]
-fn a_wound_opens_where_the_links_are_cut_and_the_other_side_stays() {
+fn a_cut_lets_one_side_move_and_the_other_stay() {
     let cut = chain(&[REPORT, INCISION, BESIDE, UNRELAXED, UNIFORM]);
     let (lost, ended) = (lost(&cut), Ended::of(&cut));
     assert_eq!(ended.told().cut_links, lost.len());
@@ -34,15 +34,15 @@ fn a_wound_opens_where_the_links_are_cut_and_the_other_side_stays() {
         beyond.map(|(_, by)| by.norm()).fold(0.0, f64::max)
     };
     assert_eq!(right(&ended), 0.0);
-    // Without the incision the links hold both sides together.
+    // Negative control: without the incision the links hold both sides together.
     let whole = Ended::of(&chain(&[BESIDE, UNRELAXED, UNIFORM]));
     assert_eq!(whole.told().cut_links, 0);
     assert!(right(&whole) > 3.0 && widest(&whole, &lost) < 0.3 * STEPS_MM[0] + EXACT_MM);
 }
 
-/// What an incision takes is no tissue to be dragged.
+/// A handle does not grab tissue that an incision removed.
 #[test]
-fn a_handle_in_a_cut_grabs_what_is_left() {
+fn a_handle_in_a_cut_grabs_the_remaining_tissue() {
     let at = Vector3::new(0.0, 100.0, 0.0);
     let handle = format!("[{{ at_mm = {:?}, radius_mm = 20, move_mm = [0, 9, 0] }}]", <[f64; 3]>::from(at));
     let ended = Ended::of(&chain(&[INCISION, ("incision.0.width_mm", "13"), ("handle", &handle)]));
@@ -54,20 +54,21 @@ fn a_handle_in_a_cut_grabs_what_is_left() {
 }
 
 #[test]
-fn an_incision_is_there_from_its_time_on() {
+fn an_incision_acts_from_its_time_on() {
     let common = [REPORT, INCISION, BESIDE, UNRELAXED, UNIFORM];
     let at = |at_s| chain(&[&common[..], &[("incision.0.at_s", at_s)]].concat());
     let (early, late) = (Ended::of(&at("0")), Ended::of(&at("0.375")));
     assert_eq!(early.told().cut_links, late.told().cut_links);
     assert!(early.told().cut_links > 0 && early.by != late.by);
-    // In each of four frames the handle moves by 3 mm. The cut comes before the last of them: until then the links across hold.
+    // The handle moves by 3 mm in each of four frames. The links hold until the cut, which comes
+    // before the last frame.
     let growth = |ended: &Ended| -> Vec<f64> {
         column(&ended.run, "gape_0_mid_mm").windows(2).map(|pair| pair[1] - pair[0]).collect()
     };
     let (early, late) = (growth(&early), growth(&late));
     assert!(early[..4].iter().all(|mm| *mm > 2.9), "{early:?}");
     assert!(late[2] < 0.01 && late[3] > 2.9, "{late:?}");
-    // Until then it is the body without the incision.
+    // Before the cut the run equals the run without an incision.
     let before = Ended::of(&first(3, &at("0.375")));
     let whole = Ended::of(&first(3, &chain(&[BESIDE, UNRELAXED, UNIFORM])));
     assert!(before.told().cut_links == 0 && before.by == whole.by);
@@ -75,7 +76,7 @@ fn an_incision_is_there_from_its_time_on() {
     assert!(cut.told().cut_links > 0);
 }
 
-/// Two incisions of different lengths, a handle beside each, and the times of their cuts in either order.
+/// Two incisions of different lengths with a handle next to each. The cuts come in either order.
 #[test]
 fn each_incision_cuts_its_own_links_at_its_own_time() {
     const LEFT: &str = "{ from_mm = [-50, 105, -50], to_mm = [-50, 105, 50], depth_mm = 40, width_mm = 9";
@@ -110,7 +111,7 @@ fn each_incision_cuts_its_own_links_at_its_own_time() {
             let scene = scene(&incisions);
             let cut = |frames| Run::of(&first(frames, &scene)).report.chainmail.unwrap().cut_links;
             assert_eq!([1, 3, 4].map(cut), counts, "{times:?} {swapped}");
-            // Until its cut the links across hold a wound together, and no longer.
+            // The links hold each wound together until its cut, and not after it.
             let run = Run::of(&scene);
             for (wound, (_, at_s)) in incisions.iter().enumerate() {
                 let (gapes, frame) = (column(&run, &format!("gape_{wound}_mid_mm")), (at_s / 0.125) as usize);
@@ -121,9 +122,10 @@ fn each_incision_cuts_its_own_links_at_its_own_time() {
     }
 }
 
-/// Until the later one it is the body with the earlier one alone, whatever they share and in whichever order they are named.
+/// Before the later cut the run equals the run with the earlier incision alone. Shared links and
+/// the order in the scene do not matter.
 #[test]
-fn incisions_over_one_another_cut_each_at_its_time() {
+fn overlapping_incisions_cut_at_their_own_times() {
     const SHALLOW: &str = "{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 20, width_mm = 9";
     const DEEP: &str = "{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 40, width_mm = 9";
     const ACROSS: &str = "{ from_mm = [-45, 110, 0], to_mm = [45, 110, 0], depth_mm = 30, width_mm = 9";
@@ -150,9 +152,9 @@ fn incisions_over_one_another_cut_each_at_its_time() {
     }
 }
 
-/// Nothing keeps one lip out of the other.
+/// There is no contact, so lips can pass through each other.
 #[test]
-fn lips_that_pass_through_each_other_are_told_of() {
+fn lips_that_pass_through_each_other_are_reported() {
     let over = "[{ at_mm = [-18, 97, 0], radius_mm = 22, move_mm = [40, 0, 0], over_s = 0.5 }]";
     let told = |handle| Ended::of(&chain(&[REPORT, INCISION, ("handle", handle), UNIFORM])).run.report;
     let crossed = |report: &cutis::report::Report| {
@@ -164,7 +166,7 @@ fn lips_that_pass_through_each_other_are_told_of() {
 }
 
 #[test]
-fn a_cut_after_the_last_drag_is_no_part_of_the_energy_before() {
+fn a_cut_after_the_last_drag_does_not_change_the_energy_before_it() {
     let told = |cut: &[(&str, &str)]| {
         let common = [BESIDE, ("chainmail.relax_per_frame", "3")];
         Ended::of(&chain(&[&common[..], cut].concat())).told().clone()

@@ -1,4 +1,4 @@
-//! What handles drag, and what stays.
+//! Tissue that handles drag, and tissue that stays where it is.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -11,10 +11,10 @@ use super::*;
 const CT: (&str, &str) = ("output", "{ volume = true }");
 
 #[test]
-fn what_nobody_drags_stays_where_it_is() {
+fn a_body_without_a_drag_stays_where_it_is() {
     for backend in ["cpu", "reference"] {
         let ended = Ended::of(&chain(&[CT, ("solver.backend", backend)]));
-        // One sweep finds out that nothing is to be done, and no other follows.
+        // A single sweep finds that nothing has to move.
         let still = ChainmailReport { relax_sweeps: 1, settled: true, ..ChainmailReport::default() };
         assert_eq!(*ended.told(), still);
         assert!(ended.run.positions() == ended.twin.rest && ended.run.report.max_displacement_mm == 0.0);
@@ -28,9 +28,9 @@ fn what_nobody_drags_stays_where_it_is() {
     assert!(dragged.voxels() != original().voxels(), "the control");
 }
 
-/// What incisions take is air, with this model as with the other, early or late.
+/// Removed tissue becomes air at any time, as with the other model.
 #[test]
-fn a_cut_that_nobody_drags_only_takes_tissue_away() {
+fn a_cut_without_a_drag_only_removes_tissue() {
     let other = Run::of(&chain(&[CT, INCISION, ("model", "pbd"), ("run.frames", "0")])).deformed();
     assert!(other.voxels() != original().voxels());
     for at_s in ["0", "0.25"] {
@@ -41,10 +41,10 @@ fn a_cut_that_nobody_drags_only_takes_tissue_away() {
 }
 
 #[test]
-fn a_handle_is_where_it_is_told_to_be_at_any_time() {
+fn a_handle_follows_its_path_at_any_time() {
     let scene = chain(&[HANDLE]);
     let whole = Vector3::new(0.0, 20.0, 5.0);
-    // It takes four of the frames.
+    // The movement takes four frames.
     for (frames, share) in [(1, 0.25), (2, 0.5), (4, 1.0), (6, 1.0)] {
         let (ended, told) = (Ended::of(&first(frames, &scene)), whole * share);
         let held = &ended.twin.held[0];
@@ -58,9 +58,9 @@ fn a_handle_is_where_it_is_told_to_be_at_any_time() {
     }
 }
 
-/// Two handles at their own pace, one of them on what is fixed otherwise.
+/// Two handles move at different speeds. One of them holds tissue that the scene fixes.
 #[test]
-fn each_handle_goes_its_own_way() {
+fn handles_move_independently() {
     let handles = "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5], over_s = 0.5 },
         { at_mm = [0, -55, 0], radius_mm = 9, move_mm = [1, 2, -1], over_s = 0.25 }]";
     let scene = chain(&[("handle", handles), UNIFORM]);
@@ -74,13 +74,14 @@ fn each_handle_goes_its_own_way() {
         }
         assert_eq!(ended.told().violated_links, 0);
     }
-    // It is one that the plane of the scene fixes.
+    // The plane of the scene fixes this vertex.
     let fixed = |set: &[(&str, &str)]| Run::of(&chain(set)).report.sizes.fixed_vertices;
     let grabbed = Twin::of(&scene).held[1].len();
     assert_eq!(fixed(&[]) - fixed(&[("handle", handles)]), grabbed);
 }
 
-/// The links are the edges of the lattice along its axes; each is within its limits, and some are at theirs.
+/// The links are the lattice edges along the axes. All stay within their limits, and some reach
+/// them.
 #[test]
 fn links_are_edges_within_their_limits() {
     for relax in ["0", "10"] {
@@ -95,9 +96,9 @@ fn links_are_edges_within_their_limits() {
     }
 }
 
-/// What lies beyond a region stays, and what borders on it is fixed.
+/// Tissue outside a region stays, and tissue at its border is fixed.
 #[test]
-fn a_region_is_fixed_where_it_ends() {
+fn a_region_is_fixed_at_its_border() {
     let region = ("lattice.region", "{ around_mm = 60 }");
     let ended = Ended::of(&chain(&[HANDLE, region, ("fixed", "{}")]));
     let sizes = &ended.run.report.sizes;
@@ -108,9 +109,9 @@ fn a_region_is_fixed_where_it_ends() {
     assert!(ended.told().moved > ended.twin.held[0].len());
 }
 
-/// A CT that is turned and stored along other axes: the same drag, as seen from there.
+/// A CT that is rotated and stored along other axes gives the same result in its own frame.
 #[test]
-fn the_axes_of_the_ct_may_lie_anyhow() {
+fn the_ct_may_have_any_orientation() {
     let turn =
         Rotation3::from_euler_angles(0.0, 0.0, 0.5) * Rotation3::from_euler_angles(0.0, FRAC_PI_2, 0.0);
     let folder = tempfile::tempdir().unwrap();
@@ -143,13 +144,13 @@ fn relaxation_lowers_the_energy_until_it_settles() {
     let without = told("0", 6);
     assert_eq!((without.relax_sweeps, without.relax_moves, without.settled), (0, 0, false));
     assert!(without.energy_before == without.energy_after && without.energy_after > 0.0, "{without:?}");
-    // The last frame that moves the handle is the fourth, and those after it relax on.
+    // The handle moves until the fourth frame. Later frames continue the relaxation.
     let (few, more, all) = (told("1", 4), told("1", 6), told("1", 60));
     assert_eq!([few.relax_sweeps, more.relax_sweeps], [4, 6]);
     assert!(few.energy_before == more.energy_before && few.energy_before == all.energy_before);
     let energies = [few.energy_before, few.energy_after, more.energy_after, all.energy_after];
     assert!(energies.is_sorted_by(|a, b| a > b) && all.energy_after < without.energy_after, "{energies:?}");
-    // What settled in one frame and is dragged in the next relaxes again.
+    // Tissue that has settled relaxes again after the next drag.
     let at_once = told("1000", 4);
     assert!(at_once.settled && at_once.energy_after < at_once.energy_before, "{at_once:?}");
     assert!(!few.settled && !more.settled && all.settled && all.relax_sweeps < 60, "{all:?}");

@@ -1,4 +1,4 @@
-//! What gives way how far, along which axis and at which HU.
+//! Link limits by axis and by HU.
 
 use cutis::mesh::{Lattice, Split};
 use cutis::volume::phantom::Phantom;
@@ -6,7 +6,7 @@ use cutis::volume::sample::{LatticeSize, lattice_grid};
 
 use super::*;
 
-/// A drag by a step is taken up where links give way along it, and carries rigid rows with it.
+/// Soft links absorb a drag by one step along their axis. Rigid rows move as a whole.
 #[test]
 fn links_give_way_along_their_own_axis() {
     for soft in 0..3 {
@@ -39,7 +39,7 @@ fn links_give_way_along_their_own_axis() {
     }
 }
 
-/// HU at the vertices, by the lattice alone.
+/// HU at the vertices, sampled by the lattice.
 fn hu(twin: &Twin) -> Vec<f32> {
     let volume = Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap();
     let grid = lattice_grid(volume.grid(), LatticeSize::SpacingMm(12.0)).unwrap();
@@ -69,7 +69,7 @@ fn materials_begin_at_their_hu() {
             Ended::of(&chain(&[handle, ("chainmail.materials", &list(from)), UNRELAXED, ("fixed", "{}")]));
         assert_eq!(ended.told().violated_links, 0);
         let hu = hu(&ended.twin);
-        // By the number of its ends that are rigid, how far a link is strained at the most, in half rest lengths of its axis.
+        // Largest strain of a link in half rest lengths, by the number of its rigid ends.
         let mut most = [0.0_f64; 3];
         for (&([a, b], axis), (_, strain)) in ended.twin.links.iter().zip(ended.strains()) {
             let rigid = [a, b].into_iter().filter(|&v| hu[v] >= from).count();
@@ -83,9 +83,9 @@ fn materials_begin_at_their_hu() {
     }
 }
 
-/// A large `k_steps` leaves what the drag made, a small one does not.
+/// Relaxation keeps the dragged shape with a large `k_steps`, and changes it with a small one.
 #[test]
-fn k_steps_leaves_alone_what_is_near() {
+fn k_steps_keeps_small_deviations() {
     let told = |k: &str| {
         let list =
             format!("[{{ from_hu = -1024, shortest = 0.7, longest = 1.3, shear = 0.4, k_steps = {k} }}]");

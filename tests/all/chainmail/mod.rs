@@ -1,4 +1,4 @@
-//! Scenes of the model `chainmail`, end to end.
+//! End-to-end tests of scenes with `model = "chainmail"`.
 
 mod backends;
 mod cuts;
@@ -22,22 +22,23 @@ use nalgebra::{Point3, Vector3};
 use crate::identity::original;
 use crate::scenes::{self, Run, SMALL};
 
-/// Steps of the lattice, mm.
+/// Lattice steps, mm.
 const STEPS_MM: [f64; 3] = [63.0 * 6.25 / 33.0, 63.0 * 6.25 / 33.0, 47.0 * 6.25 / 24.0];
-/// Points of the lattice.
+/// Lattice points per axis.
 const POINTS: [usize; 3] = [34, 34, 25];
-/// How exactly a place is known, mm: coordinates are rounded to 2⁻¹⁶ steps and to single precision.
+/// Accuracy of a position, mm. Coordinates are rounded to 2⁻¹⁶ steps and to single precision.
 const EXACT_MM: f64 = 2e-4;
 
-/// Half a second upwards on the belly.
+/// A handle that pulls the belly up for half a second.
 const HANDLE: (&str, &str) =
     ("handle", "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5], over_s = 0.5 }]");
-/// Along the belly, and a handle that draws its left lip away.
+/// An incision along the belly, and a handle that pulls its left lip away.
 const INCISION: (&str, &str) =
     ("incision", "[{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 40, width_mm = 9 }]");
 const BESIDE: (&str, &str) =
     ("handle", "[{ at_mm = [-18, 97, 0], radius_mm = 22, move_mm = [-12, 0, 0], over_s = 0.5 }]");
-/// Fat, firmer tissue and rigid bone, as what is expected counts on; the preset may be changed.
+/// Fat, firmer tissue and rigid bone. The expected values need these materials; the preset may
+/// change.
 const TISSUE: &str = "[{ from_hu = -1024, shortest = 0.5, longest = 1.6, shear = 0.6, k_steps = 0.02 }, \
                       { from_hu = -30, shortest = 0.7, longest = 1.3, shear = 0.4, k_steps = 0.02 }, \
                       { from_hu = 250, shortest = 1, longest = 1, shear = 0 }]";
@@ -47,19 +48,21 @@ const UNIFORM: (&str, &str) = (
 );
 const UNRELAXED: (&str, &str) = ("chainmail.relax_per_frame", "0");
 
-/// The CT of the small phantom as a file, once for all: to read it takes a tenth of the time of making it.
+/// The CT of the small phantom as a file, made once. Reading it takes a tenth of the time of making
+/// it.
 static CT_FILE: LazyLock<String> = LazyLock::new(|| {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("small-phantom.nii");
     nifti::write(&path, &original()).unwrap();
     format!("{{ path = {path:?} }}")
 });
 
-/// The small phantom as a chain on a coarse lattice, six frames of an eighth of a second; uncut, and nothing drags it.
+/// The small phantom as a chain on a coarse lattice, without incision or handle, for six frames of
+/// an eighth of a second.
 fn chain(set: &[(&str, &str)]) -> LoadedScene {
     bare(&[&[("chainmail.materials", TISSUE)], set].concat())
 }
 
-/// The same without a section of its own.
+/// The same scene without a `chainmail` section.
 fn bare(set: &[(&str, &str)]) -> LoadedScene {
     let common = [
         ("model", "chainmail"),
@@ -74,7 +77,7 @@ fn bare(set: &[(&str, &str)]) -> LoadedScene {
     scenes::scene(SMALL, &[&common, set].concat())
 }
 
-/// As many frames of a scene.
+/// A scene with this number of frames.
 fn first(frames: u32, loaded: &LoadedScene) -> LoadedScene {
     let mut less = loaded.clone();
     less.scene.run.frames = frames;
@@ -82,14 +85,15 @@ fn first(frames: u32, loaded: &LoadedScene) -> LoadedScene {
     less
 }
 
-/// What the other model makes of a scene: the same vertices, handles, and the edges that a chain has as links.
+/// The system of the same scene with the other model. It has the same vertices and handles, and the
+/// chain's links among its edges.
 struct Twin {
     rest: Vec<Point3<f32>>,
-    /// Edges along an axis, the lower end first, and the axis.
+    /// Edges along the axes: both ends, the lower one first, and the axis.
     links: Vec<([usize; 2], usize)>,
-    /// Vertices of each handle.
+    /// The vertices of each handle.
     held: Vec<Vec<usize>>,
-    /// Vertices that are fixed or cut away, and not held.
+    /// Vertices that are fixed or removed and in no handle.
     still: Vec<bool>,
 }
 
@@ -116,11 +120,11 @@ impl Twin {
     }
 }
 
-/// A run with a checkpoint at its end.
+/// A finished run with a checkpoint.
 struct Ended {
     run: Run,
     twin: Twin,
-    /// How far each vertex came, mm.
+    /// Displacement of each vertex, mm.
     by: Vec<Vector3<f64>>,
 }
 
@@ -138,23 +142,23 @@ impl Ended {
         self.run.report.chainmail.as_ref().unwrap()
     }
 
-    /// Vertices that are not where they rest.
+    /// Vertices that have moved.
     fn moved(&self) -> usize {
         self.by.iter().filter(|by| **by != Vector3::zeros()).count()
     }
 
-    /// For each link its axis, and how far its ends are apart less how far they rest apart, mm.
+    /// For each link its axis, and the change of the vector between its ends, mm.
     fn strains(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> {
         self.twin.links.iter().map(|&([a, b], axis)| (axis, self.by[b] - self.by[a]))
     }
 
-    /// How far each link is beyond its limits in the coordinate that is farthest beyond, mm.
+    /// Largest excess of each link over its limits in any coordinate, mm.
     fn excesses(&self, shortest: f64, longest: f64, shear: f64) -> impl Iterator<Item = f64> {
         self.strains().map(move |(axis, strain)| {
             let of = |coordinate: usize| {
                 let (low, high) =
                     if coordinate == axis { (shortest - 1.0, longest - 1.0) } else { (-shear, shear) };
-                // The shear of a link is in its own rest length.
+                // Shear is relative to the rest length of the link.
                 let step = STEPS_MM[axis];
                 (low * step - strain[coordinate]).max(strain[coordinate] - high * step)
             };

@@ -1,4 +1,4 @@
-//! What each model costs, says and leaves out.
+//! Costs, messages and absent parts of each model.
 
 use cutis::chainmail::{Chain, Material};
 use cutis::{Plan, Silent};
@@ -15,7 +15,7 @@ fn warns(plan: &Plan, words: &str) -> bool {
 }
 
 #[test]
-fn a_chain_takes_what_it_stores_and_nothing_of_the_other_model() {
+fn a_chain_needs_only_its_own_memory() {
     let plan = plan(&[HANDLE, ("solver.backend", "auto")]);
     let count = POINTS.iter().product();
     let bytes = Chain::new(POINTS, [1.0; 3], &[Material::RIGID], vec![0; count]).unwrap().bytes();
@@ -41,21 +41,22 @@ fn a_chain_takes_what_it_stores_and_nothing_of_the_other_model() {
 }
 
 #[test]
-fn relaxation_that_is_left_out_is_said() {
+fn missing_relaxation_is_reported() {
     let plan = plan(&[UNRELAXED]);
     assert!(plan.left_out.iter().any(|line| line.starts_with("relaxation:")) && plan.projections == 0);
 }
 
-/// A handle that all frames together do not carry to its end, with either model, and a body that nothing moves.
+/// The run ends before the handle arrives, with either model. Another scene has nothing that moves
+/// the body.
 #[test]
-fn what_does_not_come_about_is_warned_about() {
+fn unfinished_movements_cause_a_warning() {
     let over = |over_s| [HANDLE, ("handle.0.over_s", over_s)];
     for model in ["chainmail", "pbd"] {
         let of = |over_s| {
             let spring = ("constraints", "{ distance = { youngs_modulus_pa = 5e3 } }");
             cutis::check(&chain(&[&over(over_s)[..], &[spring, ("model", model)]].concat()), &Silent).unwrap()
         };
-        // Six frames of an eighth of a second.
+        // The run has six frames of an eighth of a second.
         assert!(warns(&of("3"), "handle[0] comes 25.000 % of its way"), "{:?}", of("3").warnings);
         assert!(!warns(&of("0.75"), "of its way"));
     }
@@ -63,7 +64,7 @@ fn what_does_not_come_about_is_warned_about() {
 }
 
 #[test]
-fn a_section_of_the_other_model_is_warned_about() {
+fn a_section_of_the_other_model_causes_a_warning() {
     let spring = ("constraints", "{ distance = { youngs_modulus_pa = 5e3 } }");
     let gravity = ("solver.gravity_m_s2", "[0, 0, -9.81]");
     let with = plan(&[spring, gravity]);
@@ -76,7 +77,7 @@ fn a_section_of_the_other_model_is_warned_about() {
 }
 
 #[test]
-fn only_the_report_of_a_chain_speaks_of_one() {
+fn only_the_report_of_a_chain_has_chain_figures() {
     let read = |set: &[(&str, &str)]| -> Value {
         let run = Run::of(&bare(&[&[("output", "{ report = true }"), ("run.frames", "2")], set].concat()));
         serde_json::from_slice(&run.bytes("report.json")).unwrap()
@@ -89,7 +90,7 @@ fn only_the_report_of_a_chain_speaks_of_one() {
         (chain["residuals"].as_array().unwrap().len(), &chain["scene"]["model"]),
         (0, &Value::from("chainmail"))
     );
-    // Its time is told by what it spends it on.
+    // The cost report lists its time by part.
     let parts: Vec<&str> = chain["ledger"]["parts"]
         .as_array()
         .unwrap()

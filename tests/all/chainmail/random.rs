@@ -1,4 +1,5 @@
-//! Whatever a chain is told to do, it ends with an error that says why, or with links within their limits, or with a warning.
+//! A random chain scene ends with an error that gives the reason, with all links within their
+//! limits, or with a warning.
 
 use cutis::report::Report;
 use cutis::{Error, Override, Scene};
@@ -16,7 +17,7 @@ const MATERIALS: [&str; 4] = [
       { from_hu = 20, shortest = 0.5, longest = 1.5, shear = 0 }]",
 ];
 
-/// In and around the body, mm.
+/// A point in or near the body, mm.
 fn place() -> impl Strategy<Value = [f64; 3]> {
     [-180.0..180.0, -60.0..140.0, -150.0..150.0]
 }
@@ -81,9 +82,9 @@ proptest! {
     }
 }
 
-/// The generators above reach both ends.
+/// The generators above produce accepted and refused scenes.
 #[test]
-fn some_of_them_are_accepted_and_some_refused() {
+fn the_generators_give_accepted_and_refused_scenes() {
     let handle = |by: &str| format!("{{ at_mm = [-40, 100, 0], radius_mm = 20, move_mm = [0, {by}, 0] }}");
     assert!(run(&[handle("8")], &[], MATERIALS[3], 2).is_ok());
     assert!(run(&[handle("1e9")], &[], MATERIALS[0], 2).is_err());

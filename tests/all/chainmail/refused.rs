@@ -1,4 +1,4 @@
-//! What a chain cannot be or do is refused by name, before anything is written.
+//! Invalid chain scenes are refused with the key's name before any file is written.
 
 use cutis::tune::Demand;
 use cutis::{Error, Scene, Silent, TuneOptions};
@@ -6,7 +6,7 @@ use cutis::{Error, Scene, Silent, TuneOptions};
 use super::*;
 use crate::scenes::{folder, overrides};
 
-/// The key that is blamed, and the message.
+/// The key that the error names, and its message.
 fn refused(set: &[(&str, &str)]) -> (String, String) {
     let common = [
         ("model", "chainmail"),
@@ -24,7 +24,7 @@ fn refused(set: &[(&str, &str)]) -> (String, String) {
 }
 
 #[test]
-fn materials_that_make_no_sense() {
+fn invalid_materials_are_refused() {
     let soft = "shortest = 0.5, longest = 1.5, shear = 0.5";
     let list = |entries: &[&str]| {
         let entries: Vec<String> = entries.iter().map(|entry| format!("{{ {entry} }}")).collect();
@@ -79,14 +79,14 @@ fn materials_that_make_no_sense() {
         assert_eq!(key, format!("chainmail.materials{place}"), "{text}");
         assert!(words.iter().all(|word| text.contains(word)), "{words:?} in {text}");
     }
-    // As many as there may be, and the first where tissue begins.
+    // The largest allowed number of materials. The first one begins where tissue begins.
     let tissue = list(&[&format!("from_hu = -449, {soft}")]);
     cutis::check(&chain(&[("chainmail.materials", &tissue)]), &Silent).unwrap();
     cutis::check(&chain(&[("chainmail.materials", &list(&many[..64]))]), &Silent).unwrap();
 }
 
 #[test]
-fn times_zones_and_handles_that_cannot_be() {
+fn invalid_times_zones_and_handles_are_refused() {
     const HANDLE_AT: &str = "at_mm = [-40, 100, 0], radius_mm = 15";
     let one = |rest: &str| format!("[{{ {HANDLE_AT}, {rest} }}]");
     let two = format!(
@@ -94,14 +94,14 @@ fn times_zones_and_handles_that_cannot_be() {
     );
     let [far, farther, huge] =
         ["[0, 1e9, 0]", "[0, 0, -70000]", "[1e300, 0, 0]"].map(|by| one(&format!("move_mm = {by}")));
-    /// Overrides, the key that is blamed, and a part of the message.
+    /// Overrides, the key that the error names, and a part of its message.
     type Refused<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
     let cases: [Refused<'_>; 12] = [
         (&[("lattice.grading", "{ around_mm = 25 }")], "lattice.grading", "chainmail"),
         (&[("model", "pbd"), ("incision.0.at_s", "0.1")], "incision[0].at_s", "pbd"),
         (&[("incision.0.at_s", "-0.1")], "incision[0].at_s", "-0.1"),
         (&[("incision.0.at_s", "nan")], "incision[0].at_s", "NaN"),
-        // The scene has 40 frames of 1/60 s.
+        // The scene lasts 40 frames of 1/60 s.
         (&[("incision.0.at_s", "0.651")], "incision[0].at_s", "0.65 s"),
         (&[("incision.0.at_s", "0.01"), ("run.frames", "0")], "incision[0].at_s", "run.frames"),
         (&[("handle", &two)], "handle[1].at_mm", "handle[0]"),

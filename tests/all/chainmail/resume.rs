@@ -1,4 +1,4 @@
-//! A chain that goes on from a checkpoint is the one that was not stopped.
+//! A resumed chain equals one that was never stopped.
 
 use cutis::{ResampleRequest, Silent};
 
@@ -6,13 +6,14 @@ use super::*;
 use crate::scenes::{frames, run_in};
 
 const ALL: (&str, &str) = ("output", "{ volume = true, surface = true, report = true }");
-/// Followed by nothing that is fixed.
+/// A handle that fixed tissue cannot follow.
 const FAR: (&str, &str) =
     ("handle", "[{ at_mm = [-15, 105, 0], radius_mm = 11, move_mm = [-150, 0, 9], over_s = 0.375 }]");
 
-/// Before, at and after a cut, while handles move and when they have arrived, with links beyond their limits and without.
+/// The run is split before, at and after a cut, while handles move and after they arrive, with and
+/// without links beyond their limits.
 #[test]
-fn any_two_parts_of_a_run_are_the_run() {
+fn a_run_in_two_parts_equals_the_whole_run() {
     for (handle, at_s) in [(BESIDE, "0"), (BESIDE, "0.25"), (FAR, "0"), (FAR, "0.25"), (FAR, "0.5")] {
         let set = [ALL, INCISION, handle, ("incision.0.at_s", at_s), ("chainmail.relax_per_frame", "3")];
         let scene = chain(&set);
@@ -57,7 +58,7 @@ fn a_checkpoint_of_another_chain_is_refused() {
 }
 
 #[test]
-fn the_checkpoint_carries_another_volume_along() {
+fn another_volume_can_be_resampled_with_the_checkpoint() {
     let scene = chain(&[("output", "{ volume = true }"), INCISION, BESIDE]);
     let run = Run::of(&scene);
     let out = run.path("again.nii.gz");

@@ -1,4 +1,4 @@
-//! Handles that ask for more than links give.
+//! Handles that move farther than the links allow.
 
 use nalgebra::Point3;
 
@@ -7,7 +7,7 @@ use super::*;
 const FAR: (&str, &str) =
     ("handle", "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 150, 0], over_s = 0.5 }]");
 
-/// Where the warning says that something cannot follow, and by how much, mm.
+/// Place and amount, in mm, from the warning about tissue that cannot follow.
 fn warned(warnings: &[String]) -> Option<(usize, Point3<f64>, f64, bool)> {
     let mut all = warnings.iter().filter(|line| line.contains("beyond their limits"));
     let line = all.next()?;
@@ -19,9 +19,10 @@ fn warned(warnings: &[String]) -> Option<(usize, Point3<f64>, f64, bool)> {
     Some((links, Point3::from_slice(&place), excess, line.contains("is fixed")))
 }
 
-/// The handle is there all the same, and the run says how many links are beyond their limits, and by how much at the end.
+/// The handle still arrives. The run reports the number of links beyond their limits and the final
+/// excess.
 #[test]
-fn what_cannot_follow_is_told_with_place_and_amount() {
+fn tissue_that_cannot_follow_is_reported_with_place_and_amount() {
     for relax in ["0", "10"] {
         let set = [FAR, UNIFORM, ("chainmail.relax_per_frame", relax)];
         let ended = Ended::of(&chain(&set));
@@ -45,16 +46,16 @@ fn what_cannot_follow_is_told_with_place_and_amount() {
     );
 }
 
-/// Two rigid ends that are drawn apart: one is fixed, and a later frame brings the other back.
+/// Two rigid ends are pulled apart. One is fixed, and a later frame brings the other back.
 #[test]
-fn what_is_rigid_and_fixed_does_not_follow() {
+fn rigid_and_fixed_tissue_does_not_follow() {
     let rigid = "[{ from_hu = -1024, shortest = 1, longest = 1, shear = 0 }]";
     let ended = Ended::of(&chain(&[HANDLE, ("chainmail.materials", rigid)]));
     let fixed = (0..ended.by.len()).filter(|&v| ended.twin.still[v]);
     assert!(fixed.clone().count() > 100 && fixed.into_iter().all(|v| ended.by[v] == Vector3::zeros()));
     let (links, _, excess, _) = warned(&ended.run.report.warnings).unwrap();
     assert!(links > 0 && excess > 1.0 && ended.told().violated_links == links);
-    // With nothing fixed all of it follows, as one piece.
+    // Without fixed tissue the whole body follows as one piece.
     let free = Ended::of(&chain(&[HANDLE, ("chainmail.materials", rigid), ("fixed", "{}")]));
     assert_eq!((free.told().moved, free.told().violated_links), (free.by.len(), 0));
     assert_eq!((free.told().energy_after, free.told().relax_moves), (0.0, 0));

@@ -1,7 +1,8 @@
-//! A body with landmarks at known millimeters, cut twice and dragged by one handle. One run of it serves many tests.
+//! A body with landmarks at known millimeters, cut twice and dragged by one handle. One run of it
+//! serves many tests.
 //!
-//! All positions are RAS+ millimeters: +x is the patient's right, +y anterior, +z superior. No two sides of the body are
-//! alike, so that a mirrored or displaced output cannot pass.
+//! All positions are RAS+ millimeters: +x is the patient's right, +y anterior, +z superior. No two
+//! sides of the body are alike, so that a mirrored or displaced output cannot pass.
 //!
 //! | landmark | place |
 //! |---|---|
@@ -45,17 +46,10 @@ pub const VOXEL_MM: f64 = 4.0;
 pub const STEP_MM: f64 = 8.0;
 
 const SCENE: &str = r#"
-[volume]
-path = "ct.nii.gz"
-[lattice]
-spacing_mm = 8.0
-[constraints.distance]
-youngs_modulus_pa = 5.0e3
-[constraints.volume]
-bulk_modulus_pa = 5.0e4
-[constraints.stc]
-area_modulus_n_per_m = 100.0
-rest_area_scale = 0.8
+[constraints]
+distance = { youngs_modulus_pa = 5.0e3 }
+volume = { bulk_modulus_pa = 5.0e4 }
+stc = { area_modulus_n_per_m = 100.0, rest_area_scale = 0.8 }
 [fixed]
 planes = [{ point_mm = [0.0, -30.0, 0.0], normal = [0.0, -1.0, 0.0] }]
 [[incision]]
@@ -73,6 +67,10 @@ at_mm = [46.0, 6.0, 20.0]
 radius_mm = 20.0
 move_mm = [10.0, 6.0, -4.0]
 over_s = 0.1
+[volume]
+path = "ct.nii.gz"
+[lattice]
+spacing_mm = 8.0
 [solver]
 backend = "cpu"
 dt_s = 0.02

@@ -42,7 +42,8 @@ fn markers_are_where_the_handle_took_them() {
     }
 }
 
-/// What is fixed keeps its voxels, but at its edges; there are no values but those between air and the markers.
+/// What is fixed keeps its voxels, but at its edges; there are no values but those between air and
+/// the markers.
 #[test]
 fn what_is_fixed_is_unchanged() {
     let (before, after) = (ct(), deformed());

@@ -119,7 +119,8 @@ impl Picture {
         })
     }
 
-    /// Pixels per millimeter by the scale bar: the longest white run at the bottom left over the length that its label names.
+    /// Pixels per millimeter by the scale bar: the longest white run at the bottom left over the
+    /// length that its label names.
     pub fn scale_bar(&self) -> f64 {
         let corner = self.part(0..self.width / 3, self.height - self.height / 8..self.height);
         let label = [200, 100, 50, 20, 10, 5, 2, 1]

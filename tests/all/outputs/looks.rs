@@ -1,4 +1,5 @@
-//! `cutis inspect`, `skin`, `check` and single slices, against the body and against the phantom's anatomy.
+//! `cutis inspect`, `skin`, `check` and single slices, against the body and against the phantom's
+//! anatomy.
 
 use cutis::mesh::{SkinMode, Split};
 use cutis::render::{Plane, SliceView, slice};
@@ -36,7 +37,8 @@ fn an_inspection_describes_the_file() {
     assert_eq!(found["nan_count"], 0);
 }
 
-/// The skin of the body: its file has the frame, the place and the triangles that the report counts.
+/// The skin of the body: its file has the frame, the place and the triangles that the report
+/// counts.
 #[test]
 fn the_skin_of_a_file_is_where_the_body_is() {
     let request = SkinRequest { lattice: LatticeSize::Native, split: Split::Kuhn6, mode: SkinMode::Exterior };
@@ -87,7 +89,8 @@ fn toml_of(scene: &cutis::Scene) -> String {
     toml::to_string(scene).unwrap()
 }
 
-/// The spine is posterior, the lungs are superior, and the liver is on the patient's right: the letters must say so.
+/// The spine is posterior, the lungs are superior, and the liver is on the patient's right: the
+/// letters must say so.
 #[test]
 fn slices_of_the_phantom_have_the_letters_of_its_anatomy() {
     let volume = Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap();

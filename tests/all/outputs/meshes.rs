@@ -1,4 +1,5 @@
-//! `skin.vtu` and `tissue.vtu`: frame, signs, units, arrays and orientation, against the landmarks of the body.
+//! `skin.vtu` and `tissue.vtu`: frame, signs, units, arrays and orientation, against the landmarks
+//! of the body.
 
 use super::body::{BODY_MM, Finished, HANDLE_MM, MARKERS_MM, MOVE_MM, STEP_MM, finished, hu_at};
 use super::vtu::Vtu;
@@ -131,8 +132,8 @@ fn counts_and_the_largest_displacement_are_those_of_the_report() {
     assert!(largest > distance(MOVE_MM, [0.0; 3]) - 0.01);
 }
 
-/// Opening of the first wound in its middle, measured on the points of `skin.vtu`: the skin vertices next to it on either
-/// side, on the anterior face.
+/// Opening of the first wound in its middle, measured on the points of `skin.vtu`: the skin
+/// vertices next to it on either side, on the anterior face.
 #[test]
 fn the_opening_of_the_wound_is_that_of_the_skin() {
     let run = finished();

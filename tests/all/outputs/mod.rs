@@ -1,5 +1,5 @@
-//! What users look at: pictures, meshes, tables and reports of a run, checked against a body whose landmarks are known in
-//! millimeters. The files are read here without the product's own readers.
+//! What users look at: pictures, meshes, tables and reports of a run, checked against a body whose
+//! landmarks are known in millimeters. The files are read here without the product's own readers.
 
 mod body;
 mod deformed;

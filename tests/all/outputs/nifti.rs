@@ -17,7 +17,8 @@ pub struct Nifti {
     pub codes: [i16; 2],
 }
 
-/// The rows of a qform: rotation by the quaternion (b, c, d), voxel sizes, direction of the third axis, and offset.
+/// The rows of a qform: rotation by the quaternion (b, c, d), voxel sizes, direction of the third
+/// axis, and offset.
 fn qform([b, c, d]: [f64; 3], spacing: [f64; 3], third: f64, offset: [f64; 3]) -> [[f64; 4]; 3] {
     let a = (1.0 - b * b - c * c - d * d).max(0.0).sqrt();
     let quaternion = nalgebra::Quaternion::new(a, b, c, d);

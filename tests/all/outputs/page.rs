@@ -134,7 +134,8 @@ fn lists_and_the_scene_are_shown_in_full() {
     }
 }
 
-/// The chart's lines against its ticks: what they show at the first and the last frame is in `frames.csv`.
+/// The chart's lines against its ticks: what they show at the first and the last frame is in
+/// `frames.csv`.
 #[test]
 fn the_chart_shows_the_openings_over_time() {
     let svg = between(html(), "<figure><svg", "</svg>");

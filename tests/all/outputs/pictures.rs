@@ -43,7 +43,8 @@ fn left_edge(picture: &Picture, rows: [f64; 2]) -> f64 {
 const NOTCH_ROWS: [f64; 2] = [0.12, 0.18];
 const EDGE_ROWS: [f64; 2] = [0.56, 0.62];
 
-/// Beyond the right edge and the top of the body there is background in the picture; on the left and below there is none.
+/// Beyond the right edge and the top of the body there is background in the picture; on the left
+/// and below there is none.
 #[test]
 fn letters_name_the_sides_of_the_body() {
     for name in ["before.png", "after.png"] {

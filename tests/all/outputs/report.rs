@@ -65,7 +65,8 @@ fn what_went_in_is_named() {
     assert!(run.number("/backend/threads") >= 1.0 && run.number("/machine/cores") >= 1.0);
 }
 
-/// Bytes of the cost report are those of the memory lists, and times are there for what was stepped.
+/// Bytes of the cost report are those of the memory lists, and times are there for what was
+/// stepped.
 #[test]
 fn memory_and_costs_agree() {
     let run = finished();

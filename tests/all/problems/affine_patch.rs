@@ -1,7 +1,8 @@
-//! P6: the border of a body is moved by an affine map; in equilibrium the interior has followed it.
+//! P6: an affine map moves the border of a body. In equilibrium the interior follows the same map.
 //!
-//! Every vertex of the lattice is a center of symmetry, so that a uniform strain is an equilibrium. With PBD, which has
-//! no equilibrium of forces, the map is a rotation: then every constraint can be met, and the interior must follow.
+//! Every lattice vertex is a center of symmetry, so a uniform strain is an equilibrium. PBD has no
+//! equilibrium of forces. There the map is a rotation, which satisfies every constraint, and the
+//! interior must follow it.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, Volume};
@@ -15,7 +16,7 @@ const SIZE: usize = 6;
 /// Substeps of 50 s, with unit masses and springs.
 const SUBSTEPS: u32 = 150;
 
-/// Largest distance of an interior vertex from where the map puts it, in spacings.
+/// Largest distance of an interior vertex from its mapped position, in spacings.
 fn deviation<T: Scalar>(
     start: &Start<T>,
     map: Matrix3<f64>,
@@ -98,7 +99,7 @@ fn xpbd_follows_a_strain() {
     }
 }
 
-/// XPBD takes its gradients along the way of a sweep, not at its end: an error of the order h².
+/// XPBD evaluates gradients during a sweep and not at its end, which causes an error of order h².
 #[test]
 fn deviation_falls_with_the_square_of_the_substep() {
     let at = |substeps| deviation(&reference::<f64>, strain(), strain(), Formulation::Xpbd, substeps, 1.0);

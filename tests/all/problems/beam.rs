@@ -1,8 +1,9 @@
-//! A clamped beam against independent programs: where its tip is after 21 frames.
+//! Position of the tip of a clamped beam after 21 frames, compared with independent programs.
 //!
-//! Vertices 0.1 m apart, the face x = 0 fixed, unit masses, PBD with stiffness 1 on every edge, then on every
-//! tetrahedron. Three independent programs give the last vertex the same height to five digits in the lattice's order
-//! of colors; a fourth, in another order of the constraints, differs by less than 2 mm.
+//! Vertices 0.1 m apart, the face x = 0 fixed, unit masses, PBD with stiffness 1 on every edge,
+//! then on every tetrahedron. Three independent programs give the last vertex the same height to
+//! five digits in the lattice's order of colors; a fourth, in another order of the constraints,
+//! differs by less than 2 mm.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Scalar, Volume};
@@ -11,7 +12,7 @@ use cutis_test_kit::Kuhn;
 
 use super::{Start, in_double, in_single, reference};
 
-/// Size in vertices, height of the tip.
+/// Size in vertices, and height of the tip.
 const REFERENCE: [([usize; 3], f64); 2] = [([20, 5, 5], 0.33157), ([40, 10, 10], 0.84273)];
 
 fn tip<T: Scalar>(start: &Start<T>, size: [usize; 3], edges: &Groups, tets: &Groups, iterations: u32) -> f64 {
@@ -54,7 +55,7 @@ fn in_another_order<T: Scalar>(start: &Start<T>, size: [usize; 3]) -> f64 {
     tip(start, size, &edges, &tets, 5)
 }
 
-/// Five digits: half a unit of the fifth.
+/// Half a unit of the fifth digit.
 fn to_five_digits(found: f64, expected: f64) -> Result<(), String> {
     near(found, expected, 0.5e-5)
 }

@@ -1,8 +1,9 @@
-//! P8: a beam under its own weight hangs where Newton's method says, within 1 %, at every scale, on CPU and GPU. What
-//! Newton's method says is compared with an independent FEM by `cargo xtask cantilever` and `tests/python/cantilever.py`.
+//! P8: a beam under its own weight reaches the equilibrium of Newton's method within 1 %, at every
+//! scale, on CPU and GPU. `cargo xtask cantilever` and `tests/python/cantilever.py` compare
+//! Newton's method with an independent FEM program.
 //!
-//! In another unit of length gravity stays and the moduli grow with it, so that the beam sinks by the same share of its
-//! length; times grow with the root.
+//! At another scale gravity stays the same and the moduli grow with the length. The beam then sinks
+//! by the same share of its length, and times grow with the square root of the scale.
 
 use cutis_constraints::Scalar;
 use cutis_studies::cantilever::{Beam, GRAVITY_M_S2, Material, converged, settle};
@@ -10,7 +11,7 @@ use cutis_studies::cantilever::{Beam, GRAVITY_M_S2, Material, converged, settle}
 use super::{SCALES, Start, at_most, cpu, on_each_adapter, within};
 
 const CELLS: [usize; 3] = [8, 2, 2];
-/// Sinks by a tenth of its length.
+/// A beam that sinks by a tenth of its length.
 const SOFT: Material = Material { youngs_pa: 5e5, bulk_pa: 5e5, density_kg_m3: 1000.0 };
 
 fn at_scale(material: Material, scale: f64) -> Material {
@@ -18,12 +19,13 @@ fn at_scale(material: Material, scale: f64) -> Material {
     Material { youngs_pa: youngs_pa * scale, bulk_pa: bulk_pa * scale, ..material }
 }
 
-/// How far the end is to sink, in lengths of the beam.
+/// Expected deflection of the end over the length of the beam.
 fn reference(beam: &Beam, material: &Material) -> f64 {
     -beam.end_displacement(&beam.equilibrium(material, GRAVITY_M_S2).unwrap().positions).y
 }
 
-/// How far the end sinks by the solver; its substeps are a share of the time in which a wave crosses a cell.
+/// Deflection of the end by the solver. Substeps are a share of the time in which a wave crosses a
+/// cell.
 fn sag<T: Scalar>(start: &Start<T>, scale: f64, material: Material, share: f64) -> (f64, f64) {
     let beam = Beam::new(CELLS, 1, scale).unwrap();
     let right = at_scale(SOFT, scale);
@@ -54,7 +56,7 @@ fn the_solver_hangs_where_newton_says() {
 }
 
 #[test]
-fn so_does_the_solver_on_a_gpu() {
+fn the_gpu_solver_hangs_where_newton_says() {
     for scale in SCALES {
         on_each_adapter(|start| check(start, scale, SOFT, 1.0));
     }

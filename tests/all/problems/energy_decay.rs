@@ -1,5 +1,5 @@
-//! P9: an undamped body let go from a strained shape never has more energy than at the start, over 10 000 steps at the default
-//! settings, on every backend.
+//! P9: the energy of an undamped body released from a strained shape never exceeds its initial
+//! value. This holds for 10 000 steps with default settings on every backend.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{
@@ -13,13 +13,14 @@ use nalgebra::Point3;
 use super::{Start, at_most, cpu, on_each_adapter, reference, scaled};
 
 const SIZE: [usize; 3] = [4, 3, 3];
-/// Spacing in m, Young's modulus and bulk modulus in Pa, area modulus of the skin in N/m, density in kg/m³: soft tissue.
+/// Spacing in m, Young's modulus and bulk modulus in Pa, area modulus of the skin in N/m, density
+/// in kg/m³: soft tissue.
 const SPACING: f64 = 0.01;
 const YOUNGS_MODULUS: f64 = 1e4;
 const BULK_MODULUS: f64 = 1e5;
 const AREA_MODULUS: f64 = 50.0;
 const DENSITY: f64 = 1000.0;
-/// What rounding may add, as a share of the energy at the start.
+/// Allowed growth by rounding, relative to the initial energy.
 const ROUNDING: f64 = 1e-3;
 
 /// A block of tissue with skin on one side, stretched by a tenth and turning.
@@ -65,8 +66,8 @@ fn body<T: Scalar>() -> System<T> {
         .build()
 }
 
-/// The highest energy in each tenth of a run of `frames` frames, over that at the start. Velocities are multiplied by `pump` after
-/// each look, `stride` frames apart.
+/// Largest energy in each tenth of a run of `frames` frames, over the initial energy. Every
+/// `stride` frames the energy is measured and velocities are multiplied by `pump`.
 fn peaks<T: Scalar>(solver: &mut dyn Solver<T>, frames: usize, stride: usize, pump: f64) -> [f64; 10] {
     let start = solver.energy().unwrap().total_j();
     std::array::from_fn(|_| {
@@ -104,7 +105,7 @@ fn energy_never_grows_on_the_cpu() {
     no_growth(&cpu::<f64>, 1000, 1, 1.0).unwrap();
 }
 
-/// 10 000 substeps: a software device takes its time.
+/// Fewer frames than on the CPU, because software devices are slow. They make 10 000 substeps.
 #[test]
 fn energy_never_grows_on_the_gpu() {
     on_each_adapter(|start| no_growth(start, 1000, 10, 1.0));

@@ -1,6 +1,6 @@
-//! P2: a body of all kinds, free in space. Its linear momentum stays to rounding, a single projection makes no torque,
-//! and its angular momentum drifts only by the order of the step. Vertex block descent keeps the linear momentum only as
-//! far as a substep is converged.
+//! P2: a free body with all constraint kinds. It keeps its linear momentum to rounding, a single
+//! projection makes no torque, and its angular momentum drifts with the order of the step. Vertex
+//! block descent keeps the linear momentum only in converged substeps.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Constraint, Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::{SCALES, Start, at_most, in_double, in_single, reference, scaled};
 
-/// A number from −1 to 1 that depends on `n` without pattern.
+/// A pseudo-random number from −1 to 1.
 fn noise(n: usize) -> f64 {
     let mixed = (n as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     ((mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 11) as f64 / 2f64.powi(52) - 1.0
@@ -20,14 +20,14 @@ fn noise_vector(n: usize) -> Vector3<f64> {
     Vector3::new(noise(3 * n), noise(3 * n + 1), noise(3 * n + 2))
 }
 
-/// What runs for a second.
+/// Settings of a run of one second.
 #[derive(Clone, Copy)]
 struct Case {
     formulation: Formulation,
     substeps: u32,
     iterations: u32,
     scale: f64,
-    /// Whether one vertex is held: the negative control.
+    /// True if one vertex is held, for the negative control.
     pinned: bool,
 }
 
@@ -39,7 +39,7 @@ const VBD: Case = Case { formulation: Formulation::Vbd, ..XPBD };
 struct Run {
     before: Momentum,
     after: Momentum,
-    /// `Σ m|v|`, what the linear momentum is compared with.
+    /// `Σ m|v|`, the reference for the linear momentum.
     flow: f64,
 }
 
@@ -122,7 +122,7 @@ fn control_a_pinned_body_is_refused() {
     stays(&run(&reference::<f64>, &Case { pinned: true, ..XPBD }), 1e-3).unwrap_err();
 }
 
-/// A single iteration does not keep it, many do.
+/// Many iterations keep the momentum; a single one does not.
 fn stays_once_converged<T: Scalar>(start: &Start<T>, scale: f64, bound: f64) -> Result<(), String> {
     let run = |iterations| run(start, &Case { iterations, scale, ..VBD });
     let once = linear_drift(&run(1));
@@ -153,7 +153,7 @@ fn angular_momentum_drifts_less_with_smaller_steps() {
     }
 }
 
-/// Torque and force of one projection over the sum of the moments' and the impulses' sizes.
+/// Torque and force of one projection, over the sums of the absolute moments and impulses.
 fn leaks<C: Constraint<N>, const N: usize>(
     params: &C::Params<f64>,
     seed: usize,

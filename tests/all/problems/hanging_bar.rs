@@ -1,4 +1,5 @@
-//! P3: a bar of `N` springs under its own weight: the tip sinks by `ρgL²/(2E)·(1 + 1/N)` with lumped masses.
+//! P3: the tip of a bar of `N` springs with lumped masses sinks by `ρgL²/(2E)·(1 + 1/N)` under its
+//! own weight.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar};

@@ -1,7 +1,9 @@
-//! P7: a block whose tetrahedra are incompressible is pulled at one end: its volume error vanishes as iterations grow.
+//! P7: a block of incompressible tetrahedra is pulled at one end. Its volume error vanishes with
+//! the number of iterations.
 //!
-//! The block is one cube wide: its 36 tetrahedra leave free some of its 60 coordinates. A wide block of linear
-//! tetrahedra has more of them than coordinates and cannot be stretched without a change of volume (locking).
+//! The block is one cube wide: its 36 tetrahedra leave free some of its 60 coordinates. A wide
+//! block of linear tetrahedra has more of them than coordinates and cannot be stretched without a
+//! change of volume (locking).
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, Volume};
@@ -10,8 +12,8 @@ use cutis_test_kit::Kuhn;
 
 use super::{SCALES, Start, at_most, cpu, on_each_adapter, reference, scaled};
 
-/// The block with one end held and the other on its way to a stretch of 20 %. `softness` is the compliance of the volumes in
-/// units that fit the springs'.
+/// A block with one fixed end and one end that moves to a stretch of 20 %. `softness` is the
+/// compliance of the volumes in the springs' units.
 fn block<T: Scalar>(softness: f64, scale: f64) -> System<T> {
     let lattice = Kuhn::new([7, 2, 2], 1.0);
     let count = lattice.positions.len();
@@ -52,13 +54,13 @@ fn settings(iterations: u32) -> Settings {
     }
 }
 
-/// RMS of the volume error over the rest volume after the end has been pulled.
+/// RMS of the relative volume error after the pull.
 fn volume_error<T: Scalar>(mut solver: Box<dyn Solver<T>>) -> f64 {
     solver.step(1).unwrap();
     solver.residuals().unwrap().iter().find(|residual| residual.name == "volume").unwrap().rms
 }
 
-/// The error must fall from each number of iterations to the next, and be below `bound` at last.
+/// Fails unless the error falls with each larger number of iterations and ends below `bound`.
 fn check<T: Scalar, const N: usize>(
     start: &Start<T>,
     softness: f64,
@@ -75,12 +77,12 @@ fn check<T: Scalar, const N: usize>(
     at_most("last error", errors[N - 1], bound)
 }
 
-/// Many iterations: the error is to vanish.
+/// Numbers of iterations with which the error vanishes.
 fn vanishes<T: Scalar>(start: &Start<T>, softness: f64, scale: f64) -> Result<(), String> {
     check(start, softness, scale, [1, 16, 256, 2048], 1e-4)
 }
 
-/// Fewer iterations: a software device takes its time.
+/// Fewer iterations, because software devices are slow.
 fn falls<T: Scalar>(start: &Start<T>, softness: f64) -> Result<(), String> {
     check(start, softness, 1.0, [1, 8, 64], 3e-3)
 }

@@ -1,5 +1,6 @@
-//! Problems whose answers are known from outside the solver: closed forms, an independent Newton solution, independent
-//! programs. Whatever needs a solver runs on every backend. Each has a negative control, which its own check must refuse.
+//! Problems with answers from outside the solver: closed forms, an independent Newton solution, and
+//! independent programs. Problems that need a solver run on every backend. Each has a negative
+//! control that its own check must reject.
 
 mod affine_patch;
 mod beam;
@@ -14,23 +15,23 @@ mod wound_equilibrium;
 mod wound_gape;
 
 use cutis_constraints::Scalar;
-use cutis_gpu::{Gpu, GpuOptions, Select};
+use cutis_gpu::Gpu;
 use cutis_solver::{Settings, Solver, SolverReference, System};
 use cutis_solver_cpu::SolverCpu;
 use cutis_solver_gpu::SolverGpu;
 use nalgebra::Point3;
 
-/// The length scales of every problem: results may not depend on the unit of length.
+/// Length scales of every problem. Results must not depend on the unit of length.
 const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
 
-/// Starts a body on a backend.
+/// Starts a solver on a backend.
 type Start<T> = dyn Fn(System<T>, Settings) -> Box<dyn Solver<T>>;
 
 fn reference<T: Scalar>(system: System<T>, settings: Settings) -> Box<dyn Solver<T>> {
     Box::new(SolverReference::new(system, settings).unwrap())
 }
 
-/// On two threads, where a color is large enough for them.
+/// The CPU backend on two threads. It uses them for large colors.
 fn cpu<T: Scalar>(system: System<T>, settings: Settings) -> Box<dyn Solver<T>> {
     Box::new(SolverCpu::new(system, settings, Some(2)).unwrap())
 }
@@ -40,13 +41,13 @@ fn gpu(gpu: &Gpu) -> impl Fn(System<f32>, Settings) -> Box<dyn Solver<f32>> + us
     move |system, settings| Box::new(SolverGpu::new(&gpu, system, settings).unwrap())
 }
 
-/// Fails where `check` does on a backend, in `f64`: no GPU has it.
+/// Fails if `check` fails on a backend in `f64`. GPUs have no `f64`.
 #[track_caller]
 fn in_double(check: impl Fn(&Start<f64>) -> Result<(), String>) {
     on_each_host(check);
 }
 
-/// Fails where `check` does on a backend, in `f32`.
+/// Fails if `check` fails on a backend in `f32`.
 #[track_caller]
 fn in_single(check: impl Fn(&Start<f32>) -> Result<(), String>) {
     on_each_host(&check);
@@ -63,26 +64,17 @@ fn on_each_host<T: Scalar>(check: impl Fn(&Start<T>) -> Result<(), String>) {
     }
 }
 
-/// Fails where `check` does on a GPU adapter of the machine. Without one the test is left out with a word, or fails where
-/// one is required.
-#[track_caller]
+/// Fails if `check` fails on a GPU adapter. Without an adapter the test is skipped, or fails where
+/// an adapter is required.
 fn on_each_adapter(check: impl Fn(&Start<f32>) -> Result<(), String>) {
-    let adapters = cutis_gpu::adapters();
-    if adapters.is_empty() {
-        let required = ["CI", "CUTIS_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
-        assert!(!required, "this test needs a GPU adapter; a software one is enough");
-        eprintln!("left out: there is no GPU adapter");
-    }
-    for adapter in adapters {
-        let options = GpuOptions { select: Select::Index(adapter.index), ..GpuOptions::default() };
-        let start = gpu(&Gpu::open(&options).unwrap());
-        if let Err(error) = check(&start) {
-            panic!("{}: {error}", adapter.name);
+    cutis_test_kit::gpu::on_each_adapter(|device| {
+        if let Err(error) = check(&gpu(device)) {
+            panic!("{}: {error}", device.adapter().name);
         }
-    }
+    });
 }
 
-/// `points` in another unit of length.
+/// The points in another unit of length.
 fn scaled(points: &[Point3<f64>], scale: f64) -> Vec<Point3<f64>> {
     points.iter().map(|p| p * scale).collect()
 }

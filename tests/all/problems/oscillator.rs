@@ -1,4 +1,5 @@
-//! P1: a mass on one compliant distance constraint swings with the period `2π√(mα)`, whatever the substeps.
+//! P1: a mass on one compliant distance constraint oscillates with the period `2π√(mα)` for any
+//! number of substeps.
 
 use std::f64::consts::PI;
 
@@ -11,14 +12,15 @@ use super::{SCALES, Start, in_double, in_single, reference, within};
 
 const MASS: f64 = 0.3;
 const COMPLIANCE: f64 = 0.02;
-/// Strain at the start.
+/// Initial strain.
 const STRAIN: f64 = 0.1;
 
 fn expected() -> f64 {
     2.0 * PI * (MASS * COMPLIANCE).sqrt()
 }
 
-/// Period measured between upward passes through the rest length, with `substeps` to the expected period.
+/// Period between upward passes through the rest length, with `substeps` substeps per expected
+/// period.
 fn period<T: Scalar>(start: &Start<T>, compliance: f64, substeps: u32, scale: f64) -> f64 {
     let positions = [Point3::origin(), Point3::new((1.0 + STRAIN) * scale, 0.0, 0.0)];
     let groups = greedy(&[[0, 1]], 2).unwrap();

@@ -1,7 +1,8 @@
-//! P4: the moduli of the equilateral sheet, from the energy it holds under a uniform strain.
+//! P4: the moduli of the equilateral sheet, from its energy under a uniform strain.
 //!
-//! `K₂ = (√3/2)k + k_A·A0` and `μ = (√3/4)k`, so that without triangles `E = 2k/√3` and `ν = 1/3`. A parallelogram of
-//! the lattice stands for the endless sheet: springs on its border belong to it by half.
+//! `K₂ = (√3/2)k + k_A·A0` and `μ = (√3/4)k`, so that without triangles `E = 2k/√3` and `ν = 1/3`.
+//! A parallelogram of the lattice stands for the endless sheet: springs on its border belong to it
+//! by half.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, SkinTension};

@@ -1,4 +1,5 @@
-//! P5 by `cutis-newton`: the opening of the slit in equilibrium, to the digits of the table that an independent program gave.
+//! P5 with `cutis-newton`: the opening of the slit in equilibrium agrees with all digits of an
+//! independent program.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, SkinTension};
@@ -12,7 +13,8 @@ use super::{SCALES, scaled};
 const DIGITS: f64 = 5e-6;
 const PRESTRAIN: f64 = 0.002;
 
-/// Opening in units of the spacing, of a sheet of `nx` columns with a slit of half-length `a` and an area stiffness `k_area`.
+/// Opening in spacings of a sheet of `nx` columns with a slit of half-length `a` and an area
+/// stiffness `k_area`.
 fn opening(nx: i64, a: f64, prestrain: f64, k_area: f64, scale: f64) -> f64 {
     let sheet = Sheet::new(nx).cut(a);
     let count = sheet.positions.len();

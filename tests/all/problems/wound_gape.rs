@@ -1,8 +1,9 @@
-//! P5: a slit in a stretched sheet opens by what an independent f64 Newton solution says, within 1 %.
+//! P5: the opening of a slit in a stretched sheet agrees with an independent `f64` Newton solution
+//! within 1 %.
 //!
-//! Equilibrium is reached by damped dynamics with unit masses: the time step is half of what a wave needs from vertex
-//! to vertex, the damping is critical for the slowest mode of the clamped sheet, and a few iterations solve the
-//! implicit step well enough that what is at rest is in equilibrium.
+//! Damped dynamics with unit masses lead to equilibrium. The time step is half the time of a wave
+//! from vertex to vertex, and the damping is critical for the slowest mode of the clamped sheet. A
+//! few iterations solve the implicit step well enough that a resting sheet is in equilibrium.
 
 use std::f64::consts::{PI, SQRT_2};
 
@@ -31,7 +32,7 @@ const SMALL: Case = Case { nx: 60, a: 6.0, e: 0.002, k_area: 0.0, opening: 0.067
 const MIDDLE: Case = Case { nx: 120, a: 12.0, opening: 0.13450, ..SMALL };
 const LARGE: Case = Case { nx: 200, a: 10.0, opening: 0.11773, ..SMALL };
 
-/// Opening in units of the spacing, after the sheet has come to rest.
+/// Opening in spacings after the sheet has come to rest.
 fn gape<T: Scalar>(start: &Start<T>, case: &Case, scale: f64) -> f64 {
     let sheet = Sheet::new(case.nx).cut(case.a);
     let count = sheet.positions.len();
