@@ -1,8 +1,8 @@
-//! Folders that cannot be written and disks that are full: a message that names the file, and nothing half-written.
+//! Read-only folders and full disks. The message names the file, and no partial file remains.
 
 use crate::Desk;
 
-/// Calls that write one file each, with the scene's lattice too large for the limits below.
+/// Calls that write one file each. Every file is larger than the limits of the tests.
 const WRITERS: [(&str, &str); 6] = [
     ("phantom --size 64,64,48 --out out/ct.nii", "out/ct.nii"),
     ("phantom --size 64,64,48 --out out/ct.nii.gz", "out/ct.nii.gz"),
@@ -12,7 +12,7 @@ const WRITERS: [(&str, &str); 6] = [
     ("render ct.nii --out out/skin.png --pixels 700", "out/skin.png"),
 ];
 
-/// Outputs of a run, and the first file that does not fit.
+/// Outputs of a run, and the first file that exceeds the limit.
 const RUNS: [(&str, &str); 4] = [
     ("output={surface=true}", "out/skin.vtu"),
     ("output={tissue=true}", "out/tissue.vtu"),
@@ -39,13 +39,13 @@ fn prepared() -> Desk {
     desk
 }
 
-/// Every call that writes, with the file that it fails on.
+/// Every call that writes, and the file that exceeds the limit.
 fn calls() -> impl Iterator<Item = (String, &'static str)> {
     let run = |(set, file)| (format!("run scene.toml --out out --set output={{}} --set {set}"), file);
     WRITERS.iter().map(|&(call, file)| (call.to_owned(), file)).chain(RUNS.into_iter().map(run))
 }
 
-/// A file may not grow beyond 16 KiB: the write that would fails, as on a full disk, for root as for anybody.
+/// Files are limited to 16 KiB. Longer writes fail as on a full disk, also for root.
 #[test]
 fn a_write_that_fails_leaves_nothing() {
     let desk = prepared();
@@ -56,7 +56,7 @@ fn a_write_that_fails_leaves_nothing() {
     }
 }
 
-/// What was there before a failed write is still there, whole.
+/// A failed write keeps the previous file unchanged.
 #[test]
 fn a_write_that_fails_keeps_the_old_file() {
     let desk = prepared();
@@ -70,7 +70,7 @@ fn a_write_that_fails_keeps_the_old_file() {
     }
 }
 
-/// The same without a limit goes well: it is the limit that the tests above see.
+/// Negative control: the same calls succeed without a limit.
 #[test]
 fn the_same_calls_succeed_without_a_limit() {
     let desk = prepared();
@@ -83,7 +83,7 @@ fn the_same_calls_succeed_without_a_limit() {
     }
 }
 
-/// A small file system of its own, in a mount namespace that ends with the call.
+/// The call runs with a small file system in its own mount namespace.
 #[test]
 fn a_full_disk_leaves_nothing() {
     let desk = prepared();
@@ -109,7 +109,7 @@ fn a_full_disk_leaves_nothing() {
     assert!(desk.names("out").is_empty());
 }
 
-/// Root may write anywhere, so these are places where nobody can: below a file, and in /proc.
+/// Root can write almost anywhere. Nobody can write below a file or in /proc.
 #[test]
 fn a_folder_that_cannot_be_written_is_named() {
     let desk = prepared();

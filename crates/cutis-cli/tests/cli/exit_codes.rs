@@ -1,9 +1,10 @@
-//! 0 done, 1 failed while running, 2 bad input or usage; the message names file, key and value.
+//! Exit codes: 0 for success, 1 for a failure during a run, 2 for bad input or usage. Messages name
+//! file, key and value.
 
 use crate::Desk;
 
 #[test]
-fn what_works_ends_with_zero() {
+fn successful_calls_end_with_zero() {
     let desk = Desk::new();
     for call in [
         "--help",
@@ -47,7 +48,7 @@ fn usage_errors_end_with_two() {
 }
 
 #[test]
-fn bad_input_ends_with_two_and_is_named() {
+fn bad_input_ends_with_two_and_a_message_that_names_it() {
     let desk = Desk::new();
     desk.put("typo.toml", crate::SCENE.replace("depth_mm", "depht_mm"));
     desk.put("type.toml", crate::SCENE.replace("rest_area_scale = 0.8", "rest_area_scale = \"tight\""));
@@ -104,7 +105,7 @@ fn a_run_that_fails_ends_with_one() {
     assert!(desk.names("run").is_empty(), "{:?}", desk.names("run"));
 }
 
-/// 1 KB that says it holds 32767³ voxels, 70 TB.
+/// A file of 1 KB with a header for 32767³ voxels, which would take 70 TB.
 fn hostile_header() -> Vec<u8> {
     let mut bytes = vec![0_u8; 1024];
     let mut put = |offset: usize, value: &[u8]| bytes[offset..offset + value.len()].copy_from_slice(value);

@@ -1,14 +1,15 @@
-//! GPUs from the command line: which there are, what is said where there is none, and that nobody looks for one unasked.
+//! GPUs from the command line: the list of devices, the message without a device, and no search for
+//! devices that the scene does not need.
 
 use serde_json::Value;
 
 use crate::{Desk, Done};
 
-/// A Vulkan loader that finds no driver.
+/// Environment in which the Vulkan loader finds no driver.
 const NO_DRIVER: [(&str, &str); 2] =
     [("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")];
 
-/// A Vulkan loader that tells of everything it does.
+/// Environment in which the Vulkan loader logs every action.
 const TALKATIVE: [(&str, &str); 1] = [("VK_LOADER_DEBUG", "all")];
 
 fn words(call: &str) -> Vec<&str> {
@@ -20,7 +21,8 @@ fn parsed(done: Done) -> Value {
     serde_json::from_str(&done.stdout).unwrap_or_else(|e| panic!("{}: {e}: {}", done.call, done.stdout))
 }
 
-/// The adapters of this machine. None: a failure where tests may not be skipped, else a printed reason.
+/// The adapters of this machine. Without an adapter the test is skipped with a printed reason, or
+/// fails where an adapter is required.
 fn adapters(desk: &Desk) -> Option<Vec<Value>> {
     let found = parsed(desk.cutis(&["devices", "--json"]));
     let adapters = found["devices"].as_array().unwrap().clone();
@@ -34,7 +36,7 @@ fn adapters(desk: &Desk) -> Option<Vec<Value>> {
 }
 
 #[test]
-fn a_gpu_that_is_not_there_is_refused_with_what_to_install() {
+fn a_missing_gpu_is_refused_with_installation_advice() {
     let desk = Desk::new();
     for call in [
         "run scene.toml --backend gpu",
@@ -52,7 +54,7 @@ fn a_gpu_that_is_not_there_is_refused_with_what_to_install() {
 }
 
 #[test]
-fn nothing_else_needs_a_gpu() {
+fn other_calls_need_no_gpu() {
     let desk = Desk::new();
     for call in ["run scene.toml --out auto", "run scene.toml --backend cpu --adapter nvidia --out cpu"] {
         desk.cutis_with(&NO_DRIVER, &words(call)).expect_success();
@@ -90,7 +92,7 @@ fn devices() {
 }
 
 #[test]
-fn an_adapter_that_is_not_there_is_refused_with_those_that_are() {
+fn an_unknown_adapter_is_refused_with_a_list() {
     let desk = Desk::new();
     let Some(adapters) = adapters(&desk) else { return };
     let first = adapters[0]["name"].as_str().unwrap();
@@ -148,9 +150,9 @@ fn a_run_on_a_gpu_says_where_it_ran() {
     assert_eq!(warned, adapters[0]["kind"] == "software");
 }
 
-/// The whole program on both backends: the state of every vertex and every opening have the same bits.
+/// Both backends give the same bits for every vertex and every opening.
 #[test]
-fn the_demo_on_software_is_that_of_the_cpu() {
+fn the_demo_on_a_software_gpu_equals_the_cpu() {
     let desk = Desk::new();
     let Some(adapters) = adapters(&desk) else { return };
     if adapters[0]["kind"] != "software" {
@@ -177,9 +179,9 @@ fn the_demo_on_software_is_that_of_the_cpu() {
     assert!(control.0[60..] != gpu.0[60..] && control.1 != gpu.1, "the comparison sees a small change");
 }
 
-/// A scene that does not name a GPU, and one that is too small for `auto`, do not even load Vulkan.
+/// Scenes that name no GPU or are too small for `auto` do not load Vulkan.
 #[test]
-fn nobody_looks_for_a_gpu_unasked() {
+fn vulkan_is_loaded_only_on_request() {
     let desk = Desk::new();
     if adapters(&desk).is_none() {
         return;

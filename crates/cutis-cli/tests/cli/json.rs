@@ -1,18 +1,16 @@
-//! `--json` prints one JSON value with the keys that others rely on, and nothing else on standard output.
-
-use std::path::PathBuf;
+//! `--json` prints one JSON value with the documented keys, and nothing else, on standard output.
 
 use serde_json::Value;
 
 use crate::Desk;
 
-/// The printed value.
+/// Runs the program and parses the JSON value that it prints.
 fn json(desk: &Desk, call: &str) -> Value {
     let done = desk.cutis(&call.split(' ').collect::<Vec<_>>()).expect_success();
     serde_json::from_str(&done.stdout).unwrap_or_else(|e| panic!("{call}: {e}: {}", done.stdout))
 }
 
-/// Fails unless each dotted key is there; `[]` goes into the first entry of a list.
+/// Fails unless the value has each dotted key. `[]` selects the first entry of a list.
 fn expect_keys(value: &Value, keys: &[&str]) {
     for key in keys {
         let found = key.split('.').try_fold(value, |at, part| match part.strip_suffix("[]") {
@@ -69,17 +67,10 @@ fn skin() {
     );
 }
 
-/// The counts of an independent program, all the way from the command line.
+/// The counts agree with those of an independent program.
 #[test]
 fn skin_of_a_real_abdomen() {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
-    let data = PathBuf::from(std::env::var_os("CUTIS_TEST_DATA").unwrap_or_else(|| beside.into()));
-    let volume = data.join("ct/abdomen_ts_129x107x118.nii.gz");
-    if !volume.is_file() {
-        assert!(std::env::var_os("CI").is_none(), "there is no {}", volume.display());
-        eprintln!("skipped: there is no {} (set CUTIS_TEST_DATA)", volume.display());
-        return;
-    }
+    let Some(volume) = cutis_test_kit::scans::find("ct/abdomen_ts_129x107x118.nii.gz") else { return };
     let found =
         json(&Desk::new(), &format!("skin {} --lattice native --mode paper --json", volume.display()));
     assert_eq!(
@@ -169,7 +160,8 @@ fn run() {
     );
     assert!(printed["wound"]["final_mm"].as_f64() > printed["wound"]["initial_mm"].as_f64());
 
-    // The report is as its schema says: what is required is there, and what is there is described.
+    // The report has all required keys of its schema, and the schema describes all keys of the
+    // report.
     let schema = json(&desk, "scene report-schema");
     let described = schema["properties"].as_object().unwrap();
     assert!(written.as_object().unwrap().keys().all(|key| described.contains_key(key)));

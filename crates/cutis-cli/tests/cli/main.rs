@@ -1,10 +1,11 @@
-//! The program as users and scripts meet it: exit codes, messages, JSON, and files that are whole or not there.
+//! The program as users and scripts see it: exit codes, messages, JSON, and complete files or none.
 
 mod disk;
 mod exit_codes;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod json;
+mod looks;
 mod paper_form;
 mod printed;
 mod tune;
@@ -17,37 +18,30 @@ use tempfile::TempDir;
 /// The program under test.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_cutis");
 
-/// A torso of a few thousand vertices with an incision; fractions of a second per run.
+/// A torso of a few thousand vertices with an incision. A run takes a fraction of a second.
 const SCENE: &str = r#"
+incision = [{ from_mm = [30, 110, -50], to_mm = [30, 110, 50], depth_mm = 20.0, width_mm = 10.0 }]
 [volume]
 phantom = { size = [48, 48, 36], seed = 1 }
 [lattice]
 spacing_mm = 12.0
-[constraints.distance]
-youngs_modulus_pa = 5.0e3
-[constraints.volume]
-bulk_modulus_pa = 5.0e4
-[constraints.stc]
-area_modulus_n_per_m = 100.0
-rest_area_scale = 0.8
+[constraints]
+distance = { youngs_modulus_pa = 5.0e3 }
+volume = { bulk_modulus_pa = 5.0e4 }
+stc = { area_modulus_n_per_m = 100.0, rest_area_scale = 0.8 }
 [fixed]
 bone_above_hu = 250.0
 end_layers = ["k"]
-[[incision]]
-from_mm = [30.0, 110.0, -50.0]
-to_mm = [30.0, 110.0, 50.0]
-depth_mm = 20.0
-width_mm = 10.0
 [run]
 frames = 2
 "#;
 
-/// An empty folder with `scene.toml` in it, in which the program runs.
+/// A temporary folder with `scene.toml`, in which the program runs.
 struct Desk {
     folder: TempDir,
 }
 
-/// What a call of the program left.
+/// Exit code and output of a call of the program.
 struct Done {
     call: String,
     code: i32,
@@ -71,7 +65,7 @@ impl Desk {
         std::fs::write(self.path(name), bytes).unwrap();
     }
 
-    /// Names of the files of a folder, sorted; none if there is no such folder.
+    /// Sorted names of the files of a folder. Empty if the folder does not exist.
     fn names(&self, folder: &str) -> Vec<String> {
         let Ok(entries) = std::fs::read_dir(self.path(folder)) else { return Vec::new() };
         let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -84,7 +78,7 @@ impl Desk {
         self.finish(args, Command::new(PROGRAM).args(args))
     }
 
-    /// Runs the program in the folder, with more variables in its environment.
+    /// Runs the program in the folder with additional environment variables.
     #[cfg(feature = "gpu")]
     fn cutis_with(&self, variables: &[(&str, &str)], args: &[&str]) -> Done {
         self.finish(args, Command::new(PROGRAM).args(args).envs(variables.iter().copied()))
@@ -96,7 +90,8 @@ impl Desk {
     }
 
     fn finish(&self, what: &[&str], command: &mut Command) -> Done {
-        // On software Vulkan: a layer that complains without a display stays out, and the calling thread does the work.
+        // For software Vulkan: disable a layer that needs a display, and compute on the calling
+        // thread.
         let command = command.env("NODEVICE_SELECT", "1").env("LP_NUM_THREADS", "0");
         let Output { status, stdout, stderr } =
             command.current_dir(self.folder.path()).env("RUST_BACKTRACE", "1").output().unwrap();
@@ -114,13 +109,14 @@ impl Desk {
 }
 
 impl Done {
-    /// Fails unless it went well.
+    /// Fails unless the exit code is 0.
     fn expect_success(self) -> Self {
         assert_eq!(self.code, 0, "{}: {}", self.call, self.stderr);
         self
     }
 
-    /// Fails unless it ended with `code`, nothing on standard output, and one `error:` that has all the words.
+    /// Fails unless the call ended with `code`, printed nothing on standard output, and printed one
+    /// `error:` with all the words.
     fn expect_error(&self, code: i32, words: &[&str]) {
         assert_eq!(self.code, code, "{}: {}", self.call, self.stderr);
         assert!(self.stdout.is_empty(), "{}: {}", self.call, self.stdout);

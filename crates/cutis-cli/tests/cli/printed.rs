@@ -1,4 +1,4 @@
-//! What `cutis scene` prints can be used as it is.
+//! The output of `cutis scene` is valid without changes.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn the_reference_is_printed_to_the_byte() {
     assert!(printed == cutis::scene::reference());
 }
 
-/// `| head` closes the pipe early; that is nobody's error.
+/// `| head` closes the pipe early, which is not an error.
 #[test]
 fn a_closed_pipe_is_no_panic() {
     let done = Desk::new().script("set -o pipefail; \"$cutis\" scene schema | true");

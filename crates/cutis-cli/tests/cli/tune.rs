@@ -1,4 +1,4 @@
-//! `cutis tune`: what it prints, what it writes, and its exit codes.
+//! `cutis tune`: its output, its files and its exit codes.
 
 use serde_json::Value;
 
@@ -34,7 +34,7 @@ fn tune(desk: &Desk, options: &str) -> crate::Done {
 }
 
 #[test]
-fn it_prints_what_it_found_and_writes_a_copy_with_comments() {
+fn tune_prints_its_result_and_writes_a_copy_with_comments() {
     let desk = Desk::new();
     desk.put("scene.toml", format!("# A torso.\n{SCENE}"));
     let done = tune(&desk, "--error 40 --json").expect_success();
@@ -51,12 +51,12 @@ fn it_prints_what_it_found_and_writes_a_copy_with_comments() {
     assert!(copy.starts_with("# Tuned by cutis") && copy.contains("# A torso."), "{copy}");
     let substeps = &found["picked"]["setting"]["substeps"];
     assert!(copy.contains("[solver]") || *substeps == 10, "{copy}");
-    // The copy holds what the command line changed too.
+    // The copy also has the overrides of the command line.
     let run = desk.cutis(&["run", "scene-tuned.toml", "--out", "run", "--json"]).expect_success();
     let report: Value = serde_json::from_str(&run.stdout).unwrap();
     assert_eq!((&report["scene"]["solver"]["substeps"], desk.names("run").len()), (substeps, 0));
 
-    // What is there is not replaced unless it is said.
+    // An existing file is replaced only with `--force`.
     tune(&desk, "--error 40").expect_error(2, &["scene-tuned.toml", "--force", "-o"]);
     tune(&desk, "-o scene.toml --force").expect_error(2, &["scene.toml", "the scene itself"]);
     let done = tune(&desk, "--error 40 --force --settings-only").expect_success();
@@ -66,7 +66,7 @@ fn it_prints_what_it_found_and_writes_a_copy_with_comments() {
 }
 
 #[test]
-fn it_ends_with_one_where_nothing_meets_the_demand_and_with_two_where_it_cannot_begin() {
+fn tune_ends_with_one_for_unmet_targets_and_with_two_for_bad_input() {
     let desk = Desk::new();
     let done = tune(&desk, "--budget-ms 0.000001 --settings-only --json");
     assert_eq!(done.code, 1, "{}", done.stderr);
@@ -86,18 +86,18 @@ fn it_ends_with_one_where_nothing_meets_the_demand_and_with_two_where_it_cannot_
     assert_eq!(desk.names("."), ["scene.toml"]);
 }
 
-/// Where the tuned scene cannot be written, nothing is run first.
+/// A path that cannot be written is refused before any run.
 #[test]
-fn a_folder_that_is_not_there_is_told_before_the_work() {
+fn a_missing_folder_is_refused_before_the_work() {
     let desk = Desk::new();
     tune(&desk, "-o nowhere/tuned.toml").expect_error(2, &["nowhere/tuned.toml", "cannot be written"]);
     assert_eq!(desk.names("."), ["scene.toml"]);
 }
 
-/// What was measured is printed although the outputs could not be timed.
+/// The measured settings are printed although the outputs could not be timed.
 #[cfg(unix)]
 #[test]
-fn a_temporary_folder_that_cannot_be_written_loses_nothing() {
+fn an_unwritable_temporary_folder_loses_no_results() {
     let desk = Desk::new();
     let call =
         "TMPDIR=$PWD/nowhere $cutis tune scene.toml --set 'output={surface=true}' --minutes 0.5 --error 40";

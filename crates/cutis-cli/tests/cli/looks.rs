@@ -1,0 +1,147 @@
+//! Printed summaries agree with the files, and `cutis render` draws the requested view.
+
+use serde_json::Value;
+
+use crate::{Desk, Done};
+
+fn call(desk: &Desk, call: &str) -> Done {
+    desk.cutis(&call.split(' ').collect::<Vec<_>>()).expect_success()
+}
+
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).unwrap()
+}
+
+/// The number that precedes a word.
+fn before(text: &str, word: &str) -> f64 {
+    let start = text.split_once(word).unwrap_or_else(|| panic!("no {word:?} in {text}")).0;
+    start.rsplit([' ', '(']).next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn the_summary_of_a_run_has_the_figures_of_its_report() {
+    let desk = Desk::new();
+    let printed = call(&desk, "run scene.toml --out run").stdout;
+    let report = json(&std::fs::read(desk.path("run/report.json")).unwrap());
+    for (word, key) in [
+        (" vertices,", "vertices"),
+        (" edges,", "edges"),
+        (" tetrahedra,", "tets"),
+        (" skin triangles", "skin_triangles"),
+    ] {
+        assert_eq!(before(&printed, word), report["sizes"][key].as_f64().unwrap(), "{key}");
+    }
+    let wound = printed.split_once("wound: ").unwrap().1;
+    for (word, key) in [(" mm -> ", "initial_mm"), (" mm (", "final_mm"), (" mm in the middle)", "mid_mm")] {
+        let expected = report["wound"][key].as_f64().unwrap();
+        assert!((before(wound, word) - expected).abs() < 0.0051, "{key}: {expected}, {wound}");
+    }
+    assert!(report["wound"]["final_mm"].as_f64() > report["wound"]["initial_mm"].as_f64());
+    let ms = before(&printed, " ms each");
+    assert!((ms - report["frames"]["ms_mean"].as_f64().unwrap()).abs() < 0.051, "{printed}");
+}
+
+#[test]
+fn the_table_of_a_plan_has_the_figures_of_its_json() {
+    let desk = Desk::new();
+    let plan = json(call(&desk, "check scene.toml --json").stdout.as_bytes());
+    let table = call(&desk, "check scene.toml").stdout;
+    let sizes = &plan["sizes"];
+    let line = |name: &str| {
+        let line = table.lines().find(|line| line.starts_with(name));
+        line.unwrap_or_else(|| panic!("no {name} in {table}"))[name.len()..].trim().to_owned()
+    };
+    let lattice: Vec<String> = sizes["lattice"].as_array().unwrap().iter().map(Value::to_string).collect();
+    assert_eq!(line("lattice"), lattice.join(" x "));
+    let vertices = format!(
+        "{} ({} fixed, {} cut out)",
+        sizes["vertices"], sizes["fixed_vertices"], sizes["removed_vertices"]
+    );
+    assert_eq!(line("vertices"), vertices);
+    for (name, value) in [
+        ("edges", &sizes["edges"]),
+        ("tetrahedra", &sizes["tets"]),
+        ("skin triangles", &sizes["skin_triangles"]),
+        ("projections", &plan["projections"]),
+    ] {
+        assert_eq!(line(name), value.to_string(), "{name}");
+    }
+    let megabytes: f64 = line("memory, CT").strip_suffix(" MB").unwrap().parse().unwrap();
+    assert!((megabytes - 2.0 * 48.0 * 48.0 * 36.0 / 1e6).abs() < 0.051, "{megabytes} MB");
+    for part in plan["memory"].as_array().unwrap() {
+        let name = part["part"].as_str().unwrap();
+        let row = table.lines().find(|line| line.trim_start().starts_with(&format!("{name} "))).unwrap();
+        assert!(row.split_whitespace().any(|cell| cell == part["bytes"].to_string()), "{row}: {part}");
+    }
+}
+
+#[test]
+fn inspect_prints_what_its_json_holds() {
+    let desk = Desk::new();
+    call(&desk, "phantom --size 20,16,12 --seed 3 --out ct.nii.gz");
+    let found = json(call(&desk, "inspect ct.nii.gz --json").stdout.as_bytes());
+    let page = call(&desk, "inspect ct.nii.gz").stdout;
+    for expected in [
+        "shape        20 x 16 x 12".to_owned(),
+        format!("orientation  {}", found["orientation"].as_str().unwrap()),
+        format!(
+            "HU           {} to {}",
+            found["hu_min"].as_f64().unwrap(),
+            found["hu_max"].as_f64().unwrap()
+        ),
+    ] {
+        assert!(page.lines().any(|line| line == expected), "no {expected:?} in {page}");
+    }
+    let spacing: Vec<String> = found["spacing_mm"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|mm| format!("{:.4}", mm.as_f64().unwrap()))
+        .collect();
+    assert!(page.contains(&format!("spacing      {} mm", spacing.join(" x "))), "{page}");
+}
+
+/// Draws a picture and returns its pixels and its width.
+fn pixels(desk: &Desk, options: &str) -> (Vec<[u8; 3]>, usize) {
+    call(desk, &format!("render ct.nii --out picture.png --pixels 200 {options}"));
+    let file = std::io::BufReader::new(std::fs::File::open(desk.path("picture.png")).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut data = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut data).unwrap();
+    (data.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(), info.width as usize)
+}
+
+/// Share of gray pixels, neither black nor white.
+fn gray(desk: &Desk, options: &str) -> f64 {
+    let (pixels, _) = pixels(desk, options);
+    let is_gray = |[r, g, b]: &&[u8; 3]| r == g && g == b && (60..200).contains(r);
+    pixels.iter().filter(is_gray).count() as f64 / pixels.len() as f64
+}
+
+/// Soft tissue is gray in its own window; a narrow window far from it leaves black and white.
+#[test]
+fn a_slice_has_the_requested_window_and_position() {
+    let desk = Desk::new();
+    call(&desk, "phantom --size 48,48,36 --out ct.nii");
+    let soft = gray(&desk, "--slice axial@0 --window 40/400");
+    let narrow = gray(&desk, "--slice axial@0 --window 400/40");
+    assert!(soft > 0.15 && narrow < 0.05, "{soft} and {narrow} of the pixels are gray");
+    assert!(gray(&desk, "--slice axial@5000") < 0.02, "outside the volume there is nothing");
+    let whole = gray(&desk, "--slice coronal@0");
+    let close = gray(&desk, "--slice coronal@0 --focus 0,0,0 --zoom 60");
+    assert!(close > whole + 0.1, "a close-up shows the inside: {whole} and {close}");
+}
+
+/// The torso is wider than it is deep.
+#[test]
+fn a_surface_is_seen_from_the_requested_side() {
+    let desk = Desk::new();
+    call(&desk, "phantom --size 48,48,36 --out ct.nii");
+    let body = |options: &str| {
+        let (pixels, width) = pixels(&desk, options);
+        let row = &pixels[width * (pixels.len() / width / 3)..][..width];
+        row.iter().filter(|[r, g, b]| r.abs_diff(*b) > 25 || r.abs_diff(*g) > 25).count()
+    };
+    let (front, side) = (body("--side anterior"), body("--side left"));
+    assert!(front as f64 > 1.2 * side as f64 && side > 20, "{front} and {side} pixels across");
+}
