@@ -13,7 +13,7 @@
 //! |---|---|---|
 //! | [`gradient`](checks::gradient) | `∇C` is the gradient of `C` | a gradient off by 1e-3; two swapped |
 //! | [`momentum`](checks::momentum) | gradients sum to zero and have no torque | one off by 1e-3; a couple |
-//! | [`scale`](checks::scale) | the formula contains no length and no epsilon | a micrometer |
+//! | [`scale`](checks::scale) | the formula contains no length and no epsilon | a length of 1e-20 m |
 //! | [`parameters`](checks::parameters) | each parameter matters in the samples | (the check itself: an idle parameter fails) |
 //! | [`precision`](checks::precision) | `f32` is near `f64` | value or gradient off by 1e-3 |
 //! | [`lanes`](checks::lanes) | a SIMD lane has the bits of the scalar | the next lane |

@@ -72,14 +72,14 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
     /// one as the rest shape and one as the deformed shape. `f32` represents all numbers exactly.
     pub fn cases(&self) -> Vec<Case<N>> {
         let single = |x: f64| f64::from(x as f32);
-        self.draw(|scale, x| x.map(|p| p.map(|v| single(v * scale))))
+        self.draw(SCALES, |scale, x| x.map(|p| p.map(|v| single(v * scale))))
             .map(|case| Case { params: case.params.into_iter().map(single).collect(), ..case })
             .collect()
     }
 
-    /// Samples with exactly the same shapes at every scale, for `f64`.
-    pub(crate) fn similar_cases(&self) -> Vec<Case<N>> {
-        self.draw(|scale, x| x.map(|p| p * scale)).collect()
+    /// The samples at one length scale, for `f64`. The shapes are exactly the same at every scale.
+    pub(crate) fn similar_cases(&self, scale: f64) -> Vec<Case<N>> {
+        self.draw([scale], |scale, x| x.map(|p| p * scale)).collect()
     }
 
     /// The parameters of a rest shape for each material. Those that are not finite in `f32` are
@@ -92,11 +92,12 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
         self.materials.iter().map(of).filter(finite).collect()
     }
 
-    fn draw(
+    fn draw<const S: usize>(
         &self,
+        scales: [f64; S],
         place: impl Fn(f64, [Point3<f64>; N]) -> [Point3<f64>; N],
     ) -> impl Iterator<Item = Case<N>> {
-        SCALES.into_iter().flat_map(move |scale| {
+        scales.into_iter().flat_map(move |scale| {
             let mut random = Random::new(1);
             let mut cases = Vec::with_capacity(self.materials.len() * SAMPLES);
             for material in &self.materials {

@@ -77,6 +77,14 @@ fn an_absolute_epsilon_is_rejected() {
     assert_rejected::<AbsoluteEpsilon, 2>("scale", &["momentum", "wgsl", "gpu evaluation"]);
 }
 
+/// Guards so small that no sample of a usual size comes near to them.
+#[test]
+fn a_tiny_absolute_epsilon_has_a_length() {
+    let not = ["gradient", "momentum", "precision", "degenerate", "wgsl", "gpu evaluation", "gpu projection"];
+    assert_rejected::<TinyGuard, 2>("scale", &not);
+    assert_rejected::<TinyEpsilon, 2>("scale", &not);
+}
+
 #[test]
 fn a_parameter_without_effect_is_rejected() {
     assert_rejected::<Idle, 2>("parameters", &["gradient", "wgsl", "gpu evaluation", "gpu projection"]);

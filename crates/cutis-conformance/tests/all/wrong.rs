@@ -106,6 +106,37 @@ stretch!(
     )
 );
 stretch!(
+    /// Has no direction below a length of one nanometer.
+    TinyGuard,
+    |x, p| {
+        let length = length(x);
+        let inverse = (T::one() / length).select(length.simd_gt(T::constant(1e-9)), T::zero());
+        let direction = (x[0] - x[1]) * inverse;
+        Eval { c: length - p[0] * p[1], grad: [direction, -direction] }
+    },
+    stretch_wgsl!(
+        "let length = sqrt(dot(d, d));
+        let apart = length > 1e-9;
+        let direction = d * select(0.0, 1.0 / select(1.0, length, apart), apart);
+        return Eval(length - p.rest_length * p.slack, array<vec3f, N>(direction, -direction));"
+    )
+);
+stretch!(
+    /// Adds a square picometer to its squared length.
+    TinyEpsilon,
+    |x, p| {
+        let d = x[0] - x[1];
+        let length = (d.dot(&d) + T::constant(1e-24)).simd_sqrt();
+        let direction = d * (T::one() / length);
+        Eval { c: length - p[0] * p[1], grad: [direction, -direction] }
+    },
+    stretch_wgsl!(
+        "let length = sqrt(dot(d, d) + 1e-24);
+        let direction = d * (1.0 / length);
+        return Eval(length - p.rest_length * p.slack, array<vec3f, N>(direction, -direction));"
+    )
+);
+stretch!(
     /// Reads only one of its two parameters.
     Idle,
     |x, &[rest_length, _]| stretch(x, &[rest_length, T::one()]),
