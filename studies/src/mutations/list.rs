@@ -30,12 +30,21 @@ pub enum Suite {
     Stability,
     /// ChainMail, on the CPU and on a GPU.
     ChainMail,
+    /// Pictures, meshes, tables and reports against known landmarks.
+    Outputs,
 }
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Self; 6] =
-        [Self::Conformance, Self::Solver, Self::Resample, Self::Problems, Self::Stability, Self::ChainMail];
+    pub const ALL: [Self; 7] = [
+        Self::Conformance,
+        Self::Solver,
+        Self::Resample,
+        Self::Problems,
+        Self::Stability,
+        Self::ChainMail,
+        Self::Outputs,
+    ];
 
     /// Name on the command line and in the page.
     pub fn name(self) -> &'static str {
@@ -46,6 +55,7 @@ impl Suite {
             Self::Problems => "problems",
             Self::Stability => "stability",
             Self::ChainMail => "chainmail",
+            Self::Outputs => "outputs",
         }
     }
 
@@ -58,6 +68,19 @@ impl Suite {
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],
             Self::Stability => &["-p", "cutis-tests", "--test", "all", "stability::"],
             Self::ChainMail => &["-p", "cutis-chainmail", "--features", "gpu", "--tests"],
+            Self::Outputs => &[
+                "-p",
+                "cutis-tests",
+                "-p",
+                "cutis-cli",
+                "--test",
+                "all",
+                "--test",
+                "cli",
+                "--",
+                "outputs::",
+                "looks::",
+            ],
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod chainmail;
 mod list;
+mod outputs;
 mod stability;
 
 use std::fs;
@@ -14,6 +15,7 @@ use clap::Parser;
 
 use self::chainmail::CHAINMAIL;
 use self::list::{MUTATIONS, Mutation, Suite};
+use self::outputs::OUTPUTS;
 use self::stability::STABILITY;
 use crate::kit::{Failure, Page, Provenance, Table, cargo, command, execute, results, target_dir};
 
@@ -40,7 +42,7 @@ impl Options {
 
 /// All mutations.
 fn all() -> impl Iterator<Item = &'static Mutation> {
-    MUTATIONS.iter().chain(STABILITY).chain(CHAINMAIL)
+    MUTATIONS.iter().chain(STABILITY).chain(CHAINMAIL).chain(OUTPUTS)
 }
 
 /// Tables of the page: faults and provenance of each suite.
