@@ -144,9 +144,9 @@ fn a_frame_reads_the_lips_only() {
             let folder = tempfile::tempdir().unwrap();
             let report = run_on(gpu, folder.path(), &scene(&set), false).unwrap();
             let after = gpu.counters();
-            let told = report.device.unwrap();
+            let work = report.device.unwrap();
             let counted = (after.readback_bytes - before.readback_bytes, after.kernels - before.kernels);
-            assert_eq!((told.readback_bytes, told.kernels), counted, "of this run, not of those before it");
+            assert_eq!((work.readback_bytes, work.kernels), counted, "of this run, not of those before it");
             let vertices = report.sizes.vertices as u64;
             (after.submits - before.submits, after.readback_bytes - before.readback_bytes, vertices)
         };
@@ -281,8 +281,8 @@ impl Progress for Counts<'_> {
     fn note(&self, _message: &str) {}
 }
 
-/// After the simulation the GPU copies the positions for the resampler. The host uploads only the shell of
-/// air around the body, and reads nothing but the resampled voxels.
+/// After the simulation the GPU copies the positions for the resampler. The host uploads only the
+/// shell of air around the body, and reads nothing but the resampled voxels.
 #[test]
 fn positions_stay_on_the_gpu_for_resampling() {
     on_each_adapter(|gpu| {

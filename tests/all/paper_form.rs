@@ -1,5 +1,5 @@
-//! The paper's form of skin tension is the kind `stc` in every report, although the solver has another
-//! constraint type for it.
+//! The paper's form of skin tension is the kind `stc` in every report, although the solver has
+//! another constraint type for it.
 
 use cutis::constraints::{Constraint, SkinTensionPaper};
 use cutis::{LoadedScene, Plan, Silent};
@@ -78,7 +78,8 @@ fn a_region_counts_the_memory_of_the_skin_that_it_leaves_out() {
     };
     let (all, others) =
         (1e-6 * (bytes(&whole) - bytes(&region)), 1e-6 * (without_skin(&whole) - without_skin(&region)));
-    // The line has one digit after the point; the tables of colors are not in proportion to the elements.
+    // The line has one digit after the point; the tables of colors are not in proportion to the
+    // elements.
     assert!(all - others > 0.15, "the test needs a larger skin: {all} {others}");
     assert!((saved_mb - all).abs() < 0.5 * (all - others), "{saved_mb} of {all}, {others} without skin");
 }

@@ -165,7 +165,7 @@ fn invalid_regions_are_refused_by_name() {
     let handle = ("handle", "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5] }]");
     let elsewhere = "{ min_mm = [-60, -60, -60], max_mm = [-20, 60, 60] }";
     let nothing = "{ min_mm = [500, 500, 500], max_mm = [510, 510, 510] }";
-    let beside_handle = "{ min_mm = [-40, 20, -100], max_mm = [100, 200, 100] }";
+    let near_handle = "{ min_mm = [-40, 20, -100], max_mm = [100, 200, 100] }";
     let uncut = ("incision", "[]");
     /// Overrides, the key that the error names, and a part of its message.
     type Refused<'a> = (&'a [(&'a str, &'a str)], &'a str, &'a str);
@@ -173,10 +173,10 @@ fn invalid_regions_are_refused_by_name() {
         (&[(REGION, "{ around_mm = 4 }")], REGION, "incision[0]"),
         (&[(REGION, elsewhere)], REGION, "incision[0]"),
         (&[(REGION, nothing), uncut], REGION, "none of the"),
-        (&[(REGION, beside_handle), handle], REGION, "handle[0]"),
+        (&[(REGION, near_handle), handle], REGION, "handle[0]"),
         (&[(GRADING, elsewhere)], GRADING, "incision[0]"),
         (&[(GRADING, "{ around_mm = 0.1 }")], GRADING, "incision[0]"),
-        (&[(GRADING, beside_handle), handle, ("lattice.spacing_mm", "4.0"), uncut], GRADING, "handle[0]"),
+        (&[(GRADING, near_handle), handle, ("lattice.spacing_mm", "4.0"), uncut], GRADING, "handle[0]"),
         (&[(GRADING, nothing), uncut], GRADING, "fine zone"),
     ];
     for (set, key, says) in cases {

@@ -10,7 +10,7 @@ fn gapes(run: &Run) -> Vec<f64> {
 }
 
 /// Largest change over the last ten frames, relative to the final opening.
-fn unrest(gapes: &[f64]) -> f64 {
+fn residual_motion(gapes: &[f64]) -> f64 {
     let last = gapes[gapes.len() - 1];
     gapes[gapes.len() - 11..].iter().map(|gape| (gape / last - 1.0).abs()).fold(0.0, f64::max)
 }
@@ -28,9 +28,9 @@ fn tension_opens_the_wound_which_settles() {
     assert!((gapes[0] - wound.initial_mm).abs() < 1e-3 && (gapes[40] - wound.final_mm).abs() < 1e-3);
     assert!(wound.final_mm - wound.initial_mm > 1.0, "{wound:?}");
     assert!(wound.mid_mm - wound.initial_mid_mm > 1.0, "{wound:?}");
-    assert!(unrest(&gapes) < 0.01, "{gapes:?}");
+    assert!(residual_motion(&gapes) < 0.01, "{gapes:?}");
     // Negative control: the wound is not at rest while it opens.
-    assert!(unrest(&gapes[..12]) > 0.01, "{gapes:?}");
+    assert!(residual_motion(&gapes[..12]) > 0.01, "{gapes:?}");
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn the_wound_opens_like_the_reference_in_three_dimensions() {
         let wound = wound(&run);
         let opening = wound.final_mm - wound.initial_mm;
         assert!((opening / expected_mm - 1.0).abs() < 0.2, "{opening} mm instead of {expected_mm}");
-        assert!(unrest(&gapes(&run)) < 0.01);
+        assert!(residual_motion(&gapes(&run)) < 0.01);
     }
     let mut without = scene("abdomen-reference.toml", &[&common[..], &[("run.frames", "5")]].concat());
     without.scene.constraints.stc = None;

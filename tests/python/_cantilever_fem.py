@@ -1,12 +1,15 @@
-"""The lattice body as a hyperelastic solid, by finite elements with scikit-fem. It uses no code of Cutis.
+"""The lattice body as a hyperelastic solid, by finite elements with scikit-fem. It uses no code of
+Cutis.
 
 Linear tetrahedra with the energy density (J per m³ at rest, F the deformation gradient)
 
-    W(F) = E/12 · Σ (|F e| − 1)² + K/2 · (det F − 1)²
+W(F) = E/12 · Σ (|F e| − 1)² + K/2 · (det F − 1)²
 
-where e runs over the rest directions of the six edges. Integrated over the tetrahedra it is the sum of ½C²/α over the
-springs with α = L²/(E·V_e), V_e a sixth of each tetrahedron around the edge, and over the volumes with α = V0/K. Its first
-and second derivatives are written out by hand, and `check_derivatives` compares them with differences."""
+where e runs over the rest directions of the six edges. Integrated over the tetrahedra it is the sum
+of ½C²/α over the springs with α = L²/(E·V_e), V_e a sixth of each tetrahedron around the edge, and
+over the volumes with α = V0/K. Its first and second derivatives are written out by hand, and
+`check_derivatives` compares them with differences.
+"""
 
 from itertools import combinations, product
 
@@ -24,7 +27,8 @@ DESCENT = 1e-4
 
 
 class Beam:
-    """A mesh with fixed vertices: `points` (vertices × 3, m), `tets` (× 4), `held` (bool per vertex)."""
+    """A mesh with fixed vertices: `points` (vertices × 3, m), `tets` (× 4), `held` (bool per
+    vertex)."""
 
     def __init__(self, points, tets, held):
         mesh = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tets.T))
@@ -66,7 +70,8 @@ def internal_force(v, w):
 
 @BilinearForm
 def internal_stiffness(u, v, w):
-    # A shape function of a vector element moves along one axis: the other rows of its gradient are zero.
+    # A shape function of a vector element moves along one axis: the other rows of its gradient are
+    # zero.
     gu, gv, moduli = grad(u), grad(v), w["moduli"].value
     rows = [[axis for axis in range(3) if g[axis].any()] for g in (gv, gu)]
     terms = product(*rows, range(3), range(3))
@@ -74,20 +79,23 @@ def internal_stiffness(u, v, w):
 
 
 def solve(matrix, right):
-    """Solves a sparse symmetric system directly, with a symmetric ordering and pivots on the diagonal."""
+    """Solves a sparse symmetric system directly, with a symmetric ordering and pivots on the
+    diagonal."""
     order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     return splu(matrix.tocsc(), **order).solve(right)
 
 
 class Solid:
-    """The energy of a beam in E and K (Pa), density (kg/m³) and gravity (m/s²), with both derivatives."""
+    """The energy of a beam in E and K (Pa), density (kg/m³) and gravity (m/s²), with both
+    derivatives."""
 
     def __init__(self, beam, youngs, bulk, density, gravity):
         self.beam, self.basis, self.youngs, self.bulk = beam, beam.basis, youngs, bulk
         self.load = asm(weight, self.basis, force=density * np.reshape(gravity, (3, 1, 1)))
 
     def shape(self, u):
-        """F and, for every edge, F e and its length; component first, tetrahedron and quadrature point last."""
+        """F and, for every edge, F e and its length; component first, tetrahedron and quadrature
+        point last."""
         f = self.basis.interpolate(u).grad + np.eye(3)[:, :, None, None]
         edges = np.einsum("ij...,jk...->ik...", f, self.beam.directions)
         return f, edges, np.linalg.norm(edges, axis=0)
@@ -121,7 +129,8 @@ class Solid:
         return asm(internal_stiffness, self.basis, moduli=moduli)
 
     def check_derivatives(self, u, rng):
-        """Largest relative deviation of gradient and tangent from central differences along random directions."""
+        """Largest relative deviation of gradient and tangent from central differences along
+        random directions."""
         size = np.cbrt(self.beam.volumes.min())
         deviations = []
         for _ in range(3):
@@ -167,7 +176,8 @@ class Solid:
         raise ArithmeticError(f"not at rest after {MOST_ITERATIONS} iterations")
 
     def descent(self, u, residual):
-        """Newton's direction. If it points uphill, a growing multiple of the unit matrix is added to the tangent."""
+        """Newton's direction. If it points uphill, a growing multiple of the unit matrix is
+        added to the tangent."""
         matrix, right, _, inner = condense(self.tangent(u), -residual, x=np.zeros_like(u), D=self.beam.held)
         shift, size = 0.0, abs(matrix.diagonal()).mean()
         while True:

@@ -1,8 +1,10 @@
 """The small-strain moduli of a `kuhn6` lattice with springs and volumes.
 
-Every vertex of the infinite lattice is a center of symmetry, so that a uniform strain is an equilibrium and the stiffness is
-the mean over the edges: `C = E·⟨e e e e⟩ + K·1⊗1`, where each tetrahedron counts its six edges e alike. It is not isotropic:
-the springs along the cube's diagonal make that axis stiffer than the others."""
+Every vertex of the infinite lattice is a center of symmetry, so that a uniform strain is an
+equilibrium and the stiffness is the mean over the edges: `C = E·⟨e e e e⟩ + K·1⊗1`, where each
+tetrahedron counts its six edges e alike. It is not isotropic: the springs along the cube's diagonal
+make that axis stiffer than the others.
+"""
 
 from itertools import permutations
 
@@ -27,8 +29,9 @@ def compliance(tensor):
 
 
 def effective(youngs, bulk):
-    """Young's modulus along an axis and the diagonal of the cubes, and the moduli of the isotropic solid that has the same
-    bulk modulus and the same mean shear (Voigt's average over all directions). All in Pa."""
+    """Young's modulus along an axis and the diagonal of the cubes, and the moduli of the
+    isotropic solid that has the same bulk modulus and the same mean shear (Voigt's average over
+    all directions). All in Pa."""
     tensor = stiffness(youngs, bulk)
     inverse = compliance(tensor)
 

@@ -1,6 +1,9 @@
-"""Volumes as nibabel, SimpleITK and `cutis inspect` read them, converted to one form (RAS+ millimeters) and compared.
+"""Volumes as nibabel, SimpleITK and `cutis inspect` read them, converted to one form (RAS+
+millimeters) and compared.
 
-A comparison returns its differences as texts, or an empty list, so that controls can test that it reports a difference."""
+A comparison returns its differences as texts, or an empty list, so that controls can test that it
+reports a difference.
+"""
 
 import json
 import os
@@ -64,7 +67,8 @@ def by_nibabel(path):
 
 
 def by_itk(path):
-    """Reads a file with SimpleITK. It indexes [k, j, i] and uses LPS, so that the first two world axes change sign."""
+    """Reads a file with SimpleITK. It indexes [k, j, i] and uses LPS, so that the first two
+    world axes change sign."""
     image = SimpleITK.ReadImage(str(path))
     if image.GetNumberOfComponentsPerPixel() > 1:
         raise ValueError("voxels are vectors")
@@ -84,7 +88,8 @@ def run_program(*words):
 
 
 def inspect(path):
-    """Runs `cutis inspect`. Returns the volume and the report, or None and the process if it refuses the file."""
+    """Runs `cutis inspect`. Returns the volume and the report, or None and the process if it
+    refuses the file."""
     process = run_program("inspect", path, "--json")
     if process.returncode != 0:
         return None, process
@@ -98,7 +103,8 @@ def inspect(path):
 
 
 def differences(ours, theirs, ignore=()):
-    """The differences between two readings of one volume, as texts. `ignore` names fields to skip."""
+    """The differences between two readings of one volume, as texts. `ignore` names fields to
+    skip."""
     found = []
 
     def compare(field, same):
@@ -176,7 +182,8 @@ class Tally:
 
 
 def data_folder():
-    """The folder of real test volumes. None if it is missing, with a printed reason; in CI that is an error."""
+    """The folder of real test volumes. None if it is missing, with a printed reason; in CI that
+    is an error."""
     folder = Path(os.environ.get("CUTIS_TEST_DATA") or CHECKOUT.parent / "shared" / "data")
     if folder.is_dir():
         return folder

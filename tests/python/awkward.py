@@ -1,7 +1,9 @@
-"""Odd and ordinary NIfTI files: `cutis inspect` reads the same volume as nibabel and SimpleITK, or refuses the file.
+"""Odd and ordinary NIfTI files: `cutis inspect` reads the same volume as nibabel and SimpleITK, or
+refuses the file.
 
-Known differences between the programs are data with a reason. A check fails if a file is unexpectedly accepted or refused,
-or if a known difference no longer occurs."""
+Known differences between the programs are data with a reason. A check fails if a file is
+unexpectedly accepted or refused, or if a known difference no longer occurs.
+"""
 
 from pathlib import Path
 
@@ -19,12 +21,18 @@ REFUSED = {
 
 # Fields in which a reader differs from the NIfTI standard and from Cutis.
 NIBABEL_DIFFERS = {
-    "no_form.nii.gz": ({"affine"}, "without sform and qform nibabel centers the volume and mirrors x; the standard scales only"),
+    "no_form.nii.gz": (
+        {"affine"},
+        "without sform and qform nibabel centers the volume and mirrors x; the standard only scales",
+    ),
 }
 ITK_DIFFERS = {
     "no_form.nii.gz": ({"affine"}, "without sform and qform ITK takes the axes for LPS"),
-    "q_s_conflict.nii.gz": ({"affine"}, "ITK prefers the qform here, we the sform, as nibabel does"),
-    "i16_slope0.nii.gz": ({"hu_min", "hu_max", "hu_sum"}, "slope 0 means unscaled; ITK adds the intercept all the same"),
+    "q_s_conflict.nii.gz": ({"affine"}, "ITK prefers the qform; Cutis and nibabel prefer the sform"),
+    "i16_slope0.nii.gz": (
+        {"hu_min", "hu_max", "hu_sum"},
+        "slope 0 means unscaled; ITK adds the intercept",
+    ),
     "f32_nan_padding.nii.gz": ({"nan_count"}, "ITK reads NaN as 0"),
 }
 
@@ -95,8 +103,8 @@ def check_file(path, tally):
         wrong = not np.allclose(ours.affine, NO_FORM_AFFINE, rtol=1e-6, atol=0.0)
         tally.check("no_form.nii.gz affine", [f"{ours.affine} is not pixdim alone"] if wrong else [])
     if path.name in WARNED:
-        told = any(WARNED[path.name].lower() in warning.lower() for warning in report["warnings"])
-        tally.check(f"{path.name} warns", [] if told else [f"no warning about {WARNED[path.name]!r}: {report['warnings']}"])
+        warned = any(WARNED[path.name].lower() in warning.lower() for warning in report["warnings"])
+        tally.check(f"{path.name} warns", [] if warned else [f"no warning about {WARNED[path.name]!r}: {report['warnings']}"])
 
 
 def main():

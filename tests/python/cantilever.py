@@ -1,7 +1,10 @@
-"""P8: the bent beam by finite elements (scikit-fem), compared with Newton's method and the solver of Cutis at rest.
+"""P8: the bent beam by finite elements (scikit-fem), compared with Newton's method and the solver
+of Cutis at rest.
 
-Without arguments: a few cases, as part of the tests. With `--json FILE`: all cases, also in real time, and all figures
-in that file; `cargo xtask study cantilever` makes the tables from it. `CUTIS_STUDY` names the program of the studies."""
+Without arguments: a few cases, as part of the tests. With `--json FILE`: all cases, also in real
+time, and all figures in that file; `cargo xtask study cantilever` makes the tables from it.
+`CUTIS_STUDY` names the program of the studies.
+"""
 
 import json
 import os
@@ -18,11 +21,13 @@ from _cantilever_fem import Beam, Solid, isotropic
 from _cantilever_moduli import effective
 from _compare import Tally
 
-# Largest difference of the end and of all vertices (RMS) from the FEM, as a share of the displacement.
+# Largest difference of the end and of all vertices (RMS) from the FEM, as a share of the
+# displacement.
 EXACT = 1e-6
 # The same for the end in a run of the solver with short substeps.
 CONVERGED = 1e-2
-# Single precision has to meet CONVERGED only if the strain due to the weight is this many times the rounding of a cell's strain.
+# Single precision has to meet CONVERGED only if the strain due to the weight is this many times the
+# rounding of a cell's strain.
 RESOLVED = 100.0
 # Relative difference of sizes, which Cutis keeps in single precision.
 SIZES = 1e-6
@@ -42,7 +47,8 @@ def beyond(label, difference, bound):
 
 
 def size_problems(ours, beam, corners):
-    """Compares the volumes of tetrahedra, edges and vertices with sums over the mesh of scikit-fem."""
+    """Compares the volumes of tetrahedra, edges and vertices with sums over the mesh of scikit-
+    fem."""
     volumes = beam.volumes
     vertices = np.zeros(len(ours["positions"]))
     np.add.at(vertices, corners.ravel(), np.tile(volumes / 4, 4))
@@ -84,7 +90,8 @@ class Mesh:
 
 
 def solve(mesh, case, gravity):
-    """The solution of the FEM: the solid, its coefficients at rest, and the end displacement with the iterations."""
+    """The solution of the FEM: the solid, its coefficients at rest, and the end displacement
+    with the iterations."""
     material = case["material"]
     youngs, bulk, density = (material[key] for key in ("youngs_pa", "bulk_pa", "density_kg_m3"))
     solid = Solid(mesh.beam, youngs, bulk, density, gravity)
@@ -93,7 +100,8 @@ def solve(mesh, case, gravity):
 
 
 def resolution(mesh, case, gravity):
-    """The strain ρgL/max(E, K) due to the weight, over the rounding of the strain of a cell in `f32` at the beam's length."""
+    """The strain ρgL/max(E, K) due to the weight, over the rounding of the strain of a cell in
+    `f32` at the beam's length."""
     material = case["material"]
     strain = material["density_kg_m3"] * np.linalg.norm(gravity) * mesh.length / max(material["youngs_pa"], material["bulk_pa"])
     cell = np.cbrt(6 * mesh.beam.volumes.min())
@@ -101,7 +109,8 @@ def resolution(mesh, case, gravity):
 
 
 def small_strain(mesh, case, gravity):
-    """The end displacement by small-strain isotropic elasticity, and the moduli of the lattice, for comparison."""
+    """The end displacement by small-strain isotropic elasticity, and the moduli of the lattice,
+    for comparison."""
     material = case["material"]
     moduli = effective(material["youngs_pa"], material["bulk_pa"])
     u = isotropic(mesh.beam, moduli["lame_pa"], moduli["shear_pa"], material["density_kg_m3"], gravity)

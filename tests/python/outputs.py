@@ -1,4 +1,5 @@
-"""The outputs of `cutis`, read by nibabel and SimpleITK: equal voxels, equal positions, and a header that both accept."""
+"""The outputs of `cutis`, read by nibabel and SimpleITK: equal voxels, equal positions, and a
+header that both accept."""
 
 import json
 import tempfile
@@ -83,7 +84,8 @@ REPORT_KEYS = {
 def run_or_fail(*words):
     process = run_program(*words)
     if process.returncode != 0:
-        raise AssertionError(f"cutis {' '.join(map(str, words))} ended with {process.returncode}: {process.stderr}")
+        command = " ".join(map(str, words))
+        raise AssertionError(f"cutis {command} ended with {process.returncode}: {process.stderr}")
     return process
 
 
@@ -103,7 +105,8 @@ def header_problems(path):
 
 
 def readers_agree(path, label, tally):
-    """Checks that all three programs read the same volume with the same brightest voxel. Returns the volume of nibabel."""
+    """Checks that all three programs read the same volume with the same brightest voxel. Returns
+    the volume of nibabel."""
     ours, report = inspect(path)
     if ours is None:
         raise AssertionError(f"cutis refuses its own {label}: {report.stderr}")
@@ -199,9 +202,9 @@ def near(image, place, radius):
 def changed_problems(before, after, handle, reach):
     """Checks that voxels near the handle have changed and that voxels beyond its reach have not."""
     changed = before.values != after.values
-    beside, beyond = changed[near(before, handle, 30.0)], int(changed[~near(before, handle, reach)].sum())
+    close, beyond = changed[near(before, handle, 30.0)], int(changed[~near(before, handle, reach)].sum())
     problems = [] if same_place(after, before) else ["shape or affine changed"]
-    problems += [] if beside.mean() > 0.9 else [f"only {beside.sum()} of {beside.size} voxels changed beside the handle"]
+    problems += [] if close.mean() > 0.9 else [f"only {close.sum()} of {close.size} voxels changed near the handle"]
     return problems + ([f"{beyond} voxels changed beyond its reach"] if beyond else [])
 
 
@@ -229,8 +232,8 @@ def report_problems(path):
     problems = unlike_schema(report, schema, schema)
     damaged = {**report, "chainmail": {"unheard_of": 0}}
     problems += [] if len(unlike_schema(damaged, schema, schema)) > 2 else ["a damaged report passes"]
-    told = report.get("chainmail") or {}
-    problems += [] if told.get("moved", 0) > 20 and told.get("violated_links") == 0 else [f"chainmail: {told}"]
+    chainmail = report.get("chainmail") or {}
+    problems += [] if chainmail.get("moved", 0) > 20 and chainmail.get("violated_links") == 0 else [f"chainmail: {chainmail}"]
     return problems
 
 

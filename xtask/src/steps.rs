@@ -204,7 +204,8 @@ fn build_studies(workspace: &Workspace, more: &[&str]) -> Result<()> {
     execute(workspace.cargo("build").args(["--package", "cutis-studies", "--bin", "study"]).args(more))
 }
 
-/// The study `cantilever`: bends all beams by the solver and by the FEM of the Python check, and writes the page.
+/// The study `cantilever`: bends all beams by the solver and by the FEM of the Python check, and
+/// writes the page.
 pub fn cantilever(workspace: &Workspace) -> Result<()> {
     build_studies(workspace, &["--release"])?;
     let study = workspace.study("release")?;

@@ -36,20 +36,20 @@ fn pull(chain: &Chain) -> Drag {
 /// Drags every seventh element along each axis a little, so that many elements are away from the
 /// mean of their neighbors.
 fn knead(chain: &Chain) -> Chain {
-    let mut kneaded = chain.clone();
+    let mut deformed = chain.clone();
     for element in 0..chain.places() as u32 {
         let place = [element as usize % SIDE, element as usize / SIDE % SIDE, element as usize / SIDE.pow(2)];
         if place.iter().all(|n| n % 7 == 3) {
             let by = |axis: usize| {
                 f64::from((element.wrapping_mul(2_654_435_761) >> (8 * axis)) & 255) / 256.0 - 0.5
             };
-            let at = kneaded.position(element);
-            kneaded
+            let at = deformed.position(element);
+            deformed
                 .drag(&[Drag { element, to: [0, 1, 2].map(|axis| at[axis] + by(axis)) }], Order::Fifo)
                 .unwrap();
         }
     }
-    kneaded
+    deformed
 }
 
 fn benches(criterion: &mut Criterion) {

@@ -1,5 +1,5 @@
-//! Drags one element of a small block with a rigid core, relaxes the block, and prints the positions
-//! along the middle row.
+//! Drags one element of a small block with a rigid core, relaxes the block, and prints the
+//! positions along the middle row.
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "the example prints its result")]
 

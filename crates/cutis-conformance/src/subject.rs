@@ -147,8 +147,8 @@ impl<const N: usize> Case<N> {
         C::eval(&self.positions(), &self.params::<C, T>())
     }
 
-    /// The reference size for errors of the value: the rest size, or the change of the value when
-    /// the points move by the scale, whichever is larger. Errors of the gradient are relative to
+    /// The reference size for errors of the value: the larger of the rest size and the change of
+    /// the value when the points move by the scale. Errors of the gradient are relative to
     /// this size divided by the scale.
     pub fn size<C: Constraint<N>>(&self) -> f64 {
         let eval = self.eval::<C, f64>();

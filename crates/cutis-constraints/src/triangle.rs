@@ -37,7 +37,7 @@ pub(crate) fn area_and_gradient<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> (T, [
 }
 
 /// `1/r²` with `r² = 16 max(e², A0)`, where `e` is the longer edge at the first vertex: four times
-/// the present size or the rest size, whichever is larger.
+/// the larger of the present size and the rest size.
 #[inline(always)]
 pub(crate) fn inverse_reach_squared<T: Real>([x1, x2, x3]: &[Point3<T>; 3], rest_area: T) -> T {
     let (e2, e3) = (x2 - x1, x3 - x1);

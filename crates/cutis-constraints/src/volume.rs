@@ -70,7 +70,7 @@ impl Constraint<4> for Volume {
     }
 
     /// `r² = 16 max(e², √(V0 e))`, where `e` is the longest edge at the first vertex. The reach is
-    /// four times the present size or the rest size, whichever is larger. The geometric mean stands
+    /// four times the larger of the present size and the rest size. The geometric mean stands
     /// in for the rest size because it saves a third root.
     #[inline(always)]
     fn inverse_reach_squared<T: Real>(

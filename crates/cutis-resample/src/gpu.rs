@@ -4,15 +4,15 @@
 //!
 //! 1. `place` maps positions of vertices to voxel indices relative to a central voxel ("places").
 //! 2. `span` finds the slices that each tet comes near, deformed and (if it moved) at rest, and the
-//!    slices that a chunk of tets comes near. The passes of a slab skip chunks that do not touch it.
-//!    In all other chunks they look at every tet, and skip a tet of another slab after reading four
-//!    bytes. Sorting tets by slab would avoid these reads, but would need counts, sums and a second
-//!    copy of the list in every frame. A slab has up to 128 MiB of owners within WebGPU's baseline
-//!    limits, so that even 512 × 512 × 1152 voxels need only nine slabs.
+//!    slices that a chunk of tets comes near. The passes of a slab skip chunks that do not touch
+//!    it. In all other chunks they look at every tet, and skip a tet of another slab after reading
+//!    four bytes. Sorting tets by slab would avoid these reads, but would need counts, sums and a
+//!    second copy of the list in every frame. A slab has up to 128 MiB of owners within WebGPU's
+//!    baseline limits, so that even 512 × 512 × 1152 voxels need only nine slabs.
 //! 3. `claim` runs for each slab, with one thread per tet. The thread visits the voxels in the box
 //!    of its tet. For each voxel that the tet holds or comes near, `atomicMin` on the voxel's owner
-//!    lets the tet with the smallest key win. A tet with a large box goes on a list instead, and the
-//!    threads of a workgroup share its rows.
+//!    lets the tet with the smallest key win. A tet with a large box goes on a list instead, and
+//!    the threads of a workgroup share its rows.
 //! 4. `vacate` visits tets that moved or were removed in the same way at rest. It marks voxels that
 //!    the body may have left.
 //! 5. `gather` runs with one thread per two voxels and computes their values through their owners.

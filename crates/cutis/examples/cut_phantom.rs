@@ -1,11 +1,13 @@
 //! Cuts the skin of a synthetic torso and prints how far its tension opens the wound.
 //!
 //! `cargo run --example cut_phantom -p cutis` takes a few seconds and needs no data.
+#![expect(clippy::print_stdout, reason = "an example that prints its results")]
 
 use cutis::{Error, Override, RunOptions, Silent};
 
 fn main() -> Result<(), Error> {
-    // The built-in demo on a smaller phantom and a coarser lattice, without files except the report.
+    // The built-in demo on a smaller phantom and a coarser lattice, without files except the
+    // report.
     let changes = [
         ("volume.phantom", "{ size = [64, 64, 48], seed = 1 }"),
         ("lattice.spacing_mm", "9.0"),

@@ -13,7 +13,8 @@ var<private> inverse_reach_squared: f32;
 var<private> hidden_zero: u32;
 
 // Returns the value unchanged, in a form that optimizers cannot analyze. Drivers replace
-// `a * b + a * c` by `a * (b + c)`, which rounds differently. They cannot do so with `exact(a * b)`.
+// `a * b + a * c` by `a * (b + c)`, which rounds differently. They cannot do so with
+// `exact(a * b)`.
 fn exact(value: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(value) | hidden_zero);
 }

@@ -42,11 +42,11 @@ pub fn stiffness_under_load(
 pub struct KindError {
     /// Name of the kind.
     pub name: &'static str,
-    /// At the resulting positions.
+    /// Residual at the resulting positions.
     pub found: f64,
-    /// At the equilibrium. Not zero, because constraints carry the load.
+    /// Residual at the equilibrium. It is not zero, because constraints carry the load.
     pub equilibrium: f64,
-    /// Of the differences between the two, constraint by constraint.
+    /// RMS of the differences between the two, constraint by constraint.
     pub error: f64,
 }
 

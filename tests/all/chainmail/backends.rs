@@ -27,13 +27,17 @@ fn busy(set: &[(&str, &str)]) -> LoadedScene {
 fn any_number_of_threads_gives_the_same_bits() {
     let run = |set: &[(&str, &str)]| Run::of(&busy(set));
     let one = run(&[("solver.threads", "1")]);
-    let told = one.report.chainmail.clone();
-    assert!(told.as_ref().is_some_and(|told| told.violated_links > 0 && told.relax_moves > 1000));
+    let chainmail = one.report.chainmail.clone();
+    assert!(
+        chainmail
+            .as_ref()
+            .is_some_and(|chainmail| chainmail.violated_links > 0 && chainmail.relax_moves > 1000)
+    );
     for (backend, threads) in [("cpu", "2"), ("cpu", "3"), ("cpu", "8"), ("reference", "0")] {
         let other = run(&[("solver.backend", backend), ("solver.threads", threads)]);
         assert_eq!(other.report.backend.name, backend);
         assert!(FILES.iter().all(|file| one.bytes(file) == other.bytes(file)), "{backend} {threads}");
-        assert_eq!(other.report.chainmail, told, "{backend} {threads}");
+        assert_eq!(other.report.chainmail, chainmail, "{backend} {threads}");
     }
     // Negative control: one sweep less per frame changes the result.
     let control = run(&[("chainmail.relax_per_frame", "3")]);

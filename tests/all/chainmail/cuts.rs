@@ -23,20 +23,20 @@ fn widest(ended: &Ended, lost: &[([usize; 2], usize)]) -> f64 {
 
 #[test]
 fn a_cut_lets_one_side_move_and_the_other_stay() {
-    let cut = chain(&[REPORT, INCISION, BESIDE, UNRELAXED, UNIFORM]);
+    let cut = chain(&[REPORT, INCISION, ASIDE, UNRELAXED, UNIFORM]);
     let (lost, ended) = (lost(&cut), Ended::of(&cut));
-    assert_eq!(ended.told().cut_links, lost.len());
+    assert_eq!(ended.chainmail().cut_links, lost.len());
     let wound = ended.run.report.wound.as_ref().unwrap();
     assert!(wound.mid_mm - wound.initial_mid_mm > 8.0, "{wound:?}");
-    assert!(widest(&ended, &lost) > 11.9 && ended.told().violated_links == 0);
+    assert!(widest(&ended, &lost) > 11.9 && ended.chainmail().violated_links == 0);
     let right = |ended: &Ended| {
         let beyond = ended.twin.rest.iter().zip(&ended.by).filter(|(rest, _)| rest.x > 0.0);
         beyond.map(|(_, by)| by.norm()).fold(0.0, f64::max)
     };
     assert_eq!(right(&ended), 0.0);
     // Negative control: without the incision the links hold both sides together.
-    let whole = Ended::of(&chain(&[BESIDE, UNRELAXED, UNIFORM]));
-    assert_eq!(whole.told().cut_links, 0);
+    let whole = Ended::of(&chain(&[ASIDE, UNRELAXED, UNIFORM]));
+    assert_eq!(whole.chainmail().cut_links, 0);
     assert!(right(&whole) > 3.0 && widest(&whole, &lost) < 0.3 * STEPS_MM[0] + EXACT_MM);
 }
 
@@ -55,11 +55,11 @@ fn a_handle_in_a_cut_grabs_the_remaining_tissue() {
 
 #[test]
 fn an_incision_acts_from_its_time_on() {
-    let common = [REPORT, INCISION, BESIDE, UNRELAXED, UNIFORM];
+    let common = [REPORT, INCISION, ASIDE, UNRELAXED, UNIFORM];
     let at = |at_s| chain(&[&common[..], &[("incision.0.at_s", at_s)]].concat());
     let (early, late) = (Ended::of(&at("0")), Ended::of(&at("0.375")));
-    assert_eq!(early.told().cut_links, late.told().cut_links);
-    assert!(early.told().cut_links > 0 && early.by != late.by);
+    assert_eq!(early.chainmail().cut_links, late.chainmail().cut_links);
+    assert!(early.chainmail().cut_links > 0 && early.by != late.by);
     // The handle moves by 3 mm in each of four frames. The links hold until the cut, which comes
     // before the last frame.
     let growth = |ended: &Ended| -> Vec<f64> {
@@ -70,10 +70,10 @@ fn an_incision_acts_from_its_time_on() {
     assert!(late[2] < 0.01 && late[3] > 2.9, "{late:?}");
     // Before the cut the run equals the run without an incision.
     let before = Ended::of(&first(3, &at("0.375")));
-    let whole = Ended::of(&first(3, &chain(&[BESIDE, UNRELAXED, UNIFORM])));
-    assert!(before.told().cut_links == 0 && before.by == whole.by);
+    let whole = Ended::of(&first(3, &chain(&[ASIDE, UNRELAXED, UNIFORM])));
+    assert!(before.chainmail().cut_links == 0 && before.by == whole.by);
     let cut = Ended::of(&first(4, &at("0.375")));
-    assert!(cut.told().cut_links > 0);
+    assert!(cut.chainmail().cut_links > 0);
 }
 
 /// Two incisions of different lengths with a handle next to each. The cuts come in either order.
@@ -156,22 +156,22 @@ fn overlapping_incisions_cut_at_their_own_times() {
 #[test]
 fn lips_that_pass_through_each_other_are_reported() {
     let over = "[{ at_mm = [-18, 97, 0], radius_mm = 22, move_mm = [40, 0, 0], over_s = 0.5 }]";
-    let told = |handle| Ended::of(&chain(&[REPORT, INCISION, ("handle", handle), UNIFORM])).run.report;
+    let chainmail = |handle| Ended::of(&chain(&[REPORT, INCISION, ("handle", handle), UNIFORM])).run.report;
     let crossed = |report: &cutis::report::Report| {
         report.warnings.iter().any(|line| line.contains("incision[0] have passed through each other"))
     };
-    let (through, apart) = (told(over), told(BESIDE.1));
+    let (through, apart) = (chainmail(over), chainmail(ASIDE.1));
     assert!(crossed(&through) && through.wound.as_ref().unwrap().mid_mm < 0.0, "{:?}", through.wound);
     assert!(!crossed(&apart), "{:?}", apart.warnings);
 }
 
 #[test]
 fn a_cut_after_the_last_drag_does_not_change_the_energy_before_it() {
-    let told = |cut: &[(&str, &str)]| {
-        let common = [BESIDE, ("chainmail.relax_per_frame", "3")];
-        Ended::of(&chain(&[&common[..], cut].concat())).told().clone()
+    let chainmail = |cut: &[(&str, &str)]| {
+        let common = [ASIDE, ("chainmail.relax_per_frame", "3")];
+        Ended::of(&chain(&[&common[..], cut].concat())).chainmail().clone()
     };
-    let (whole, cut) = (told(&[]), told(&[INCISION, ("incision.0.at_s", "0.625")]));
+    let (whole, cut) = (chainmail(&[]), chainmail(&[INCISION, ("incision.0.at_s", "0.625")]));
     assert!(cut.cut_links > 0 && whole.energy_before > 0.0, "{cut:?}");
     assert_eq!((cut.energy_before, cut.energy_after == whole.energy_after), (whole.energy_before, false));
 }

@@ -16,7 +16,7 @@ fn a_body_without_a_drag_stays_where_it_is() {
         let ended = Ended::of(&chain(&[CT, ("solver.backend", backend)]));
         // A single sweep finds that nothing has to move.
         let still = ChainmailReport { relax_sweeps: 1, settled: true, ..ChainmailReport::default() };
-        assert_eq!(*ended.told(), still);
+        assert_eq!(*ended.chainmail(), still);
         assert!(ended.run.positions() == ended.twin.rest && ended.run.report.max_displacement_mm == 0.0);
         let found = ended.run.deformed();
         assert_eq!(found.grid(), original().grid());
@@ -35,7 +35,7 @@ fn a_cut_without_a_drag_only_removes_tissue() {
     assert!(other.voxels() != original().voxels());
     for at_s in ["0", "0.25"] {
         let ended = Ended::of(&chain(&[CT, INCISION, ("incision.0.at_s", at_s)]));
-        assert!(ended.told().cut_links > 0 && ended.told().moved == 0 && ended.moved() == 0);
+        assert!(ended.chainmail().cut_links > 0 && ended.chainmail().moved == 0 && ended.moved() == 0);
         assert!(ended.run.deformed().voxels() == other.voxels(), "{at_s}");
     }
 }
@@ -46,12 +46,19 @@ fn a_handle_follows_its_path_at_any_time() {
     let whole = Vector3::new(0.0, 20.0, 5.0);
     // The movement takes four frames.
     for (frames, share) in [(1, 0.25), (2, 0.5), (4, 1.0), (6, 1.0)] {
-        let (ended, told) = (Ended::of(&first(frames, &scene)), whole * share);
+        let (ended, chainmail) = (Ended::of(&first(frames, &scene)), whole * share);
         let held = &ended.twin.held[0];
-        assert!(held.len() > 1 && held.iter().all(|&v| (ended.by[v] - told).norm() < EXACT_MM), "{frames}");
-        assert!((ended.run.report.max_displacement_mm - told.norm()).abs() < EXACT_MM);
-        assert!(ended.told().moved == ended.moved() && ended.moved() > held.len(), "{:?}", ended.told());
-        assert_eq!(ended.told().violated_links, 0);
+        assert!(
+            held.len() > 1 && held.iter().all(|&v| (ended.by[v] - chainmail).norm() < EXACT_MM),
+            "{frames}"
+        );
+        assert!((ended.run.report.max_displacement_mm - chainmail.norm()).abs() < EXACT_MM);
+        assert!(
+            ended.chainmail().moved == ended.moved() && ended.moved() > held.len(),
+            "{:?}",
+            ended.chainmail()
+        );
+        assert_eq!(ended.chainmail().violated_links, 0);
         let mut fixed = (0..ended.by.len()).filter(|&v| ended.twin.still[v]);
         assert!(fixed.all(|v| ended.by[v] == Vector3::zeros()), "{frames}");
         assert!(ended.run.report.sizes.fixed_vertices > 100);
@@ -72,7 +79,7 @@ fn handles_move_independently() {
             assert!(!held.is_empty());
             assert!(held.iter().all(|&v| (ended.by[v] - Vector3::from(moved)).norm() < EXACT_MM), "{frames}");
         }
-        assert_eq!(ended.told().violated_links, 0);
+        assert_eq!(ended.chainmail().violated_links, 0);
     }
     // The plane of the scene fixes this vertex.
     let fixed = |set: &[(&str, &str)]| Run::of(&chain(set)).report.sizes.fixed_vertices;
@@ -91,8 +98,8 @@ fn links_are_edges_within_their_limits() {
         assert!(excesses.iter().all(|&excess| excess < EXACT_MM), "beyond a limit");
         assert!(excesses.iter().any(|&excess| excess > -2.0 * EXACT_MM), "none is at its limit");
         let energy = ended.strains().map(|(_, strain)| 0.5 * strain.norm_squared()).sum::<f64>();
-        let told = ended.told().energy_after;
-        assert!((told / energy - 1.0).abs() < 1e-4, "{told} mm², and by the positions {energy}");
+        let chainmail = ended.chainmail().energy_after;
+        assert!((chainmail / energy - 1.0).abs() < 1e-4, "{chainmail} mm², and by the positions {energy}");
     }
 }
 
@@ -106,7 +113,7 @@ fn a_region_is_fixed_at_its_border() {
     assert!(sizes.frozen_vertices > 1000 && still > 50 && sizes.fixed_vertices == still, "{sizes:?}");
     assert!(ended.by.iter().zip(&ended.twin.still).all(|(by, still)| !still || *by == Vector3::zeros()));
     assert_eq!(sizes.edges, ended.twin.links.len());
-    assert!(ended.told().moved > ended.twin.held[0].len());
+    assert!(ended.chainmail().moved > ended.twin.held[0].len());
 }
 
 /// A CT that is rotated and stored along other axes gives the same result in its own frame.
@@ -131,27 +138,27 @@ fn the_ct_may_have_any_orientation() {
     };
     let turned = run(&format!("{{ path = {path:?} }}"), turn);
     let upright = run(&CT_FILE, Rotation3::identity());
-    assert!(turned.told().moved == upright.told().moved && turned.moved() > 100);
+    assert!(turned.chainmail().moved == upright.chainmail().moved && turned.moved() > 100);
     assert!(turned.by.iter().zip(&upright.by).all(|(a, b)| (a - turn * b).norm() < 2.0 * EXACT_MM));
 }
 
 #[test]
 fn relaxation_lowers_the_energy_until_it_settles() {
-    let told = |relax: &str, frames: u32| {
+    let chainmail = |relax: &str, frames: u32| {
         let scene = chain(&[HANDLE, ("chainmail.relax_per_frame", relax)]);
         Run::of(&first(frames, &scene)).report.chainmail.unwrap()
     };
-    let without = told("0", 6);
+    let without = chainmail("0", 6);
     assert_eq!((without.relax_sweeps, without.relax_moves, without.settled), (0, 0, false));
     assert!(without.energy_before == without.energy_after && without.energy_after > 0.0, "{without:?}");
     // The handle moves until the fourth frame. Later frames continue the relaxation.
-    let (few, more, all) = (told("1", 4), told("1", 6), told("1", 60));
+    let (few, more, all) = (chainmail("1", 4), chainmail("1", 6), chainmail("1", 60));
     assert_eq!([few.relax_sweeps, more.relax_sweeps], [4, 6]);
     assert!(few.energy_before == more.energy_before && few.energy_before == all.energy_before);
     let energies = [few.energy_before, few.energy_after, more.energy_after, all.energy_after];
     assert!(energies.is_sorted_by(|a, b| a > b) && all.energy_after < without.energy_after, "{energies:?}");
     // Tissue that has settled relaxes again after the next drag.
-    let at_once = told("1000", 4);
+    let at_once = chainmail("1000", 4);
     assert!(at_once.settled && at_once.energy_after < at_once.energy_before, "{at_once:?}");
     assert!(!few.settled && !more.settled && all.settled && all.relax_sweeps < 60, "{all:?}");
 }

@@ -28,7 +28,7 @@ fn links_give_way_along_their_own_axis() {
                 [("handle", handle.as_str()), ("chainmail.materials", &list), UNRELAXED, ("fixed", "{}")];
             let ended = Ended::of(&chain(&set));
             let held = ended.twin.held[0].len();
-            assert!(held > 0 && ended.told().violated_links == 0);
+            assert!(held > 0 && ended.chainmail().violated_links == 0);
             if drag == soft {
                 assert_eq!(ended.moved(), held, "soft along {soft}");
             } else {
@@ -67,7 +67,7 @@ fn materials_begin_at_their_hu() {
     for from in [-30.0_f32, 40.0] {
         let ended =
             Ended::of(&chain(&[handle, ("chainmail.materials", &list(from)), UNRELAXED, ("fixed", "{}")]));
-        assert_eq!(ended.told().violated_links, 0);
+        assert_eq!(ended.chainmail().violated_links, 0);
         let hu = hu(&ended.twin);
         // Largest strain of a link in half rest lengths, by the number of its rigid ends.
         let mut most = [0.0_f64; 3];
@@ -86,12 +86,12 @@ fn materials_begin_at_their_hu() {
 /// Relaxation keeps the dragged shape with a large `k_steps`, and changes it with a small one.
 #[test]
 fn k_steps_keeps_small_deviations() {
-    let told = |k: &str| {
+    let chainmail = |k: &str| {
         let list =
             format!("[{{ from_hu = -1024, shortest = 0.7, longest = 1.3, shear = 0.4, k_steps = {k} }}]");
         Run::of(&chain(&[HANDLE, ("chainmail.materials", &list)])).report.chainmail.unwrap()
     };
-    let (plastic, elastic) = (told("2"), told("0"));
+    let (plastic, elastic) = (chainmail("2"), chainmail("0"));
     assert_eq!((plastic.relax_moves, plastic.energy_before), (0, plastic.energy_after));
     assert!(elastic.relax_moves > 100 && elastic.energy_after < plastic.energy_after);
 }

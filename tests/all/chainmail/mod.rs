@@ -35,7 +35,7 @@ const HANDLE: (&str, &str) =
 /// An incision along the belly, and a handle that pulls its left lip away.
 const INCISION: (&str, &str) =
     ("incision", "[{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 40, width_mm = 9 }]");
-const BESIDE: (&str, &str) =
+const ASIDE: (&str, &str) =
     ("handle", "[{ at_mm = [-18, 97, 0], radius_mm = 22, move_mm = [-12, 0, 0], over_s = 0.5 }]");
 /// Fat, firmer tissue and rigid bone. The expected values need these materials; the preset may
 /// change.
@@ -138,7 +138,7 @@ impl Ended {
         Self { run, twin, by }
     }
 
-    fn told(&self) -> &ChainmailReport {
+    fn chainmail(&self) -> &ChainmailReport {
         self.run.report.chainmail.as_ref().unwrap()
     }
 

@@ -71,12 +71,12 @@ proptest! {
         match run(&handles, &incisions, materials, relax) {
             Err(error) => prop_assert!(error.is_bad_input() && error.to_string().contains(SMALL), "{}", error),
             Ok(report) => {
-                let told = report.chainmail.unwrap();
+                let chainmail = report.chainmail.unwrap();
                 let warned = report.warnings.iter().any(|line| line.contains("beyond their limits"));
-                prop_assert_eq!(warned, told.violated_links > 0);
-                prop_assert!(report.max_displacement_mm.is_finite() && told.energy_after.is_finite());
-                prop_assert!(told.moved <= report.sizes.vertices);
-                prop_assert!((report.max_displacement_mm > 0.0) == (told.moved > 0));
+                prop_assert_eq!(warned, chainmail.violated_links > 0);
+                prop_assert!(report.max_displacement_mm.is_finite() && chainmail.energy_after.is_finite());
+                prop_assert!(chainmail.moved <= report.sizes.vertices);
+                prop_assert!((report.max_displacement_mm > 0.0) == (chainmail.moved > 0));
             }
         }
     }

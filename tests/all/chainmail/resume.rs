@@ -14,12 +14,15 @@ const FAR: (&str, &str) =
 /// without links beyond their limits.
 #[test]
 fn a_run_in_two_parts_equals_the_whole_run() {
-    for (handle, at_s) in [(BESIDE, "0"), (BESIDE, "0.25"), (FAR, "0"), (FAR, "0.25"), (FAR, "0.5")] {
+    for (handle, at_s) in [(ASIDE, "0"), (ASIDE, "0.25"), (FAR, "0"), (FAR, "0.25"), (FAR, "0.5")] {
         let set = [ALL, INCISION, handle, ("incision.0.at_s", at_s), ("chainmail.relax_per_frame", "3")];
         let scene = chain(&set);
         let whole = Run::of(&scene);
-        let told = whole.report.chainmail.as_ref().unwrap();
-        assert!(told.cut_links > 0 && (told.violated_links > 0) == (handle == FAR), "{told:?}");
+        let chainmail = whole.report.chainmail.as_ref().unwrap();
+        assert!(
+            chainmail.cut_links > 0 && (chainmail.violated_links > 0) == (handle == FAR),
+            "{chainmail:?}"
+        );
         for middle in 1..=6 {
             let folder = tempfile::tempdir().unwrap();
             run_in(folder.path(), &first(middle, &scene), false).unwrap();
@@ -37,11 +40,11 @@ fn a_run_in_two_parts_equals_the_whole_run() {
             let found = report.chainmail.unwrap();
             assert_eq!(
                 (found.moved, found.violated_links, found.cut_links),
-                (told.moved, told.violated_links, told.cut_links),
+                (chainmail.moved, chainmail.violated_links, chainmail.cut_links),
                 "{what}"
             );
-            let energies = |told: &ChainmailReport| [told.energy_before, told.energy_after];
-            assert_eq!(energies(&found), energies(told), "{what}");
+            let energies = |chainmail: &ChainmailReport| [chainmail.energy_before, chainmail.energy_after];
+            assert_eq!(energies(&found), energies(chainmail), "{what}");
         }
     }
 }
@@ -59,12 +62,15 @@ fn a_checkpoint_of_another_chain_is_refused() {
 
 #[test]
 fn another_volume_can_be_resampled_with_the_checkpoint() {
-    let scene = chain(&[("output", "{ volume = true }"), INCISION, BESIDE]);
+    let scene = chain(&[("output", "{ volume = true }"), INCISION, ASIDE]);
     let run = Run::of(&scene);
     let out = run.path("again.nii.gz");
     let request = ResampleRequest { run: run.folder().into(), volume: None, out };
     let found = cutis::resample_run(&scene, &request, &Silent).unwrap();
     assert!(run.bytes("again.nii.gz") == run.bytes("deformed.nii.gz"));
-    let told = run.report.resample.as_ref().unwrap();
-    assert_eq!((found.covered_voxels, found.vacated_voxels), (told.covered_voxels, told.vacated_voxels));
+    let chainmail = run.report.resample.as_ref().unwrap();
+    assert_eq!(
+        (found.covered_voxels, found.vacated_voxels),
+        (chainmail.covered_voxels, chainmail.vacated_voxels)
+    );
 }

@@ -32,7 +32,7 @@ fn tissue_that_cannot_follow_is_reported_with_place_and_amount() {
         assert!(held.iter().all(|&v| (ended.by[v] - Vector3::new(0.0, 150.0, 0.0)).norm() < EXACT_MM));
         let excesses: Vec<f64> = ended.excesses(0.7, 1.3, 0.4).filter(|&mm| mm > EXACT_MM).collect();
         let most = excesses.iter().copied().fold(0.0, f64::max);
-        assert!(most > 1.0 && ended.told().violated_links == excesses.len(), "{most}");
+        assert!(most > 1.0 && ended.chainmail().violated_links == excesses.len(), "{most}");
         let (links, place, excess, fixed) = warned(&report.warnings).unwrap();
         assert!(links == excesses.len() && (excess - most).abs() < 0.0051, "{excess} {most}");
         let near = |v: &usize| (ended.twin.rest[*v].cast::<f64>() * 1000.0 - place).norm() < 0.2;
@@ -54,10 +54,10 @@ fn rigid_and_fixed_tissue_does_not_follow() {
     let fixed = (0..ended.by.len()).filter(|&v| ended.twin.still[v]);
     assert!(fixed.clone().count() > 100 && fixed.into_iter().all(|v| ended.by[v] == Vector3::zeros()));
     let (links, _, excess, _) = warned(&ended.run.report.warnings).unwrap();
-    assert!(links > 0 && excess > 1.0 && ended.told().violated_links == links);
+    assert!(links > 0 && excess > 1.0 && ended.chainmail().violated_links == links);
     // Without fixed tissue the whole body follows as one piece.
     let free = Ended::of(&chain(&[HANDLE, ("chainmail.materials", rigid), ("fixed", "{}")]));
-    assert_eq!((free.told().moved, free.told().violated_links), (free.by.len(), 0));
-    assert_eq!((free.told().energy_after, free.told().relax_moves), (0.0, 0));
+    assert_eq!((free.chainmail().moved, free.chainmail().violated_links), (free.by.len(), 0));
+    assert_eq!((free.chainmail().energy_after, free.chainmail().relax_moves), (0.0, 0));
     assert!(free.by.iter().all(|by| (by - Vector3::new(0.0, 20.0, 5.0)).norm() < EXACT_MM));
 }

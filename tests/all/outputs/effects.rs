@@ -32,15 +32,16 @@ fn near_and_far(run: &Finished) -> [f64; 2] {
     found.map(|(sum, count)| sum / count)
 }
 
-/// Skin is at rest but near the incision, where it is tight: it moves there, and hardly elsewhere.
+/// Skin is at rest except near the incision, where it is tight. It moves there and hardly
+/// elsewhere.
 #[test]
 fn values_near_an_incision_hold_near_it() {
     let at_rest = ("constraints.stc.rest_area_scale", "1.0");
     let tight = "{ radius_mm = 30.0, rest_area_factor = 0.6 }";
     let [near, far] = near_and_far(&with(&[at_rest, ("constraints.stc.near_incision", tight)]));
     assert!(near > 0.3 && far < 0.25 * near, "{near} mm near the incision, {far} mm far from it");
-    let still = near_and_far(&with(&[at_rest]));
-    assert!(still[0] < 1e-3 && still[1] < 1e-3, "{still:?}: skin at rest does not move");
+    let unloaded = near_and_far(&with(&[at_rest]));
+    assert!(unloaded[0] < 1e-3 && unloaded[1] < 1e-3, "{unloaded:?}: skin at rest does not move");
     // The factor holds at the segment and fades to 1 at the radius: a wider radius pulls more.
     let wide = "{ radius_mm = 90.0, rest_area_factor = 0.6 }";
     let [_, far_of_wide] = near_and_far(&with(&[at_rest, ("constraints.stc.near_incision", wide)]));

@@ -184,9 +184,9 @@ fn only_the_wound_has_the_color_of_flesh() {
         let is_flesh = |[r, g, b]: [u8; 3]| r > 60 && f64::from(r) > 2.5 * f64::from(g.max(b));
         let flesh =
             |columns: std::ops::Range<usize>| picture.part(columns, h / 4..3 * h / 4).find(is_flesh).len();
-        let (wound, beside) =
+        let (wound, around) =
             (flesh(3 * w / 8..5 * w / 8), flesh(w / 5..3 * w / 8) + flesh(5 * w / 8..7 * w / 8));
-        assert!(wound > w * h / 50 && beside < wound / 20, "{name}: {wound} and {beside} pixels");
+        assert!(wound > w * h / 50 && around < wound / 20, "{name}: {wound} and {around} pixels");
     }
 }
 

@@ -71,7 +71,8 @@ fn the_table_of_a_plan_has_the_figures_of_its_json() {
     for part in plan["memory"].as_array().unwrap() {
         let name = part["part"].as_str().unwrap();
         let row = table.lines().find(|line| line.trim_start().starts_with(&format!("{name} "))).unwrap();
-        assert!(row.split_whitespace().any(|cell| cell == part["bytes"].to_string()), "{row}: {part}");
+        let bytes = part["bytes"].to_string();
+        assert!(row.split_whitespace().any(|cell| cell == bytes), "{row}: {part}");
     }
 }
 

@@ -130,7 +130,7 @@ fn a_body_tied_by_a_constraint_has_an_equilibrium() {
 /// Rotating and moving a problem rotates and moves its solution. A distance of a million body sizes
 /// from the origin costs six digits.
 #[test]
-fn place_and_orientation_do_not_matter() {
+fn the_solution_is_independent_of_place_and_orientation() {
     let turn = Rotation3::from_euler_angles(0.3, -0.7, 1.1);
     let gravity = Vector3::new(0.0, 0.0, -1e-3);
     let plain = Problem::of(&hanging(4, 1.0), gravity.into()).unwrap();

@@ -1,4 +1,4 @@
-//! What a scene leaves out, and therefore does not pay for, whatever its model.
+//! The parts that a scene leaves out and does not pay for, for every model.
 
 use crate::backend::{self, Chosen};
 use crate::body::{Body, even_shape, needs_skin};

@@ -7,7 +7,7 @@
 //!
 //! If the differences do not shrink, or shrink faster than any method converges, no limit is
 //! visible. The finest run is then the reference. Its uncertainty is its difference from the run
-//! before, or half of the difference before that, whichever is larger.
+//! before, or half of the difference before that, if that is larger.
 
 use std::collections::VecDeque;
 
@@ -231,7 +231,7 @@ mod tests {
     /// With a second power the estimated order is wrong. The reported uncertainty must still cover
     /// the true error.
     #[test]
-    fn what_is_told_of_the_error_holds() {
+    fn the_uncertainty_covers_the_true_error() {
         for c in [-20.0, -3.0, 3.0, 20.0] {
             let found = limit(|s| [3.0 + 1.0 / s + c / (s * s), 2.0 - c / s.powi(3), 1.0]);
             let exact = Field(vec![

@@ -120,20 +120,20 @@ impl Trials<'_> {
         if candidate.own {
             return ControlFlow::Continue(());
         }
-        let course = self.history(candidate.setting, run);
-        let moment = course.errors.len() - 1;
+        let history = self.history(candidate.setting, run);
+        let moment = history.errors.len() - 1;
         let share = format!("{} of {} frames", self.bench.moments()[moment], self.bench.frames);
         let over = match self.demand {
             Demand::BudgetMs(ms) => run.ms_per_frame > OVER_BUDGET * ms,
             Demand::Default | Demand::Error(_) => false,
         };
-        let nearer = others.iter().any(|other| course.is_dominated_by(other));
+        let nearer = others.iter().any(|other| history.is_dominated_by(other));
         if over {
             candidate.abandoned = Some(format!("abandoned after {share}: over budget"));
         } else if nearer {
             candidate.abandoned = Some(format!(
                 "abandoned after {share}: the error was {:.1} %, and a cheaper setting was much more accurate",
-                100.0 * course.errors[moment]
+                100.0 * history.errors[moment]
             ));
         }
         if over || nearer { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

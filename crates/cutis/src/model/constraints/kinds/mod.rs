@@ -151,8 +151,8 @@ pub fn constraint_kinds() -> impl Iterator<Item = &'static str> {
     KINDS.iter().map(|row| row.key)
 }
 
-/// The name of a part of the solver in all reports. A kind has the name of its key, whichever of
-/// its constraint types the solver holds. Other parts keep the solver's name.
+/// The name of a part of the solver in all reports. A kind has the name of its key,
+/// for each of its constraint types. Other parts keep the solver's name.
 pub(crate) fn report_name(solver_name: &str) -> &str {
     let named = KINDS.iter().find(|row| row.facts.solver_names.contains(&solver_name));
     named.map_or(solver_name, |row| row.key)
