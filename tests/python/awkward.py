@@ -23,12 +23,12 @@ REFUSED = {
 NIBABEL_DIFFERS = {
     "no_form.nii.gz": (
         {"affine"},
-        "without sform and qform nibabel centers the volume and mirrors x; the standard only scales",
+        "without sform and qform nibabel centers and mirrors the volume; the standard only scales",
     ),
 }
 ITK_DIFFERS = {
     "no_form.nii.gz": ({"affine"}, "without sform and qform ITK takes the axes for LPS"),
-    "q_s_conflict.nii.gz": ({"affine"}, "ITK prefers the qform; Cutis and nibabel prefer the sform"),
+    "q_s_conflict.nii.gz": ({"affine"}, "ITK prefers the qform, Cutis and nibabel the sform"),
     "i16_slope0.nii.gz": (
         {"hu_min", "hu_max", "hu_sum"},
         "slope 0 means unscaled; ITK adds the intercept",

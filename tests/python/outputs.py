@@ -99,7 +99,9 @@ def header_problems(path):
         "slope 1": image.dataobj.slope == 1.0 and image.dataobj.inter == 0.0,
         "mm": header.get_xyzt_units()[0] == "mm",
         "codes 1": int(header["qform_code"]) == int(header["sform_code"]) == 1,
-        "qform = sform": np.allclose(image.get_qform(), image.get_sform(), rtol=0.0, atol=POSITION_SHARE * min(header.get_zooms())),
+        "qform = sform": np.allclose(
+            image.get_qform(), image.get_sform(), rtol=0.0, atol=POSITION_SHARE * min(header.get_zooms())
+        ),
     }
     return [f"header is not {name}" for name, held in wanted.items() if not held]
 

@@ -60,8 +60,8 @@ fn a_gpu_gives_the_same_bits() {
         // The GPU looks up the tetrahedron of a voxel in single precision.
         let found = nifti::read(folder.path().join("deformed.nii.gz")).unwrap().volume;
         assert!(share_differing(cpu.deformed().voxels(), found.voxels()) < 1e-4);
-        // Half of the run is on the GPU and half on the CPU. Without resampling the device only relaxes
-        // the chain.
+        // Half of the run is on the GPU and half on the CPU. Without resampling the device only
+        // relaxes the chain.
         let other = tempfile::tempdir().unwrap();
         let mut half = first(3, &loaded);
         half.scene.output.volume = false;

@@ -11,10 +11,10 @@ const HEAD: &str = "# Scene reference
 
 `cutis scene reference` writes this page from the schema of the program; do not edit it by hand.
 
-A scene is a TOML file. Lengths are millimeters. Positions are world millimeters in the volume's RAS+
-frame (x to the right, y to the front, z to the head). All other values are in SI units. Moduli,
-lengths, factors and durations are above 0 unless their row says otherwise. Unknown keys and values
-out of range are refused by name. `cutis scene new` prints a scene to start from.
+A scene is a TOML file. Lengths are millimeters. Positions are world millimeters in the volume's
+RAS+ frame (x to the right, y to the front, z to the head). All other values are in SI units.
+Moduli, lengths, factors and durations are above 0 unless their row says otherwise. Unknown keys
+and values out of range are refused by name. `cutis scene new` prints a scene to start from.
 ";
 
 /// Returns the reference as Markdown: one table per section, in the order of the schema.
