@@ -16,7 +16,7 @@ pub const CHAINMAIL: &[Mutation] = &[
         ChainMail,
         "ChainMail: nothing is lowered",
         "crates/cutis-chainmail/src/pass.rs",
-        "self.propagate::<false, true>(&waiting, &mut passed);",
+        "self.propagate::<false, true>(&waiting, &mut result);",
         "",
     ),
     mutation(

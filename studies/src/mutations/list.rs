@@ -63,7 +63,7 @@ impl Suite {
     pub fn arguments(self) -> &'static [&'static str] {
         match self {
             Self::Conformance => &["-p", "cutis-conformance", "--test", "all", "builtin"],
-            Self::Solver => &["-p", "cutis-solver-gpu", "--test", "suite"],
+            Self::Solver => &["-p", "cutis-solver-gpu", "--test", "all"],
             Self::Resample => &["-p", "cutis-resample", "--features", "gpu", "--test", "all", "gpu::"],
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],
             Self::Stability => &["-p", "cutis-tests", "--test", "all", "stability::"],

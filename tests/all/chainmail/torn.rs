@@ -13,7 +13,7 @@ fn warned(warnings: &[String]) -> Option<(usize, Point3<f64>, f64, bool)> {
     let line = all.next()?;
     assert!(all.next().is_none() && line.contains("chainmail.materials") && line.contains("mm"), "{line}");
     let between = |from: &str, to: &str| line.split_once(from).unwrap().1.split_once(to).unwrap().0;
-    let place: Vec<f64> = between("rests at [", "]").split(", ").map(|c| c.parse().unwrap()).collect();
+    let place: Vec<f64> = between("the vertex at [", "]").split(", ").map(|c| c.parse().unwrap()).collect();
     let links = line.split(' ').next().unwrap().parse().unwrap();
     let excess = between("by up to ", " mm").parse().unwrap();
     Some((links, Point3::from_slice(&place), excess, line.contains("is fixed")))

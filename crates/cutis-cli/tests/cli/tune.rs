@@ -60,7 +60,7 @@ fn tune_prints_its_result_and_writes_a_copy_with_comments() {
     tune(&desk, "--error 40").expect_error(2, &["scene-tuned.toml", "--force", "-o"]);
     tune(&desk, "-o scene.toml --force").expect_error(2, &["scene.toml", "the scene itself"]);
     let done = tune(&desk, "--error 40 --force --settings-only").expect_success();
-    for words in ["reference", "asked for", "ms/frame", "opening", "> picked", "written:"] {
+    for words in ["reference", "target", "ms/frame", "opening", "> picked", "written:"] {
         assert!(done.stdout.contains(words), "no {words:?} in {}", done.stdout);
     }
 }
