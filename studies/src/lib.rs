@@ -1,8 +1,8 @@
-//! Studies: what was measured, one module for each page of `docs/results`. `cargo xtask study NAME`
+//! Studies: measurements, with one module for each page of `docs/results`. `cargo xtask study NAME`
 //! runs one.
 //!
-//! The figures are for readers. What must hold after every change is in `tests/`, which uses the
-//! problems of this crate.
+//! The figures are for readers. Requirements that must hold after every change are tested in
+//! `tests/`, which uses the problems of this crate.
 
 pub mod accuracy;
 pub mod cantilever;
@@ -20,7 +20,7 @@ pub mod tuning;
 mod tests {
     use crate::kit::Page;
 
-    /// A study that ends with a page that it cannot write would have measured for nothing.
+    /// A study that cannot write its page at the end has measured in vain.
     #[test]
     fn every_page_has_the_tables_of_its_study() {
         for (name, tables) in [

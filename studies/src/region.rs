@@ -76,8 +76,8 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         for (region, grading) in VARIANTS {
             variants.push(Variant::of(region, grading, &simulate((region, grading), &[])?)?);
         }
-        // A second run in the opposite order, since other programs may slow down parts of the
-        // first.
+        // Run everything again in the opposite order, because other programs may slow down parts of
+        // the first run.
         for (&choice, variant) in VARIANTS.iter().zip(&mut variants).rev() {
             let again = simulate(choice, &["--frames", TIMED_FRAMES])?;
             variant.ms_min = variant.ms_min.min(number_at(&again, "/frames/ms_min")?);

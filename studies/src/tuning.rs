@@ -39,7 +39,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let program = Program::build()?;
     let folder = target_dir()?.join("studies/tuning");
     fs::create_dir_all(&folder)?;
-    // A path relative to the root, so that the calibration holds no path of this machine.
+    // A path relative to the root, so that the calibration contains no path of this machine.
     let copy = folder.strip_prefix(root()).unwrap_or(&folder).join("demo-tuned.toml");
     eprintln!("cutis tune {SCENE}");
     let document = program.run(|command| {

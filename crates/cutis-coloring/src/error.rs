@@ -24,7 +24,7 @@ pub enum ColoringError {
         /// The repeated vertex.
         vertex: u32,
     },
-    /// There are more constraints than a `u32` can number.
+    /// There are more constraints than 32-bit indices can address.
     #[error("{count} constraints; at most {limit} can be numbered in 32 bits")]
     TooManyConstraints {
         /// Number of constraints.
@@ -32,7 +32,7 @@ pub enum ColoringError {
         /// The largest allowed number.
         limit: usize,
     },
-    /// There are more vertices than a `u32` can number.
+    /// There are more vertices than 32-bit indices can address.
     #[error("{count} vertices; at most {limit} can be numbered in 32 bits")]
     TooManyVertices {
         /// Number of vertices.

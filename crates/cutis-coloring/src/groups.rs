@@ -6,8 +6,8 @@ use crate::sort::{self, check_constraint_count, filled};
 /// Constraints divided into groups (colors) so that no two constraints of a group share a vertex.
 ///
 /// The constraints of group `c` are `order[offsets[c]..offsets[c + 1]]`, in ascending order. No
-/// group is empty. Groups made by this crate have these properties. Use [`verify`](Groups::verify)
-/// for others.
+/// group is empty. Groups from this crate have these properties. Use [`verify`](Groups::verify) to
+/// check other groups.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Groups {
     /// Constraint indices, group after group.
@@ -56,7 +56,7 @@ impl Groups {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Whether there is no group, and so no constraint.
+    /// True if there are no groups, and therefore no constraints.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,4 +1,4 @@
-//! Graph coloring of constraints: index tuples in, groups without shared vertices out.
+//! Graph coloring of constraints: divides index tuples into groups in which no two share a vertex.
 //!
 //! Two constraints that share a vertex cannot be projected at the same time. A coloring gives each
 //! constraint a color so that constraints of one color share no vertex. A solver processes one
@@ -6,8 +6,9 @@
 //! and the result has the same bits. The coloring only sees vertex indices, never the kind of a
 //! constraint.
 //!
-//! A solver that moves one vertex after the other needs groups of vertices instead, no two of which
-//! are in one constraint. [`greedy_vertices`] finds them from the [`Incidence`] of each kind.
+//! A solver that moves one vertex after the other needs groups of vertices instead. No two vertices
+//! of a group may be in one constraint. [`greedy_vertices`] finds them from the [`Incidence`] of
+//! each kind.
 //!
 //! ```
 //! use cutis_coloring::greedy;

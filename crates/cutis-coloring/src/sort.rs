@@ -24,7 +24,7 @@ pub(crate) fn check_constraint_count(count: usize) -> Result<(), ColoringError> 
 
 /// Writes `items` to `sorted` by ascending key. Items with equal keys keep their order.
 ///
-/// `counts[key]` is the number of items with this key. `sorted` is as long as there are items.
+/// `counts[key]` is the number of items with this key. `sorted` has one place for each item.
 pub(crate) fn by_key(
     items: impl Iterator<Item = u32>,
     keys: impl Iterator<Item = usize>,

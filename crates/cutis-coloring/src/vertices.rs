@@ -1,5 +1,5 @@
-//! Groups of vertices, no two of which are in one constraint, for solvers that move one vertex
-//! after the other.
+//! Groups of vertices for solvers that move one vertex after the other. No two vertices of a group
+//! are in one constraint.
 
 use crate::sort::{self, filled};
 use crate::{ColoringError, Groups, Incidence, Tuples};
@@ -12,9 +12,9 @@ const NONE: u32 = u32::MAX;
 /// The result names only the moving vertices. A constraint may have several fixed ones.
 ///
 /// `kinds` and `incidences` have one entry per kind, in the same order. `moves` has one entry per
-/// vertex. The cost is one look at each vertex of each constraint of each vertex, and 4 bytes per
-/// vertex and color in addition to the result. The color of a vertex is at most the number of its
-/// neighbors.
+/// vertex. For each vertex, the function visits every vertex of every constraint that contains it.
+/// It needs 4 bytes per vertex and color in addition to the result. The color of a vertex is at
+/// most the number of its neighbors.
 ///
 /// # Errors
 /// [`ColoringError::OutOfMemory`].

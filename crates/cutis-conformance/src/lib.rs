@@ -14,9 +14,9 @@
 //! | [`gradient`](checks::gradient) | `∇C` is the gradient of `C` | a gradient off by 1e-3; two swapped |
 //! | [`momentum`](checks::momentum) | gradients sum to zero and have no torque | one off by 1e-3; a couple |
 //! | [`scale`](checks::scale) | the formula contains no length and no epsilon | a length of 1e-20 m |
-//! | [`parameters`](checks::parameters) | each parameter matters in the samples | (the check itself: an idle parameter fails) |
+//! | [`parameters`](checks::parameters) | each parameter has an effect on the samples | (the check itself: a parameter without effect fails) |
 //! | [`precision`](checks::precision) | `f32` is near `f64` | value or gradient off by 1e-3 |
-//! | [`lanes`](checks::lanes) | a SIMD lane has the bits of the scalar | the next lane |
+//! | [`lanes`](checks::lanes) | a SIMD lane gives the same bits as scalar code | the next lane |
 //! | [`degenerate`](checks::degenerate) | collapsed shapes stay finite | a division by zero |
 //! | [`wgsl`](checks::wgsl) | the shader is valid, `Params` has the layout of the host | an unknown name, an extra parameter, `normalize` |
 //! | [`projection`](checks::projection) | threads give the bits of the reference | value or gradient off by 1e-3 |

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// The sequence of a seed.
+    /// The sequence for a seed.
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }

@@ -49,7 +49,7 @@ fn thickness(x: &[Point3<f64>]) -> f64 {
 /// Degenerate shapes and their descriptions: all points at zero, at one place, on a line or in a
 /// plane, and each pair of points at one place.
 pub(crate) fn degenerate<const N: usize>() -> Vec<(String, [Point3<f64>; N])> {
-    // These are no round numbers, so that no result is exact by chance.
+    // These numbers are not round, so that no result is exact by chance.
     let (origin, along, across) =
         (Point3::new(0.1, -0.7, 1.3), Vector3::new(0.8, 1.0, -1.1), Vector3::new(-0.5, 1.5, -0.7));
     let step = |i: usize| i as f64 * (1.0 + i as f64) / 3.0;

@@ -135,8 +135,8 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     const WGSL: &'static str;
     /// The scalars of one constraint, `[T; K]`.
     type Params<T: Real>: Params<T>;
-    /// The choices of the caller when a constraint is built from its rest shape, such as a
-    /// rest-area scale.
+    /// Material values that the caller chooses when a constraint is built from its rest shape, such
+    /// as a rest-area scale.
     type Material;
     /// Parameters of a constraint with the rest shape `x` (positions in meters).
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;

@@ -1,15 +1,15 @@
 //! Compliances from material parameters that do not depend on the mesh.
 //!
-//! A compliance `α` turns a constraint `C` into the energy `C²/(2α)` in joules. Each formula here
-//! divides out the size of the element. Refining a mesh therefore changes the compliances but not
-//! the material. Arguments and results are `f64` in SI units. An infinite modulus means a rigid
+//! A compliance `α` turns a constraint `C` into the energy `C²/(2α)` in joules. Each formula
+//! contains the size of the element. Refining a mesh therefore changes the compliances but not the
+//! material. Arguments and results are `f64` in SI units. An infinite modulus means a rigid
 //! material: `α = 0`.
 
 /// An invalid material parameter or rest size.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaterialError {
-    /// A value that must be above 0 is not, or is not a number.
+    /// A value that must be above 0 is 0 or less, infinite where that is not allowed, or NaN.
     #[error("{quantity} is {value} {unit}; it must be a finite number above 0")]
     NotPositive {
         /// Name of the quantity.

@@ -12,8 +12,8 @@ use crate::{
 /// Copies to and from buffers consist of whole words of 4 bytes.
 pub(crate) const WORD: u64 = 4;
 
-/// Size of a part of an upload in bytes. Large contents are uploaded in parts, so that no complete
-/// second copy has to fit in memory.
+/// Size of a part of an upload in bytes. Large contents are uploaded in parts, so that memory does
+/// not have to hold a second complete copy.
 pub(crate) const PART: usize = 16 << 20;
 
 /// A buffer of `len` elements of `T` on the device. Its memory is freed when the buffer and the
@@ -164,8 +164,8 @@ impl<T> Buffer<T> {
         self.len == 0
     }
 
-    /// Returns the memory on the device in bytes: that of the elements, padded to a multiple of 4
-    /// and never 0.
+    /// Returns the memory on the device in bytes: the size of the elements, padded to a multiple of
+    /// 4, and never 0.
     pub fn bytes(&self) -> u64 {
         self.raw.size()
     }

@@ -155,8 +155,8 @@ impl Gpu {
         self.shared.tally.snapshot()
     }
 
-    /// Waits until all submitted work is done, without a readback. For example to time work from
-    /// the host.
+    /// Waits until all submitted work is done, without a readback. Use it, for example, to time
+    /// work from the host.
     ///
     /// # Errors
     ///
@@ -165,8 +165,8 @@ impl Gpu {
         self.flush(&|| "waiting for the device".to_owned())
     }
 
-    /// Destroys the device like a reset of the driver. Every later call returns [`GpuError::Lost`].
-    /// For tests of programs whose GPU disappears.
+    /// Destroys the device, with the same effect as a reset of the driver. Every later call returns
+    /// [`GpuError::Lost`]. Use it to test how a program handles a lost GPU.
     pub fn lose(&self) {
         // The lock ensures that no other thread has memory of the device mapped.
         let _staging = lock(&self.shared.staging);

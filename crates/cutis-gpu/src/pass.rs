@@ -25,9 +25,9 @@ impl Gpu {
 }
 
 impl Pass<'_> {
-    /// Runs a kernel with `threads` threads, rounded up to whole workgroups. So a kernel must
-    /// ignore threads beyond its items. For 0 threads nothing runs. The order of the groups does
-    /// not matter.
+    /// Runs a kernel with `threads` threads, rounded up to whole workgroups. A kernel must
+    /// therefore ignore threads beyond its items. For 0 threads nothing runs. `groups` may be in
+    /// any order.
     ///
     /// [`Pass::submit`] returns an error for more threads than [`Gpu::chunk_len`] allows and for
     /// bind groups of another kernel.
@@ -80,8 +80,9 @@ impl Pass<'_> {
     ///
     /// # Errors
     ///
-    /// Returns the first error of the recording, [`GpuError::Validation`] if the device rejects the
-    /// work, [`GpuError::OutOfMemory`] or [`GpuError::Lost`]. In these cases nothing runs.
+    /// Returns the first error that occurred while the pass was recorded, [`GpuError::Validation`]
+    /// if the device rejects the work, [`GpuError::OutOfMemory`] or [`GpuError::Lost`]. In these
+    /// cases nothing runs.
     pub fn submit(mut self) -> Result<(), GpuError> {
         self.gpu.alive()?;
         if let Some(error) = self.error {

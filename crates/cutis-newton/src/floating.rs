@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::{NewtonError, Problem};
 
-/// Gradients whose sum is below this fraction of their sizes sum to zero: moving the constraint as
-/// a whole costs nothing.
+/// If the sum of a constraint's gradients is below this fraction of their sizes, it counts as zero.
+/// Moving such a constraint as a whole costs no energy.
 const NO_FORCE: f64 = 1e-9;
 
 /// Refuses a body with a connected part that nothing holds.

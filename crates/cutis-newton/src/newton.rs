@@ -9,7 +9,7 @@ use crate::{NewtonError, Options};
 
 /// Fraction of the decrease predicted by the slope that a step must reach (Armijo).
 const DECREASE: f64 = 1e-4;
-/// Shortest step length. Shorter steps are given up.
+/// Shortest step length. The line search ends without a result below it.
 const SHORTEST: f64 = 1e-9;
 /// The least fraction of the negative curvature that is flipped.
 const LEAST_FLIPPED: f64 = 1e-3;

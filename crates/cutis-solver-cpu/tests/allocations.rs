@@ -58,7 +58,7 @@ fn settings(iterations: u32) -> Settings {
     Settings { formulation: Formulation::Xpbd, iterations, ..Settings::default() }
 }
 
-/// Returns the number of allocations of `steps` calls of `step`, after a first call.
+/// Returns the number of allocations in `steps` calls of `step`. A first call is not counted.
 fn allocations(solver: &mut dyn Solver<f32>, steps: usize) -> usize {
     solver.step(1).unwrap();
     let before = ALLOCATIONS.load(Ordering::Relaxed);

@@ -1,10 +1,10 @@
 //! Vertex block descent on the device: slabs of the body, and chunks of vertices that move in
 //! parallel.
 //!
-//! Each vertex of a constraint reads it, and the vertices of a constraint have different colors. So
-//! constraints are stored by **slab** and not by color. A slab is a range of vertices whose
-//! constraints fit one binding per array. All colors of a slab share its arrays. A body that fits
-//! the device's bindings is one slab, and each of its constraints is stored once.
+//! All vertices of a constraint read it, and these vertices have different colors. Constraints are
+//! therefore stored by **slab** and not by color. A slab is a range of vertices whose constraints
+//! fit one binding per array. All colors of a slab share its arrays. A body that fits the device's
+//! bindings is one slab, and each of its constraints is stored once.
 
 use std::ops::Range;
 
@@ -215,7 +215,7 @@ impl SlabConstraints {
 }
 
 /// Returns ranges of vertices whose constraints and entries fit one binding per array. A vertex
-/// that needs more is a slab on its own, and its buffers exceed the device's limits.
+/// that needs more forms a slab by itself. The buffers of such a slab exceed the device's limits.
 fn slabs(gpu: &Gpu, kinds: &[Kind<f32>], descent: &Descent<f32>) -> Vec<Range<u32>> {
     let mut order = descent.groups().order.clone();
     order.sort_unstable();

@@ -6,7 +6,7 @@ use cutis_shaders::solver;
 use crate::body::DeviceBody;
 
 /// Kernel and buffers of the last request. They are kept, because a caller that reads positions
-/// every frame reads those of the same vertices.
+/// every frame usually reads the same vertices.
 pub(crate) struct Gather {
     kernel: Kernel,
     wanted: Vec<u32>,

@@ -6,7 +6,7 @@
 //! multiplication with an addition, and then differs by rounding.
 //!
 //! - **The state stays on the device.** A frame is one submission, or several for a very long
-//!   frame. A call of `step` reads back twelve bytes, which tell whether all positions are finite.
+//!   frame. A call of `step` reads back twelve bytes, which show whether all positions are finite.
 //!   Everything else is read on request: [`positions_of`](cutis_solver::Solver::positions_of) reads
 //!   only the requested vertices, and [`residuals`](cutis_solver::Solver::residuals) reads two
 //!   numbers per 64 constraints. [`SolverGpu::vertices`] gives other kernels access to the
@@ -14,8 +14,8 @@
 //! - **Chunks.** The constraints of a color are stored in parts that fit WebGPU's baseline limits
 //!   on bindings, buffers and workgroups. Constraints of a color share no vertex, so the result
 //!   does not depend on the split.
-//! - **Pipelines and buffers only for parts in use.** Kinds, handles, multipliers and measurements
-//!   that a body does not use have none.
+//! - **Only parts in use have pipelines and buffers.** Unused kinds of constraints, handles,
+//!   multipliers and measurements have neither.
 //!
 //! ```
 //! use cutis_constraints::Distance;

@@ -1,4 +1,4 @@
-//! Recording of the work of a frame, in one pass, or in one timed pass per part.
+//! Records the work of a frame in one pass, or in one timed pass per part.
 
 use std::time::Instant;
 
@@ -29,7 +29,7 @@ impl<'a> Recorder<'a> {
     /// Returns the pass that records the work of `part`.
     ///
     /// # Errors
-    /// Returns the errors of [`submit`](Self::submit) for the part before.
+    /// Returns the errors of [`submit`](Self::submit) for the previous part.
     pub(crate) fn pass_for(&mut self, part: &'static str) -> Result<&mut Pass<'a>, GpuError> {
         if self.profiling.as_ref().is_some_and(|profiling| profiling.part != part) {
             self.submit()?;

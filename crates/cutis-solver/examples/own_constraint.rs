@@ -33,7 +33,7 @@ impl Constraint<1> for OnCylinder {
         [(x.x * x.x + x.z * x.z).simd_sqrt()]
     }
 
-    // No branches: this code also runs on SIMD lanes, where each lane may take another side.
+    // Do not branch: this code also runs on SIMD lanes, and lanes may need different results.
     fn eval<T: Real>([x]: &[Point3<T>; 1], &[radius]: &[T; 1]) -> Eval<T, 1> {
         let zero = T::zero();
         let d = Vector3::new(x.x, zero, x.z);

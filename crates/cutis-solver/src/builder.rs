@@ -22,8 +22,8 @@ impl<T: Scalar> SystemBuilder<T> {
     /// Starts a system with positions in meters and inverse masses in 1/kg (0 = fixed), one of
     /// each per vertex. Their number type may differ from the solver's.
     ///
-    /// Along each axis on which the body lies farther from zero than its own extent, the solver
-    /// subtracts the center of the body, so that single precision is not lost to the distance.
+    /// If the body is farther from zero along an axis than its own extent, the solver subtracts the
+    /// center of the body on this axis. Positions in single precision then keep their accuracy.
     /// [`System::positions`] returns the caller's coordinates exactly.
     ///
     /// # Errors
@@ -164,9 +164,9 @@ impl<T: Scalar> SystemBuilder<T> {
     }
 
     /// Sets color groups of the vertices for [`Formulation::Vbd`](crate::Formulation::Vbd). Use it
-    /// where better groups are known than greedy coloring finds, for example those of a lattice in
-    /// closed form. The groups may contain vertices that do not move. They are checked when a
-    /// solver is built. Other formulations ignore them.
+    /// if you know better groups than greedy coloring finds, for example the closed-form groups of
+    /// a lattice. The groups may contain vertices that do not move. They are checked when a solver
+    /// is built. Other formulations ignore them.
     pub fn vertex_groups(mut self, groups: Groups) -> Self {
         self.system.vertex_groups = Some(Arc::new(groups));
         self

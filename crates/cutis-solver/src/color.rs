@@ -34,7 +34,7 @@ impl<T: Scalar> ConstraintColor<'_, T> {
 /// them.
 pub struct VertexColor<'a, T: Scalar> {
     pub(crate) system: &'a mut System<T>,
-    /// Belongs to `system`.
+    /// The descent data of `system`.
     pub(crate) descent: &'a Descent<T>,
     pub(crate) pass: ColorPass,
 }

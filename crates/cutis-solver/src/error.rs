@@ -119,7 +119,7 @@ pub enum SolverError {
         kind: &'static str,
         /// Indices of the vertices of the constraint.
         vertices: Vec<u32>,
-        /// Value over rest size.
+        /// The constraint's value divided by its rest size.
         ratio: f64,
     },
     /// A stiffness or a compliance is out of range.

@@ -15,11 +15,11 @@
 //!   `Δx_i = w_i ∇_iC Δλ`, with `α̃ = α/h²` and `λ = 0` at the start of every substep.
 //! - [`Formulation::Vbd`] (Chen et al. 2024): vertex block descent with the same energies `½C²/α`.
 //!   The energy of the implicit step decreases vertex by vertex. See [`VertexForce`] for the force
-//!   on a vertex, and `descent.rs` for the differences to the source.
+//!   on a vertex, and `descent.rs` for the differences from the source.
 //!
-//! A note that is not legal advice: US patent 11,270,041 B2 is said to read on accumulating λ over
-//! iterations. `Pbd` and `Vbd` have no λ, and `Xpbd` with one iteration per substep neither stores
-//! nor accumulates one. All of them are complete.
+//! US patent 11,270,041 B2 is said to cover the accumulation of λ over iterations. This is not
+//! legal advice. `Pbd` and `Vbd` have no λ, and `Xpbd` with one iteration per substep neither
+//! stores nor accumulates one. Each of the three is a complete method.
 //!
 //! # Example
 //! A mass on a spring of compliance 0.01 m/N, released at 1.1 times its rest length:

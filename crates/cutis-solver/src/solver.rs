@@ -23,10 +23,10 @@ pub trait Solver<T: Scalar>: Send {
     /// [`SolverError::Device`] if a device fails.
     fn step(&mut self, frames: usize) -> Result<(), SolverError>;
 
-    /// Runs `frames` frames with the bits of [`step`](Self::step) and adds the duration of each
-    /// part to `profile`. On a CPU backend the overhead is negligible. On a device the host waits
-    /// for each part, so that the parts take longer than a plain step. After an error, the profile
-    /// contains the parts that ran before it.
+    /// Runs `frames` frames and adds the duration of each part to `profile`. The result has the
+    /// same bits as that of [`step`](Self::step). On a CPU backend the overhead is negligible. On a
+    /// device the host waits for each part, so that the parts take longer than a plain step. After
+    /// an error, the profile contains the parts that ran before it.
     ///
     /// # Errors
     /// Returns the errors of [`step`](Self::step).

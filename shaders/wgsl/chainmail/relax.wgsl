@@ -1,5 +1,6 @@
-// Half a sweep of the ChainMail relaxation: one coordinate of the elements of a slab with even, or
-// odd, i + j + k. The same operations as `Plane::relax`.
+// Half a sweep of the ChainMail relaxation. It moves one coordinate of those elements of a slab
+// whose i + j + k is even, or of those whose i + j + k is odd. The same operations as
+// `Plane::relax`.
 //
 // All neighbors of such an element have the other parity, so that no thread reads an element that
 // another thread writes. All numbers are integers, and sums wrap as in Rust.

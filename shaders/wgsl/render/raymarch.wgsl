@@ -1,6 +1,6 @@
 // One thread per ray. xyz of a ray is its start as a continuous index, and w is its length in
-// steps, negative for a ray that misses the volume. The result is the linear light, with the number
-// of steps to the surface as w, or −1 without surface.
+// steps, negative for a ray that misses the volume. The result is the linear light. Its w is the
+// number of steps to the surface, or −1 if the ray does not hit the surface.
 
 @group(0) @binding(4) var<storage, read> rays: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> found: array<vec4f>;

@@ -6,7 +6,8 @@ struct Box {
     end: vec3u,
 }
 
-// The voxels whose centers can lie in the tet or within the tolerance. Without any, `end` is zero.
+// The voxels whose centers can lie in the tet or within the tolerance. If there are none, `end` is
+// zero.
 fn box_of(p: Corners) -> Box {
     let region = vec3f(grid.region_x, grid.region_y, grid.region_z);
     let last = vec3f(f32(grid.columns - 1u), f32(grid.rows - 1u), f32(grid.slices - 1u));

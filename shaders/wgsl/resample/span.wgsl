@@ -9,7 +9,8 @@
 @group(0) @binding(4) var<storage, read_write> reaches: array<atomic<u32>>;
 @group(1) @binding(2) var<storage, read_write> spans: array<vec2u>;
 
-// The first slice in the lower half of a word and the end in the upper half. Zero without slices.
+// The first slice in the lower half of a word and the end in the upper half. Zero if the tet
+// touches no slice.
 fn span_of(p: Corners) -> u32 {
     if !(is_finite_3(p.a) && is_finite_3(p.b) && is_finite_3(p.c) && is_finite_3(p.d)) {
         return 0u;

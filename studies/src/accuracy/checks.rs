@@ -11,13 +11,13 @@ use crate::kit::{Checks, Failure, larger, percent};
 const CONVERGED: f64 = 0.01;
 /// Largest E3 of the best setting of XPBD.
 const CLOSE: f64 = 0.05;
-/// Largest difference in E1 between `f32` and `f64`. With short substeps the last place of a
-/// position is a good part of a step.
+/// Largest difference in E1 between `f32` and `f64`. With short substeps, the last digit of a
+/// position is a large part of the motion in a step.
 const SINGLE: f64 = 0.05;
-/// A wrong substep has a larger E1.
+/// The control with a wrong substep must have a larger E1.
 const WRONG_STEP: f64 = 0.01;
-/// Factor by which an error may rise where it ought to fall: rounding, and root mean squares of a
-/// sweep that moves the last vertices most.
+/// Factor by which an error may rise where it should fall. The causes are rounding, and root mean
+/// squares of a sweep that moves the last vertices most.
 const SLACK: f64 = 1.05;
 
 /// Checks the measurements of one problem.

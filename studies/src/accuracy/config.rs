@@ -73,7 +73,7 @@ pub fn first_gpu() -> Result<Option<Gpu>, Failure> {
     Ok(Some(Gpu::open(&options)?))
 }
 
-/// How a substep is solved.
+/// Method that solves a substep.
 #[derive(Clone, Copy)]
 pub struct Method {
     /// `xpbd`, `vbd` or `pbd`.

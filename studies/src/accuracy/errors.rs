@@ -20,8 +20,8 @@ pub fn relative_rms(
     (off / whole).sqrt()
 }
 
-/// Factor on the load that would move the body as far as it should: `u·u / u·u'`, with the
-/// displacements `u` of the right answer and `u'` of the result, over the vertices that are `free`.
+/// Factor on the load that would move the body as far as the reference: `u·u / u·u'`, with the
+/// displacements `u` of the reference and `u'` of the result, over the vertices that are `free`.
 pub fn stiffness_under_load(
     found: &[Point3<f64>],
     right: &[Point3<f64>],

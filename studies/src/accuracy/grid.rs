@@ -26,16 +26,18 @@ const FULL: Limits = Limits {
     times: 1,
 };
 const QUICK: Limits = Limits { substeps: &[1, 10, 40], sweeps: 20, raised: &[(1, 16), (10, 16)], times: 1 };
-/// For the serial reference and a software adapter, which are compared and not meant to be fast.
+/// Limits for the serial reference and a software adapter. They serve for comparison and are not
+/// expected to be fast.
 const SLOW: Limits = Limits { substeps: &[1, 10, 20], sweeps: 5, raised: &[(1, 64), (10, 8)], times: 1 };
 
 impl Limits {
-    /// The limits of a method that takes `times` as long.
+    /// The limits for a method whose iterations take `times` as long.
     fn shared_by(self, times: u32) -> Self {
         Self { times, ..self }
     }
 
-    /// Substeps and iterations, and whether there are few enough for a run to rest.
+    /// Substeps and iterations, and whether there are few enough for a run until the body is at
+    /// rest.
     fn pairs(self) -> Vec<([u32; 2], bool)> {
         let of = |&s: &u32| {
             let most = (self.sweeps / self.times / s).max(1);

@@ -42,7 +42,7 @@ pub struct Measurement {
     /// E4: the largest error in `residuals`.
     pub e4: Option<f64>,
     /// Motion in the second half of the frames over the displacement at the end. E3 and E4 contain
-    /// this much error of time.
+    /// a temporal error of this size.
     pub residual_motion: Option<f64>,
     /// Opening of the wound over the opening at the equilibrium.
     pub opening: Option<f64>,
@@ -50,7 +50,7 @@ pub struct Measurement {
     pub stiffness: Option<f64>,
     /// E4 of each kind of constraint.
     pub residuals: Vec<KindError>,
-    /// Why the run ended early.
+    /// Reason why the run ended early.
     pub failure: Option<String>,
 }
 
@@ -98,7 +98,7 @@ impl Measurement {
         }
     }
 
-    /// True if the body had not come to rest. E3 and E4 then contain an error of time.
+    /// True if the body had not come to rest. E3 and E4 then contain a temporal error.
     pub fn still_moves(&self) -> bool {
         self.residual_motion.is_some_and(|motion| motion.is_nan() || motion > AT_REST)
     }

@@ -15,7 +15,8 @@ use crate::kit::larger;
 /// Frames of a configuration before the next one runs, so that the load of the machine affects all
 /// alike.
 const ROUND: u32 = 5;
-/// Motion in a round over the displacement, below which a body is at rest and needs no more frames.
+/// A body is at rest and needs no more frames if its motion in a round, divided by its
+/// displacement, is below this.
 const STILL: f64 = 1e-6;
 
 /// A running configuration.
@@ -51,7 +52,8 @@ impl<'a> Entry<'a> {
         self.row.failure.is_some() || self.frame >= self.last_frame || settled
     }
 
-    /// Runs a few frames. Compares the positions at the frame of E2, and keeps those at the end.
+    /// Runs a few frames. Compares the positions at the frame of E2, and stores the final
+    /// positions.
     fn round(&mut self, problem: &Problem, reference: &Reference) -> Result<(), Failure> {
         for _ in 0..ROUND.min(self.last_frame - self.frame) {
             match self.running.frame_ms() {

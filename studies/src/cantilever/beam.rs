@@ -138,7 +138,7 @@ impl Beam {
     /// The same beam without the volume constraint of one tetrahedron, for controls.
     ///
     /// # Errors
-    /// The coloring fails; it does not.
+    /// The coloring fails. This does not happen, because the mesh is valid.
     pub fn without_tet(&self, tet: usize) -> Result<Self, Failure> {
         let mut beam = self.clone();
         beam.tets.remove(tet);

@@ -1,4 +1,4 @@
-//! The cases: beams with their materials, and settings of real time.
+//! The cases: beams with their materials, and real-time settings.
 
 use cutis_solver::Formulation;
 use serde::Serialize;
@@ -17,7 +17,7 @@ pub struct BeamCase {
     pub refinement: usize,
     /// Material.
     pub material: Material,
-    /// True if every setting of real time is tried.
+    /// True if every real-time setting is tried.
     #[serde(skip)]
     pub in_detail: bool,
     /// True for the case of the controls.
@@ -67,7 +67,7 @@ impl BeamCase {
     }
 }
 
-/// Settings of real time, with frames of 1/60 s: XPBD with 1 to 50 substeps of 1 to 5 iterations,
+/// Real-time settings, with frames of 1/60 s: XPBD with 1 to 50 substeps of 1 to 5 iterations,
 /// vertex block descent, and PBD with stiffness 1.
 pub fn real_time(damping_per_s: f64) -> Vec<Stepping> {
     let stepping = |formulation, substeps, iterations| Stepping {

@@ -22,7 +22,8 @@ const SINGLE: (f64, u32) = (2.0, 30);
 /// Largest motion of a beam at rest in a frame over its displacement, in double and in single
 /// precision.
 const STILL: (f64, f64) = (1e-6, 1e-4);
-/// Largest work in real time (substeps × iterations), except for the coarse beam that sags by 10 %.
+/// Largest number of sweeps (substeps × iterations) of a real-time setting, except for the coarse
+/// beam that sags by 10 %.
 const MOST_SWEEPS: u32 = 50;
 
 /// The file.
@@ -48,7 +49,7 @@ struct CaseResults {
     newton: Newton,
     /// Runs of the solver with short substeps.
     converged: Vec<Run>,
-    /// Runs of the solver in real time.
+    /// Runs of the solver with real-time settings.
     real_time: Vec<Run>,
     /// Displacement of the end by Newton's method with a deliberate fault, by the name of the
     /// fault.

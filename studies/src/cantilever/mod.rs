@@ -2,9 +2,10 @@
 //! FEM.
 //!
 //! The beam is square, four times as long as thick, on a `kuhn6` lattice of `cutis-mesh` along x;
-//! gravity is along −y. Where it comes to rest is a minimum of an energy, so that Newton's method
-//! (`cutis-newton`), finite elements (`tests/python`) and the solver with short substeps have to
-//! agree. With the few substeps of real time they differ, and the study measures how much.
+//! gravity is along −y. Its state of rest is a minimum of an energy. Newton's method
+//! (`cutis-newton`), finite elements (`tests/python`) and the solver with short substeps must
+//! therefore agree. With the few substeps of real-time settings the solver differs, and the study
+//! measures how much.
 
 mod beam;
 mod cases;
@@ -32,7 +33,7 @@ use crate::kit::{Provenance, write_json};
 #[derive(Clone, Debug, Parser)]
 #[command(name = "cantilever", bin_name = "cargo xtask study cantilever")]
 pub struct Options {
-    /// Only the cases of the tests: the coarse beam, no settings of real time, no GPU.
+    /// Only the cases of the tests: the coarse beam, no real-time settings, no GPU.
     #[arg(long, requires = "beams")]
     pub quick: bool,
     /// Bend the beams and write the results to this file, for tests/python/cantilever.py.

@@ -121,7 +121,7 @@ fn short_substeps(cases: &[Value]) -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// The setting of real time with the smallest error, for each case and formulation.
+/// The real-time setting with the smallest error, for each case and formulation.
 fn real_time(cases: &[Value]) -> Result<Table, Failure> {
     let mut table = Table::new([
         "case",

@@ -30,13 +30,13 @@ pub(super) struct Answer {
     pub(super) moved: usize,
     /// Mean displacement by ring, mm.
     pub(super) rings_mm: Vec<f64>,
-    /// Difference from the last answer over all vertices that moved in either: mean, 95 % and
-    /// largest, mm.
+    /// Difference from the result of the last model, over all vertices that moved in either: mean,
+    /// 95th percentile and maximum, mm.
     pub(super) differs_mm: [f64; 3],
     displacements: Vec<Vector3<f64>>,
 }
 
-/// The answers of all models to one drag. The last one is the reference.
+/// The results of all models for one drag. The last one is the reference.
 pub(super) struct Comparison {
     pub(super) scene: String,
     pub(super) vertices: usize,
@@ -51,7 +51,7 @@ const PBD: [(&str, &str); 3] = [
     ("run.frames", "120"),
 ];
 
-/// Materials that relax as far as single elements can.
+/// Materials whose elements can stretch, shorten and shear widely, and rigid bone.
 const ELASTIC: &str = "[{ from_hu = -1024, shortest = 0.4, longest = 1.8, shear = 0.8 }, \
                        { from_hu = 250, shortest = 1, longest = 1, shear = 0 }]";
 

@@ -62,7 +62,7 @@ impl Row for Answer {
     }
 }
 
-/// The answers of one comparison, with the size of its body.
+/// The results of one comparison, with the size of its body.
 pub(super) fn models(comparison: &Comparison) -> String {
     format!(
         "`{}` at {} mm, {} vertices:\n\n{}",

@@ -1,5 +1,5 @@
-//! What all studies share: tables and charts, the pages of `docs/results`, provenance, checks with
-//! controls, and the programs of the checkout.
+//! Tools shared by the studies: tables and charts, the pages of `docs/results`, provenance, checks
+//! with controls, and programs that run in the checkout.
 
 mod checkout;
 mod checks;

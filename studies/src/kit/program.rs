@@ -44,7 +44,7 @@ impl Program {
     /// report of the run.
     ///
     /// # Errors
-    /// As for [`run`](Self::run); no report was written.
+    /// The errors of [`run`](Self::run), or the run wrote no report.
     pub fn scene(
         &self,
         scene: &Path,

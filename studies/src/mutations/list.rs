@@ -1,4 +1,4 @@
-//! Mutations of constraints, GPU passes and resampling: faults that people make, each an edit of
+//! Mutations of constraints, GPU passes and resampling: typical programming faults, each an edit in
 //! one place.
 
 /// One fault.

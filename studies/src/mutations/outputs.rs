@@ -1,4 +1,4 @@
-//! Faults in what users look at: pictures, meshes, tables, reports and printed summaries.
+//! Faults in the outputs that users see: pictures, meshes, tables, reports and printed summaries.
 
 use super::list::Suite::Outputs;
 use super::list::{Mutation, mutation};

@@ -1,4 +1,4 @@
-//! The bench of a ring: a device, its policy, and the log that takes the comparisons.
+//! The bench of a ring: a device, its policy, and the log that records the comparisons.
 
 use cutis_gpu::Gpu;
 
@@ -19,7 +19,7 @@ pub enum Effort {
     Full,
 }
 
-/// A device in comparison.
+/// A device to compare with the CPU.
 pub struct Bench<'t, 'o> {
     /// The device.
     pub gpu: Gpu,
@@ -27,7 +27,7 @@ pub struct Bench<'t, 'o> {
     pub policy: Policy,
     /// Size of the scenes and number of frames.
     pub effort: Effort,
-    /// Takes the comparisons.
+    /// Records the comparisons.
     pub log: &'t mut Log<'o>,
 }
 

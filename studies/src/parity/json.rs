@@ -14,7 +14,7 @@ use crate::kit::{commit, load};
 /// Version of the layout.
 const SCHEMA: &str = "cutis-parity/1";
 
-/// Variables that change how a software driver works.
+/// Environment variables that change how a software driver works.
 const VARIABLES: [&str; 3] = ["LP_NUM_THREADS", "VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
 
 /// The whole result.
@@ -35,7 +35,7 @@ pub struct Document<'a> {
     pub rows: &'a [Comparison],
 }
 
-/// An adapter in comparison.
+/// An adapter that was compared with the CPU.
 #[derive(Serialize)]
 struct AdapterEntry {
     index: usize,

@@ -72,8 +72,8 @@ fn check(
     Ok(())
 }
 
-/// The controls with their rows. On software a control has two rows: within the tolerance, and for
-/// equality.
+/// The controls with their rows. On a software adapter a control has two rows, one for the
+/// tolerance and one for equality.
 fn controls(rows: &[Finding]) -> Vec<(&str, Vec<&Finding>)> {
     let mut found: Vec<(&str, Vec<&Finding>)> = Vec::new();
     for row in rows.iter().filter(|row| row.is_control()) {

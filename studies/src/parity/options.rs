@@ -23,8 +23,8 @@ pub struct Options {
     #[arg(long, conflicts_with = "quick")]
     pub full: bool,
     /// Instead of the rings: one step of a lattice of 129 × 129 × 289 vertices with three kinds of
-    /// constraints, within WebGPU's baseline limits. Needs about 3 GiB of memory, on a software
-    /// adapter for both sides together.
+    /// constraints, within WebGPU's baseline limits. Needs about 3 GiB of memory. On a software
+    /// adapter this includes the memory of the device.
     #[arg(long, conflicts_with_all = ["quick", "full", "chunk_cap"])]
     pub full_size: bool,
     /// Run with default limits, in small chunks and at full size, and write the tables of

@@ -1,8 +1,9 @@
 //! Bodies in their own units: material, initial state, and the system at a scale.
 //!
-//! At scale `s` lengths are `s` times as large; masses and times stay. Then energies grow by `s²`.
-//! A compliance `C²/U` stays for a length, grows by `s²` for an area and by `s⁴` for a volume. This
-//! is the same problem in another unit of length.
+//! At scale `s`, lengths are multiplied by `s`, and masses and times do not change. Energies are
+//! then multiplied by `s²`. A compliance `C²/U` does not change for a length. It is multiplied by
+//! `s²` for an area and by `s⁴` for a volume. The result is the same problem in another unit of
+//! length.
 
 use std::collections::BTreeMap;
 

@@ -12,7 +12,7 @@ pub enum End {
     Bounded,
     /// The largest value over rest size of every kind falls below this number and stays below.
     Recovers(f64),
-    /// The kinetic energy falls below a millionth of the energy put in and stays below.
+    /// The kinetic energy falls below a millionth of the available energy and stays below.
     Rests,
     /// No bit of a position has changed.
     Unmoved,
@@ -60,13 +60,13 @@ impl Default for Run {
 /// A case, before it runs on a backend at a scale.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Name: what is tried, and the stiffness.
+    /// Name: the topic of the case and its stiffness.
     pub name: String,
     /// The body.
     pub body: Body,
     /// Settings of the run.
     pub run: Run,
-    /// Largest total energy over the energy put in: see [`Meter`](super::energy::Meter).
+    /// Largest total energy over the available energy: see [`Meter`](super::energy::Meter).
     pub energy: f64,
     /// Requirement for the end of a run.
     pub end: End,

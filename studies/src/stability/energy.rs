@@ -6,9 +6,10 @@
 //! Vertex block descent steps implicitly, so there a compliance counts as it is. All sums are in
 //! `f64`, by [`evaluate`](cutis_solver::ConstraintSet::evaluate), from the stored parameters.
 //!
-//! Every projection rounds positions. An error of half a unit in the last place of a position is an
-//! error of the velocity of that much per substep. This random walk heats a body, and more so with
-//! shorter substeps. The energy that rounding can add counts as put in, and its share is reported.
+//! Every projection rounds positions. An error of half a unit in the last place of a position
+//! changes the velocity by this error divided by the substep. These errors are a random walk that
+//! heats a body, and more so with shorter substeps. The energy that rounding can add counts as
+//! available, and its share is reported.
 
 use cutis_constraints::Scalar;
 use cutis_solver::{Formulation, Settings, Stiffness, System};
@@ -16,8 +17,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::kit::larger;
 
-/// Largest total energy over the energy put in, if a substep resolves the stiffness: it does not
-/// grow.
+/// Largest total energy over the available energy if a substep resolves the stiffness. The energy
+/// then does not grow.
 pub const RESOLVED: f64 = 1.05;
 /// The same if a substep does not resolve the stiffness. The constraints of a vertex then move it
 /// one after the other within a substep. If they agree in direction, the kinetic energy is the
@@ -149,14 +150,14 @@ impl History {
         self.entries.push((energy, work));
     }
 
-    /// Energy put in: the energy at the start, the work of the handles, and the work of gravity
+    /// Available energy: the energy at the start, the work of the handles, and the work of gravity
     /// down to the lowest height.
     fn budget(&self, work: f64) -> f64 {
         let Some((start, _)) = self.entries.first() else { return 0.0 };
         start.kinetic + start.elastic + start.gravity - self.lowest() + work
     }
 
-    /// An energy over the energy put in until the end.
+    /// An energy over the available energy until the end.
     pub fn share(&self, energy: f64) -> f64 {
         let budget = self.entries.last().map_or(0.0, |(_, work)| self.budget(*work));
         if energy == 0.0 { 0.0 } else { energy / budget }
@@ -166,7 +167,7 @@ impl History {
         self.entries.iter().map(|(energy, _)| energy.gravity).fold(f64::INFINITY, f64::min)
     }
 
-    /// Largest total energy over the energy put in until then. `rounding` counts as put in.
+    /// Largest total energy over the available energy until then. `rounding` counts as available.
     pub fn worst_ratio(&self, rounding: f64) -> f64 {
         let ratio = |(energy, work): &(Energy, f64)| {
             let total = energy.kinetic + energy.elastic + energy.gravity - self.lowest();
@@ -177,8 +178,8 @@ impl History {
         self.entries.iter().map(ratio).fold(0.0, larger)
     }
 
-    /// Index of the first sample from which the kinetic energy stays below `share` of the energy
-    /// put in.
+    /// Index of the first sample from which the kinetic energy stays below `share` of the available
+    /// energy.
     pub fn rests_from(&self, share: f64, rounding: f64) -> Option<usize> {
         let moves = |(energy, work): &(Energy, f64)| energy.kinetic > share * (self.budget(*work) + rounding);
         after_last(self.entries.iter().map(moves))

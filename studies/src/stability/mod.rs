@@ -2,8 +2,8 @@
 //! requirement.
 //!
 //! A trial ends `settled` (back at the rest shape, or at rest), `bounded` (all numbers finite, no
-//! energy out of nothing), `named` (a typed error names an element that cannot act), `refused` (a
-//! typed error refuses the input), or `FAILED`.
+//! energy created), `named` (a typed error names an element that cannot act), `refused` (a typed
+//! error refuses the input), or `FAILED`.
 
 pub mod body;
 pub mod case;

@@ -102,7 +102,7 @@ pub fn refused(trials: &[Trial]) -> Table {
     table
 }
 
-/// All failed trials in words, for the end of a run.
+/// A description of every failed trial, for the end of a run.
 pub fn failures(trials: &[Trial]) -> usize {
     trials.iter().filter(|trial| matches!(trial.outcome, Outcome::Failed(_))).count()
 }

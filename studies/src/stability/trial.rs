@@ -63,13 +63,13 @@ pub struct Trial {
     pub scale: Option<f64>,
     /// How the trial ended.
     pub outcome: Outcome,
-    /// Largest total energy over the energy that was put in.
+    /// Largest total energy over the available energy.
     pub energy_ratio: Option<f64>,
     /// Simulated time after which the requirement stayed met, s.
     pub recovery_s: Option<f64>,
     /// Largest value over rest size at the end.
     pub error: Option<f64>,
-    /// Share of rounding in the energy that was put in.
+    /// Share of rounding in the available energy.
     pub rounding_share: Option<f64>,
     /// Wall time, s.
     pub wall_s: f64,

@@ -1,4 +1,4 @@
-//! Check: the gradient is that of the value.
+//! Check: the gradient is the derivative of the value.
 
 use cutis_constraints::{Constraint, Eval};
 use nalgebra::Vector3;

@@ -1,4 +1,4 @@
-//! Check: a SIMD lane has the bits of the scalar.
+//! Check: a SIMD lane gives the same bits as scalar code.
 
 use cutis_constraints::{Constraint, Eval, Params, Real, Scalar};
 use nalgebra::{Point3, Vector3};
@@ -8,9 +8,9 @@ use crate::checks::degenerate_cases;
 use crate::measure::numbers;
 use crate::{Case, Report, Subject};
 
-/// Several samples evaluated in SIMD lanes, in `f32` and in `f64`, degenerate ones among them, have
-/// the same bits in each lane as in a scalar. The CPU backend relies on it. Control: the next lane
-/// must differ.
+/// Samples evaluated in SIMD lanes, in `f32` and in `f64`, have the same bits in each lane as in
+/// scalar code. Some of the samples are degenerate. The CPU backend relies on this equality.
+/// Control: the next lane must differ.
 pub fn lanes<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "lanes");
     // Interleave the samples, so that lanes differ in scale and mix regular with degenerate shapes.

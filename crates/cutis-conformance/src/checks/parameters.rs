@@ -13,8 +13,8 @@ const VISIBLE: f64 = 1e-6;
 /// The parameters are finite. A change of each by 1e-3 changes value or gradient by more than 1e-6
 /// in at least one sample.
 ///
-/// A parameter without effect is useless, or the materials leave it idle, such as an amplification
-/// of 0. In the second case choose other materials with [`Subject::new`].
+/// A parameter without effect is useless, or the materials make it ineffective, for example with an
+/// amplification of 0. In the second case choose other materials with [`Subject::new`].
 pub fn parameters<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "parameters");
     let cases = subject.cases();

@@ -14,7 +14,7 @@ use crate::{ConformanceError, Report, SCALES, Subject};
 /// times the rounding error of `f32`.
 ///
 /// # Errors
-/// A body that is refused or becomes infinite.
+/// A body that a solver refuses, or whose positions become infinite.
 pub fn projection<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
 ) -> Result<Report, ConformanceError> {

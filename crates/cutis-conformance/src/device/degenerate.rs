@@ -16,8 +16,8 @@ use crate::{Case, ConformanceError, Report, SCALES, Subject};
 /// finite, on a software adapter they equal those of the CPU, and a solver that projects such
 /// elements stays finite.
 ///
-/// Control: a value with the exponent of infinity must be noticed. A division by zero would not do,
-/// because its result depends on the device.
+/// Control: a value with the exponent of infinity must be noticed. A division by zero is not a
+/// suitable control, because its result depends on the device.
 ///
 /// # Errors
 /// [`ConformanceError::Gpu`] if the shader is refused or the device fails, and the errors of a

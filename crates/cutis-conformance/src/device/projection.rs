@@ -11,7 +11,7 @@ use crate::{ConformanceError, Report, Subject};
 
 /// Runs the bodies of [`projection`](fn@crate::checks::projection) on the GPU backend. Its vertices
 /// may deviate from the reference solver in `f64` at most 4 times as much as the reference solver
-/// in `f32` does. On a software adapter they must equal the latter.
+/// in `f32` does. On a software adapter they must equal those of the reference solver in `f32`.
 ///
 /// Controls: a reference whose value or gradient is off by 1e-3 must be noticed.
 ///

@@ -77,7 +77,7 @@ fn an_absolute_epsilon_is_rejected() {
     assert_rejected::<AbsoluteEpsilon, 2>("scale", &["momentum", "wgsl", "gpu evaluation"]);
 }
 
-/// Guards so small that no sample of a usual size comes near to them.
+/// These guards are so small that no sample of ordinary size comes near them.
 #[test]
 fn a_tiny_absolute_epsilon_has_a_length() {
     let not = ["gradient", "momentum", "precision", "degenerate", "wgsl", "gpu evaluation", "gpu projection"];

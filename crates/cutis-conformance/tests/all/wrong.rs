@@ -106,7 +106,7 @@ stretch!(
     )
 );
 stretch!(
-    /// Has no direction below a length of one nanometer.
+    /// Treats the direction as undefined below a length of one nanometer.
     TinyGuard,
     |x, p| {
         let length = length(x);
@@ -256,7 +256,7 @@ stretch!(
     }"
 );
 
-/// The shader of a content with the given end of its body.
+/// The shader of a content constraint (see `content!`). `$tail` is the end of its `eval`.
 macro_rules! content_wgsl {
     ($tail:literal) => {
         concat!(
@@ -272,8 +272,8 @@ macro_rules! content_wgsl {
     };
 }
 
-/// Implements a variant of the content of a tetrahedron, `C = a·(b×c)/6 − V0`. The gradient is a
-/// function of the three cross products.
+/// Implements a variant of a constraint on the content (signed volume) of a tetrahedron,
+/// `C = a·(b×c)/6 − V0`. The gradient is a function of the three cross products.
 macro_rules! content {
     ($(#[$doc:meta])* $name:ident, $gradient:expr, $wgsl:expr) => {
         $(#[$doc])*

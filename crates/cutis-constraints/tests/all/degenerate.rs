@@ -23,7 +23,8 @@ fn is_zero<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> bool {
     eval.grad == [Vector3::zeros(); N]
 }
 
-/// Points away from the origin without round numbers, so that no result is exact by chance.
+/// Points away from the origin. Their coordinates are not round, so that no result is exact by
+/// chance.
 const A: [f64; 3] = [0.1, -0.7, 1.3];
 const B: [f64; 3] = [0.9, 0.3, 0.2];
 const C: [f64; 3] = [-0.4, 0.8, 0.6];

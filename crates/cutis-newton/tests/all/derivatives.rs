@@ -1,4 +1,4 @@
-//! The check of derivatives passes correct ones and refuses wrong ones.
+//! The derivative check accepts correct derivatives and rejects wrong ones.
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Constraint, Distance, Eval, Real};

@@ -29,9 +29,9 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         }
     }
 
-    /// Projects constraints of one color in SIMD lanes, and the remainder with scalars. The bits
-    /// are those of the scalar loop: the constraints share no vertex, and each lane executes the
-    /// operations of the scalar.
+    /// Projects constraints of one color in SIMD lanes, and the remainder with scalars. The result
+    /// has the same bits as that of the scalar loop, because the constraints share no vertex and
+    /// each lane executes the scalar operations.
     fn project_simd<S: Store<T>, R: Rule<T>, L: Rule<T::Lanes>>(
         &self,
         chunk: ConstraintChunk<'_, T, S>,

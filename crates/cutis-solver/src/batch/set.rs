@@ -1,4 +1,4 @@
-//! The arrays of a kind, and measurements over its constraints.
+//! The arrays of one kind of constraint, and measurements over its constraints.
 
 use std::marker::PhantomData;
 use std::sync::Arc;

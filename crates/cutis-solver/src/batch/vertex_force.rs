@@ -21,8 +21,9 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         }
     }
 
-    /// Adds the forces on several vertices, one per SIMD lane, for as many constraints as the
-    /// vertex with the fewest has. The other constraints follow with scalars.
+    /// Adds the forces on several vertices, one per SIMD lane. The lanes process as many
+    /// constraints as the vertex with the fewest constraints has. Scalar code adds the remaining
+    /// ones.
     #[inline(always)]
     pub(super) fn forces_simd<L: Load<T>>(
         &self,
@@ -41,7 +42,8 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             mixed: vector(|force| &force.mixed, forces),
         };
         for n in 0..common {
-            // Every lane is read once. Lanes beyond the number type's repeat the last one.
+            // The array is longer than the number of SIMD lanes of some number types. Its excess
+            // elements repeat the last entry.
             let entry: [usize; MAX_LANES] =
                 std::array::from_fn(|lane| entries[lane.min(entries.len() - 1)][n] as usize);
             let constraint = entry.map(|entry| entry / N);

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use super::*;
 use crate::{Formulation, Settings, Simulation, Stiffness, SystemBuilder};
 
-/// Two tetrahedra that share no vertex, connected by an edge, all out of shape.
+/// Two tetrahedra that share no vertex, connected by an edge. All are deformed.
 fn system(each: bool) -> System<f64> {
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Point3::from);
     let moved = corners.map(|p| Point3::new(p.x * 1.2 + 3.0, p.y - 0.1 * p.z, p.z * 0.7));

@@ -140,7 +140,7 @@ fn every_iteration_lowers_the_energy_of_a_step() {
         }
         assert!(energies[59] < 0.5 * energies[0], "{energies:?}");
     }
-    // Over-relaxation gets closer with the same number of iterations.
+    // With the same number of iterations, over-relaxation gets closer to the minimum.
     assert!(energy_of_step(60, 1.4, 2.0) < energy_of_step(60, 1.0, 2.0));
 }
 

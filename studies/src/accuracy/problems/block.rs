@@ -23,7 +23,7 @@ const STRETCH: f64 = 0.2;
 /// The face at x = 0 is fixed, and a handle pulls the opposite face away within six frames.
 ///
 /// # Errors
-/// The builder refuses the system; it does not.
+/// The builder refuses the system. This does not happen, because the system is valid.
 pub fn pulled(size: [usize; 3]) -> Result<Problem, Failure> {
     let face: Vec<u32> = (0..size.iter().product::<usize>())
         .filter(|n| n % size[0] == size[0] - 1)
@@ -54,7 +54,7 @@ pub fn pulled(size: [usize; 3]) -> Result<Problem, Failure> {
 /// The block hangs from the face at x = 0.
 ///
 /// # Errors
-/// The builder refuses the system; it does not.
+/// The builder refuses the system. This does not happen, because the system is valid.
 pub fn hanging(size: [usize; 3]) -> Result<Problem, Failure> {
     Ok(Problem {
         name: "hanging",

@@ -67,8 +67,8 @@ pub fn drag(spacing_mm: f64) -> Result<Problem, Failure> {
     Ok(problem)
 }
 
-/// A scene with a damping that brings the body to rest in 120 frames. With less the stiff modes go
-/// on, with more the soft ones are slow.
+/// A scene with a damping that brings the body to rest in 120 frames. With less damping the stiff
+/// modes keep swinging, and with more the soft modes come to rest slowly.
 fn from_scene(
     name: &'static str,
     what: String,

@@ -16,7 +16,7 @@ const AREA_STIFFNESS: f64 = 1.0;
 /// and a distance of 1 m.
 ///
 /// # Errors
-/// The builder refuses the system; it does not.
+/// The builder refuses the system. This does not happen, because the system is valid.
 pub fn wound(nx: i64) -> Result<Problem, Failure> {
     let half_length = nx as f64 / 10.0;
     let sheet = Sheet::new(nx).cut(half_length);

@@ -1,7 +1,7 @@
 //! Relaxation of ChainMail: positions of all elements and counts, after sweeps on the device and on
 //! the CPU.
 //!
-//! It computes in whole numbers, so that every adapter has to be exact.
+//! The relaxation computes with integers, so every adapter has to be exact.
 
 use anyhow::bail;
 use std::cell::RefCell;

@@ -126,7 +126,7 @@ fn state(found: &RunResult, expected: &RunResult, policy: Policy) -> Measured {
         .judged(policy)
 }
 
-/// Share of voxels that differ; if the two sides do not compute alike, by more than 1.
+/// Share of voxels that differ. Unless both sides compute `alike`, a difference of 1 is ignored.
 fn voxels(found: &[i16], expected: &[i16], alike: bool) -> Measured {
     let (least, tolerance) = if alike { (1, 0.0) } else { (2, SHARE) };
     let compared = found.len().max(expected.len());

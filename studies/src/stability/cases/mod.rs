@@ -11,7 +11,7 @@ use nalgebra::Point3;
 use super::case::Case;
 use super::options::Effort;
 
-/// All cases of that effort.
+/// All cases to run at this effort.
 pub fn all(effort: Effort) -> Vec<Case> {
     let mut cases = materials::cases();
     cases.extend(shapes::cases());

@@ -1,4 +1,5 @@
-//! Time and forces: substeps from 1e-5 s to 1 s, 1000 g, torn corners, a million steps.
+//! Time and forces: substeps from 1e-5 s to 1 s, a gravity of 1000 g, corners pulled through the
+//! body, a million steps.
 
 use cutis_solver::Handle;
 use cutis_test_kit::Random;
@@ -31,8 +32,8 @@ fn steps(cases: &mut Vec<Case>, law: Law) {
         let run = Run { h, substeps, samples, ..Run::default() };
         let case = Case::new(format!("substeps of {h:e} s, {}", law.name()), body, end).run(run);
         let case = Case { quick: h == 1.0, ..case };
-        // In single precision, a spring moves a vertex by less than the last place of a position
-        // within 1e-5 s.
+        // In single precision, a spring moves a vertex within 1e-5 s by less than the last digit of
+        // its position.
         cases.push(if h < 1e-4 { case.unresolved() } else { case });
     }
 }
@@ -67,8 +68,8 @@ fn many_steps(cases: &mut Vec<Case>, law: Law, effort: Effort) {
     // precision.
     let mean = body.velocities.iter().sum::<Vector3<f64>>() / body.velocities.len() as f64;
     body.velocities.iter_mut().for_each(|v| *v -= mean);
-    // Steps of descent that are not converged do not keep the angular momentum of a free body:
-    // undamped, it spins ever faster.
+    // Steps of descent that are not converged do not conserve the angular momentum of a free body.
+    // Without damping it spins faster and faster.
     let (damping_per_s, damped) = if law.is_implicit() { (10.0, "") } else { (0.0, " undamped") };
     let run = Run { damping_per_s, substeps: 4, samples: 25, frames, ..Run::default() };
     let name = format!("{} steps{damped}, {}", 25 * 4 * frames, law.name());
