@@ -18,7 +18,8 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// Groups from known colors, one per constraint, such as the closed-form colors of a lattice.
+    /// Returns groups from known colors, one per constraint, such as the closed-form colors of a
+    /// lattice.
     ///
     /// The groups are in the order of ascending color. Unused colors are skipped. This function
     /// does not check whether the colors are valid; [`verify`](Groups::verify) does.
@@ -51,7 +52,7 @@ impl Groups {
         }
     }
 
-    /// Number of groups (colors).
+    /// Returns the number of groups (colors).
     pub fn len(&self) -> usize {
         self.offsets.len().saturating_sub(1)
     }
@@ -61,7 +62,7 @@ impl Groups {
         self.len() == 0
     }
 
-    /// The constraints of group `color`, in ascending order.
+    /// Returns the constraints of group `color`, in ascending order.
     ///
     /// # Panics
     /// If `color` is not below [`len`](Groups::len).

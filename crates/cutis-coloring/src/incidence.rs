@@ -13,7 +13,7 @@ pub struct Tuples<'a> {
 }
 
 impl<'a> Tuples<'a> {
-    /// The constraints of a typed list.
+    /// Returns the vertices of these constraints as one flat list.
     pub fn of<const N: usize>(constraints: &'a [[u32; N]]) -> Self {
         Self { vertices: constraints.as_flattened(), arity: N }
     }
@@ -74,7 +74,7 @@ impl Incidence {
         Ok(Self { starts, places })
     }
 
-    /// The places of `vertex`, ascending.
+    /// Returns the places of `vertex`, ascending.
     ///
     /// # Panics
     /// If `vertex` is out of range.
@@ -90,7 +90,7 @@ impl Incidence {
         &self.starts
     }
 
-    /// All places, one vertex after the other.
+    /// Returns all places, one vertex after the other.
     pub fn places(&self) -> &[u32] {
         &self.places
     }

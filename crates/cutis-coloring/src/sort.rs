@@ -5,7 +5,7 @@ use crate::ColoringError;
 /// Length of the longest list that a `u32` can index.
 pub(crate) const INDEX_LIMIT: usize = u32::MAX as usize;
 
-/// A vector of `len` copies of `value`, or [`ColoringError::OutOfMemory`].
+/// Returns a vector of `len` copies of `value`, or [`ColoringError::OutOfMemory`].
 pub(crate) fn filled<T: Copy>(value: T, len: usize) -> Result<Vec<T>, ColoringError> {
     let mut vec = Vec::new();
     vec.try_reserve_exact(len)

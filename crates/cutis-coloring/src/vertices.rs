@@ -58,7 +58,7 @@ pub fn greedy_vertices(
 }
 
 impl Groups {
-    /// The same groups without the fixed vertices. Groups that become empty are removed.
+    /// Returns the same groups without the fixed vertices. Groups that become empty are removed.
     pub fn restricted_to(&self, moves: &[bool]) -> Self {
         let mut restricted = Groups { order: Vec::new(), offsets: vec![0] };
         for group in self.iter() {

@@ -24,14 +24,15 @@ pub enum Alteration {
 }
 
 impl Alteration {
-    /// All alterations of a constraint over `arity` vertices.
+    /// Returns all alterations of a constraint over `arity` vertices.
     pub(crate) fn all(arity: usize) -> Vec<Self> {
         let gradients = (0..arity).map(Self::Gradient);
         let swaps = (1..arity).map(|i| Self::Swapped(i - 1, i));
         std::iter::once(Self::Value).chain(gradients).chain(swaps).collect()
     }
 
-    /// The alterations that change at least one sample. Swapping equal gradients changes nothing.
+    /// Returns the alterations that change at least one sample. Swapping equal gradients changes
+    /// nothing.
     pub(crate) fn of<C: Constraint<N>, const N: usize>(cases: &[Case<N>]) -> Vec<Self> {
         let changes = |alteration: &Self| match *alteration {
             Self::Swapped(i, j) => cases.iter().any(|case| {
@@ -43,7 +44,7 @@ impl Alteration {
         Self::all(N).into_iter().filter(changes).collect()
     }
 
-    /// The evaluation with this error.
+    /// Returns the evaluation with this error.
     #[inline(always)]
     pub(crate) fn apply<T: Real, const N: usize>(self, mut eval: Eval<T, N>) -> Eval<T, N> {
         let factor = T::constant(FACTOR);
@@ -55,8 +56,8 @@ impl Alteration {
         eval
     }
 
-    /// The WGSL source of a constraint with this error. Its `eval` gets another name, and a new
-    /// `eval` alters the result.
+    /// Returns the WGSL source of a constraint with this error. Its `eval` gets another name, and a
+    /// new `eval` alters the result.
     pub fn wgsl(self, constraint: &str) -> String {
         let statement = match self {
             Self::Value => format!("found.c = found.c * {FACTOR};"),
@@ -79,7 +80,8 @@ impl fmt::Display for Alteration {
     }
 }
 
-/// The source of a constraint whose `eval` ends with `statements`, which may change `found`.
+/// Returns the source of a constraint whose `eval` ends with `statements`, which may change
+/// `found`.
 pub(crate) fn wrapped(constraint: &str, statements: &str) -> String {
     let original = renamed(constraint, "eval", "unaltered_eval");
     format!(
@@ -88,7 +90,7 @@ pub(crate) fn wrapped(constraint: &str, statements: &str) -> String {
     )
 }
 
-/// `source` with `from` replaced wherever it is a whole word.
+/// Returns `source` with `from` replaced wherever it is a whole word.
 fn renamed(source: &str, from: &str, to: &str) -> String {
     let in_word = |character: char| character.is_alphanumeric() || character == '_';
     let mut result = String::with_capacity(source.len());

@@ -5,22 +5,22 @@ use nalgebra::Vector3;
 
 use crate::{Case, SCALES};
 
-/// The largest norm among the vectors of a gradient; NaN if any is NaN.
+/// Returns the largest norm among the vectors of a gradient; NaN if any is NaN.
 pub(crate) fn length<const N: usize>(grad: &[Vector3<f64>; N]) -> f64 {
     grad.iter().map(Vector3::norm).fold(0.0, largest)
 }
 
-/// The larger number; NaN if one of them is NaN.
+/// Returns the larger number; NaN if one of them is NaN.
 pub(crate) fn largest(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// An evaluation converted to `f64`.
+/// Returns an evaluation converted to `f64`.
 pub(crate) fn double<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> Eval<f64, N> {
     Eval { c: eval.c.to_f64(), grad: eval.grad.map(|g| g.map(T::to_f64)) }
 }
 
-/// The numbers of an evaluation: the value, then the gradients.
+/// Returns the numbers of an evaluation: the value, then the gradients.
 pub(crate) fn numbers<T: Scalar, const N: usize>(eval: &Eval<T, N>) -> impl Iterator<Item = T> {
     std::iter::once(eval.c).chain(eval.grad.iter().flatten().copied())
 }
@@ -35,7 +35,7 @@ pub(crate) struct Deviation {
 }
 
 impl Deviation {
-    /// The deviation of these errors.
+    /// Returns the deviation of these errors.
     pub(crate) fn of(errors: impl IntoIterator<Item = f64>) -> Self {
         let (mut worst, mut sum, mut count) = (0.0, 0.0, 0.0);
         for error in errors {
@@ -55,13 +55,14 @@ pub const ALLOWANCE: f64 = 4.0;
 /// Operation of SPIR-V Instructions").
 const FLOOR: f64 = 2.0;
 
-/// The allowed deviation of a device where the CPU deviates by `cpu`. `ulp` is the size of an ulp.
+/// Returns the allowed deviation of a device where the CPU deviates by `cpu`. `ulp` is the size of
+/// an ulp.
 pub(crate) fn tolerance(cpu: Deviation, ulp: f64) -> Deviation {
     let of = |cpu: f64| ALLOWANCE * largest(cpu, FLOOR * ulp);
     Deviation { worst: of(cpu.worst), rms: of(cpu.rms) }
 }
 
-/// A deviation divided by its tolerance.
+/// Returns a deviation divided by its tolerance.
 pub(crate) fn excess(found: Deviation, tolerance: Deviation) -> f64 {
     largest(found.worst / tolerance.worst, found.rms / tolerance.rms)
 }
@@ -77,8 +78,8 @@ pub(crate) struct Errors {
     pub(crate) gradient: Deviation,
 }
 
-/// Deviations of `found` from the evaluation in `f64`, per scale. `found` has one evaluation for
-/// each case.
+/// Returns the deviations of `found` from the evaluation in `f64`, per scale. `found` has one
+/// evaluation for each case.
 pub(crate) fn errors<C: Constraint<N>, T: Scalar, const N: usize>(
     cases: &[Case<N>],
     found: &[Eval<T, N>],

@@ -7,12 +7,12 @@ use nalgebra::{Point3, Vector3};
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// The sequence for a seed.
+    /// Returns the sequence for a seed.
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// A number in `[0, 1)`.
+    /// Returns a number in `[0, 1)`.
     pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -21,12 +21,12 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// A number in `[low, high)`.
+    /// Returns a number in `[low, high)`.
     pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
-    /// A point in the cube from −1 to 1.
+    /// Returns a point in the cube from −1 to 1.
     pub(crate) fn point(&mut self) -> Point3<f64> {
         Point3::from(Vector3::from_fn(|_, _| self.between(-1.0, 1.0)))
     }

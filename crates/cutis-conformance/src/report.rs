@@ -24,7 +24,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Whether the value is within its limit. NaN never is.
+    /// Returns whether the value is within its limit. NaN never is.
     pub fn passed(&self) -> bool {
         match self.limit {
             Limit::AtMost(bound) => self.value <= bound,
@@ -32,7 +32,7 @@ impl Finding {
         }
     }
 
-    /// Whether this is a negative control.
+    /// Returns whether this is a negative control.
     pub fn is_control(&self) -> bool {
         matches!(self.limit, Limit::MoreThan(_))
     }
@@ -99,7 +99,7 @@ impl Report {
         self.notes.push(note.into());
     }
 
-    /// The overall result. A check that measured nothing and was not skipped failed.
+    /// Returns the overall result. A check that measured nothing and was not skipped failed.
     pub fn verdict(&self) -> Verdict {
         match self.skipped {
             Some(reason) => Verdict::Skipped(reason),
@@ -108,7 +108,7 @@ impl Report {
         }
     }
 
-    /// The findings outside their limits.
+    /// Returns the findings outside their limits.
     fn failures(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| !finding.passed())
     }

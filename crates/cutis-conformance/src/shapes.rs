@@ -10,7 +10,7 @@ const THINNEST: f64 = 0.05;
 /// Number of random shapes to try before the thickest one is taken.
 const DRAWS: usize = 16;
 
-/// A random shape of points from −1 to 1 that is not degenerate.
+/// Returns a random shape of points from −1 to 1 that is not degenerate.
 pub(crate) fn solid<const N: usize>(random: &mut Random) -> [Point3<f64>; N] {
     let mut best = [Point3::origin(); N];
     let mut best_thickness = -1.0;
@@ -27,7 +27,8 @@ pub(crate) fn solid<const N: usize>(random: &mut Random) -> [Point3<f64>; N] {
     best
 }
 
-/// The smallest edge length, triangle cross product or tetrahedron determinant among the points.
+/// Returns the smallest edge length, triangle cross product or tetrahedron determinant among the
+/// points.
 fn thickness(x: &[Point3<f64>]) -> f64 {
     let mut least = f64::INFINITY;
     for (i, a) in x.iter().enumerate() {

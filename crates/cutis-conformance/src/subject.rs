@@ -37,8 +37,8 @@ pub struct Subject<C: Constraint<N>, const N: usize> {
 }
 
 impl<C: Constraint<N>, const N: usize> Subject<C, N> {
-    /// A constraint type with materials for the samples. Choose materials for which each parameter
-    /// has an effect.
+    /// Returns a subject with these materials for the samples. Choose materials for which each
+    /// parameter has an effect.
     pub fn new(materials: impl IntoIterator<Item = C::Material>) -> Self {
         Self {
             materials: materials.into_iter().collect(),
@@ -68,8 +68,9 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
         Self { direction_only: true, ..self }
     }
 
-    /// The samples, the same in every run: for each material and scale 100 pairs of random shapes,
-    /// one as the rest shape and one as the deformed shape. `f32` represents all numbers exactly.
+    /// Returns the samples, the same in every run: for each material and scale 100 pairs of random
+    /// shapes, one as the rest shape and one as the deformed shape. `f32` represents all numbers
+    /// exactly.
     pub fn cases(&self) -> Vec<Case<N>> {
         let single = |x: f64| f64::from(x as f32);
         self.draw(SCALES, |scale, x| x.map(|p| p.map(|v| single(v * scale))))
@@ -77,13 +78,14 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
             .collect()
     }
 
-    /// The samples at one length scale, for `f64`. The shapes are exactly the same at every scale.
+    /// Returns the samples at one length scale, for `f64`. The shapes are exactly the same at every
+    /// scale.
     pub(crate) fn similar_cases(&self, scale: f64) -> Vec<Case<N>> {
         self.draw([scale], |scale, x| x.map(|p| p * scale)).collect()
     }
 
-    /// The parameters of a rest shape for each material. Those that are not finite in `f32` are
-    /// omitted, because a system refuses them.
+    /// Returns the parameters of a rest shape for each material. Those that are not finite in `f32`
+    /// are omitted, because a system refuses them.
     pub(crate) fn params_of(&self, rest: &[Point3<f64>; N]) -> Vec<Vec<f64>> {
         let of = |material| {
             C::from_rest(rest, material).as_ref().iter().map(|&p: &f64| f64::from(p as f32)).collect()
@@ -114,7 +116,7 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
 }
 
 impl<C: Constraint<N, Material: Default>, const N: usize> Default for Subject<C, N> {
-    /// A subject with the default material.
+    /// Returns a subject with the default material.
     fn default() -> Self {
         Self::new([C::Material::default()])
     }
@@ -132,24 +134,24 @@ pub struct Case<const N: usize> {
 }
 
 impl<const N: usize> Case<N> {
-    /// The parameters in another number type.
+    /// Returns the parameters in another number type.
     pub(crate) fn params<C: Constraint<N>, T: Scalar>(&self) -> C::Params<T> {
         Params::from_fn(|k| T::constant(self.params[k]))
     }
 
-    /// The positions in another number type.
+    /// Returns the positions in another number type.
     pub(crate) fn positions<T: Scalar>(&self) -> [Point3<T>; N] {
         self.x.map(|p| p.map(T::constant))
     }
 
-    /// Value and gradients, computed in the number type `T`.
+    /// Returns the value and gradients, computed in the number type `T`.
     pub fn eval<C: Constraint<N>, T: Scalar>(&self) -> Eval<T, N> {
         C::eval(&self.positions(), &self.params::<C, T>())
     }
 
-    /// The reference size for errors of the value: the larger of the rest size and the change of
-    /// the value when the points move by the scale. Errors of the gradient are relative to
-    /// this size divided by the scale.
+    /// Returns the reference size for errors of the value: the larger of the rest size and the
+    /// change of the value when the points move by the scale. Errors of the gradient are relative
+    /// to this size divided by the scale.
     pub fn size<C: Constraint<N>>(&self) -> f64 {
         let eval = self.eval::<C, f64>();
         let rest_size = C::rest_size(&self.params::<C, f64>()).abs();

@@ -37,7 +37,7 @@ impl Plan {
         Self { name: "vertex block descent", formulation: Formulation::Vbd, substeps: 3, iterations: 2 },
     ];
 
-    /// The plans that a constraint can run with.
+    /// Returns the plans that a constraint can run with.
     pub(crate) fn of(pbd_only: bool) -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(move |plan| !pbd_only || plan.formulation == Formulation::Pbd)
     }
@@ -63,14 +63,14 @@ pub(crate) struct TestBody<const N: usize> {
 }
 
 impl<const N: usize> TestBody<N> {
-    /// The samples of one scale without common vertices: one color, which is larger than a
+    /// Returns the samples of one scale without common vertices: one color, which is larger than a
     /// workgroup.
     pub(crate) fn soup(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
         let name = format!("separate elements at {scale} m");
         Self::new(name, cases, scale, |_, x| x, |k, i| k * N + i, true)
     }
 
-    /// The samples of one scale, each joined to the previous one by a vertex: two colors.
+    /// Returns the samples of one scale, each joined to the previous one by a vertex: two colors.
     pub(crate) fn chain(cases: &[Case<N>], scale: f64) -> Result<Self, ConformanceError> {
         let mut end = Point3::origin();
         let place = move |k: usize, x: [Point3<f64>; N]| {
@@ -111,8 +111,8 @@ impl<const N: usize> TestBody<N> {
         Ok(Self { name, scale, positions, inverse_masses, tuples, params, groups, each })
     }
 
-    /// The body with constraints of type `C`, whose stiffness is of the order of the vertices'
-    /// inertia.
+    /// Returns the body with constraints of type `C`, whose stiffness is of the order of the
+    /// vertices' inertia.
     pub(crate) fn system<C: Constraint<N>, T: Scalar>(&self, plan: Plan) -> Result<System<T>, SolverError> {
         let params: Vec<C::Params<T>> =
             self.params.iter().map(|p| Params::from_fn(|k| T::constant(p[k]))).collect();
@@ -144,14 +144,14 @@ impl<const N: usize> TestBody<N> {
         Ok(builder.add::<C, N>(&self.tuples, &params, stiffness, &self.groups)?.build())
     }
 
-    /// `Σ w|∇C|²` of constraint `k`, with masses of 1 kg.
+    /// Returns `Σ w|∇C|²` of constraint `k`, with masses of 1 kg.
     fn weighted_square<C: Constraint<N>>(&self, k: usize) -> f64 {
         let x = self.tuples[k].map(|vertex| self.positions[vertex as usize]);
         let case = Case { scale: self.scale, x, params: self.params[k].clone() };
         case.eval::<C, f64>().grad.iter().map(|g| g.norm_squared()).sum()
     }
 
-    /// Positions after one frame of the reference solver.
+    /// Returns the positions after one frame of the reference solver.
     pub(crate) fn reference<C: Constraint<N>, T: Scalar>(
         &self,
         plan: Plan,
@@ -160,13 +160,13 @@ impl<const N: usize> TestBody<N> {
         after_a_frame(&mut SolverReference::new(system, plan.settings())?)
     }
 
-    /// Distances between the vertices of two runs, relative to the scale.
+    /// Returns the distances between the vertices of two runs, relative to the scale.
     pub(crate) fn deviation(&self, a: &[Point3<f64>], b: &[Point3<f64>]) -> Deviation {
         Deviation::of(a.iter().zip(b).map(|(a, b)| (a - b).norm() / self.scale))
     }
 
-    /// The allowed deviation from `exact` where the CPU in `f32` ends at `single`. The smallest
-    /// assumed error is an ulp of the largest coordinate.
+    /// Returns the allowed deviation from `exact` where the CPU in `f32` ends at `single`. The
+    /// smallest assumed error is an ulp of the largest coordinate.
     pub(crate) fn tolerance(&self, single: &[Point3<f64>], exact: &[Point3<f64>]) -> Deviation {
         let coordinates = self.positions.iter().flat_map(|p| p.coords.iter());
         let extent = coordinates.fold(0.0, |most, x| f64::max(most, x.abs())) / self.scale;
@@ -193,13 +193,13 @@ impl<const N: usize> TestBody<N> {
     }
 }
 
-/// Positions after one frame.
+/// Returns the positions after one frame.
 pub(crate) fn after_a_frame<T: Scalar>(solver: &mut dyn Solver<T>) -> Result<Vec<Point3<f64>>, SolverError> {
     solver.step(1)?;
     Ok(solver.positions()?.iter().map(|p| p.map(T::to_f64)).collect())
 }
 
-/// Number of coordinates that differ between two runs.
+/// Returns the number of coordinates that differ between two runs.
 pub(crate) fn differing(a: &[Point3<f64>], b: &[Point3<f64>]) -> usize {
     let coordinates = |x: &[Point3<f64>]| x.iter().flat_map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>();
     coordinates(a).iter().zip(coordinates(b)).filter(|&(a, b)| *a != b).count()

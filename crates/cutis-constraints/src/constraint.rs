@@ -22,7 +22,8 @@ pub trait Params<T>: Copy + Debug + Send + Sync + PartialEq + AsRef<[T]> {
     const LEN: usize;
     /// Builds the array. `f(k)` gives scalar number `k`.
     fn from_fn(f: impl FnMut(usize) -> T) -> Self;
-    /// The scalars of many constraints, one constraint after the other: the layout of a GPU buffer.
+    /// Returns the scalars of many constraints, one constraint after the other: the layout of a GPU
+    /// buffer.
     fn flat(many: &[Self]) -> &[T];
 }
 
@@ -138,12 +139,12 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     /// Material values that the caller chooses when a constraint is built from its rest shape, such
     /// as a rest-area scale.
     type Material;
-    /// Parameters of a constraint with the rest shape `x` (positions in meters).
+    /// Returns the parameters of a constraint with the rest shape `x` (positions in meters).
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;
-    /// `C` and `∇C` at `x` (positions in meters).
+    /// Returns `C` and `∇C` at `x` (positions in meters).
     fn eval<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Eval<T, N>;
-    /// `1/r²` in 1/m², where `r` is the longest distance that a projection may move along the
-    /// gradient at `x`. `None` means no limit, and is the default.
+    /// Returns `1/r²` in 1/m², where `r` is the longest distance that a projection may move along
+    /// the gradient at `x`. `None` means no limit, and is the default.
     ///
     /// A projection moves to the point where the tangent of `C` meets zero. If the gradient of a
     /// collapsed element is tiny, that point is far outside the element, where the tangent says
@@ -155,8 +156,8 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
         let _ = (x, params);
         None
     }
-    /// The reference size of residuals: rest length (m), rest area (m²) or rest volume (m³). Zero
-    /// means that the rest shape has no size; `SystemBuilder` refuses to take parameters from such
-    /// a shape.
+    /// Returns the reference size of residuals: rest length (m), rest area (m²) or rest volume
+    /// (m³). Zero means that the rest shape has no size; `SystemBuilder` refuses to take parameters
+    /// from such a shape.
     fn rest_size<T: Real>(params: &Self::Params<T>) -> T;
 }

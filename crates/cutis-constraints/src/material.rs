@@ -51,7 +51,7 @@ pub enum MaterialError {
     },
 }
 
-/// Compliance of a [`Distance`](crate::Distance) in m/N: `α = L²/(E·V_e)`.
+/// Returns the compliance of a [`Distance`](crate::Distance) in m/N: `α = L²/(E·V_e)`.
 ///
 /// The edge is a rod with the length `rest_length` `L` (m), the cross-section `V_e/L` and Young's
 /// modulus `youngs_modulus_pa` `E` (Pa). `edge_volume` `V_e` (m³) is the edge's share of the volume
@@ -79,7 +79,7 @@ pub fn distance_compliance(
     finite("distance", rest_length, compliance)
 }
 
-/// Compliance of a [`Volume`](crate::Volume) in m³/Pa: `α = V0/K`.
+/// Returns the compliance of a [`Volume`](crate::Volume) in m³/Pa: `α = V0/K`.
 ///
 /// `V0` is `rest_volume` in m³ and `K` is `bulk_modulus_pa` in Pa. The energy `C²/(2α)` is then `½
 /// K (ΔV/V0)² V0`.
@@ -92,7 +92,7 @@ pub fn volume_compliance(rest_volume: f64, bulk_modulus_pa: f64) -> Result<f64, 
     finite("volume", rest_volume, rest_volume / bulk_modulus_pa)
 }
 
-/// Compliance of a [`SkinTension`](crate::SkinTension) in m³/N: `α = A0/T`.
+/// Returns the compliance of a [`SkinTension`](crate::SkinTension) in m³/N: `α = A0/T`.
 ///
 /// `A0` is `rest_area` in m². `T` is `area_modulus_n_per_m` in N/m, the tension per relative growth
 /// of the area. `k = T/A0` is the stiffness of the energy form.

@@ -9,7 +9,7 @@ use simba::simd::{SimdValue, WideF32x4, WideF64x4};
 /// It is implemented for every [`SimdRealField`]: `f32`, `f64` and the SIMD types of `simba`. Write
 /// formulas without branches (`simd_max`, `select`), so that one source serves all of them.
 pub trait Real: SimdRealField + Copy {
-    /// `value` in every lane.
+    /// Returns `value` in every lane.
     fn constant(value: f64) -> Self {
         nalgebra::convert(value)
     }
@@ -19,7 +19,7 @@ impl<T: SimdRealField + Copy> Real for T {}
 
 /// A single floating-point number: the type of stored positions.
 pub trait Scalar: Real<SimdBool = bool> + RealField + Pod {
-    /// The same number as `f64`. The conversion is exact.
+    /// Returns the same number as `f64`. The conversion is exact.
     fn to_f64(self) -> f64;
     /// Several numbers in SIMD lanes. An evaluation in lanes has the bits of one evaluation per
     /// lane.

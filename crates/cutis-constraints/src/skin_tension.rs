@@ -56,7 +56,7 @@ impl Default for SkinTensionMaterial {
     }
 }
 
-/// `max(0, C)/A0`, the relative stretch of the area; 0 if the rest area is 0.
+/// Returns `max(0, C)/A0`, the relative stretch of the area; 0 if the rest area is 0.
 #[inline(always)]
 pub(crate) fn stretch<T: Real>(c: T, rest_area: T) -> T {
     let zero = T::zero();

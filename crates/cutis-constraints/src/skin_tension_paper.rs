@@ -44,7 +44,7 @@ pub struct SkinTensionPaperMaterial {
 }
 
 impl SkinTensionPaperMaterial {
-    /// The material whose amplification is stable in PBD with `stiffness` per iteration:
+    /// Returns the material whose amplification is stable in PBD with `stiffness` per iteration:
     /// `F_max = 1/stiffness`.
     ///
     /// # Errors
@@ -87,8 +87,8 @@ impl Constraint<3> for SkinTensionPaper {
         Eval { c: c * amplified.select(amplified.simd_lt(most), most), grad }
     }
 
-    /// The reach of [`SkinTension`](crate::SkinTension), times the largest amplification, because
-    /// the returned value contains the amplification.
+    /// Returns `1/r²`, where `r` is the reach of [`SkinTension`](crate::SkinTension) times the
+    /// largest amplification, because the constraint's value contains the amplification.
     #[inline(always)]
     fn inverse_reach_squared<T: Real>(x: &[Point3<T>; 3], &[rest_area, _, most]: &[T; 3]) -> Option<T> {
         Some(triangle::inverse_reach_squared(x, rest_area) / (most * most).simd_max(T::one()))

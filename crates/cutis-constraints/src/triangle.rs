@@ -8,14 +8,14 @@ use crate::Real;
 /// of a triangle is rounding noise.
 const NOISE: f64 = 8.0;
 
-/// Area (m²) of the triangle `x`.
+/// Returns the area (m²) of the triangle `x`.
 pub(crate) fn area<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> T {
     let n = (x2 - x1).cross(&(x3 - x1));
     n.dot(&n).simd_sqrt() * T::constant(0.5)
 }
 
-/// Area (m²) of the triangle `x` and its gradient (m). With `n = (x2 − x1) × (x3 − x1)` and `n̂ =
-/// n/|n|`:
+/// Returns the area (m²) of the triangle `x` and its gradient (m). With `n = (x2 − x1) × (x3 − x1)`
+/// and `n̂ = n/|n|`:
 ///
 /// `A = |n|/2`, `∇1A = ½ (x2 − x3) × n̂`, `∇2A = ½ (x3 − x1) × n̂`, `∇3A = ½ (x1 − x2) × n̂`.
 ///
@@ -36,8 +36,8 @@ pub(crate) fn area_and_gradient<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> (T, [
     (n_length * half, [-(grad2 + grad3), grad2, grad3])
 }
 
-/// `1/r²` with `r² = 16 max(e², A0)`, where `e` is the longer edge at the first vertex: four times
-/// the larger of the present size and the rest size.
+/// Returns `1/r²` with `r² = 16 max(e², A0)`, where `e` is the longer edge at the first vertex:
+/// four times the larger of the present size and the rest size.
 #[inline(always)]
 pub(crate) fn inverse_reach_squared<T: Real>([x1, x2, x3]: &[Point3<T>; 3], rest_area: T) -> T {
     let (e2, e3) = (x2 - x1, x3 - x1);

@@ -42,7 +42,7 @@ impl Default for VolumeMaterial {
     }
 }
 
-/// Volume (m³) and its four gradients (m²).
+/// Returns the volume (m³) and its four gradients (m²).
 #[inline(always)]
 fn volume_and_gradient<T: Real>([x1, x2, x3, x4]: &[Point3<T>; 4]) -> (T, [Vector3<T>; 4]) {
     let (a, b, c) = (x2 - x1, x3 - x1, x4 - x1);
@@ -69,9 +69,9 @@ impl Constraint<4> for Volume {
         Eval { c: volume - rest_volume, grad }
     }
 
-    /// `r² = 16 max(e², √(V0 e))`, where `e` is the longest edge at the first vertex. The reach is
-    /// four times the larger of the present size and the rest size. The geometric mean stands
-    /// in for the rest size because it saves a third root.
+    /// Returns `1/r²` with `r² = 16 max(e², √(V0 e))`, where `e` is the longest edge at the first
+    /// vertex. The reach is four times the larger of the present size and the rest size. The
+    /// geometric mean stands in for the rest size because it saves a third root.
     #[inline(always)]
     fn inverse_reach_squared<T: Real>(
         [x1, x2, x3, x4]: &[Point3<T>; 4],
@@ -101,7 +101,7 @@ impl Constraint<4> for Volume {
 mod tests {
     use super::*;
 
-    /// The reach as the shader computes it, always with both roots.
+    /// Returns `1/r²` as the shader computes it, always with both roots.
     fn with_roots(edge_squared: f32, rest_volume: f32) -> f32 {
         let size_squared = edge_squared.max((rest_volume * edge_squared.sqrt()).sqrt());
         if size_squared > 0.0 { 1.0 / 16.0 / size_squared } else { 0.0 }

@@ -57,7 +57,7 @@ impl Problem {
         Ok(found)
     }
 
-    /// The size of the smallest element with a size above 0; infinite if there is none.
+    /// Returns the size of the smallest element with a size above 0; infinite if there is none.
     fn smallest_extent(&self, state: &State) -> f64 {
         let mut smallest = f64::INFINITY;
         for (elements, evaluated) in self.elastic.kinds.iter().zip(&state.field.kinds) {
@@ -75,13 +75,13 @@ impl Problem {
     }
 }
 
-/// The larger one of a deviation and `error/scale`. NaN counts as the largest.
+/// Returns the larger one of a deviation and `error/scale`. NaN counts as the largest.
 fn larger(deviation: f64, error: f64, scale: f64) -> f64 {
     let ratio = if error == 0.0 { 0.0 } else { error / scale };
     if deviation.is_nan() || ratio <= deviation { deviation } else { ratio }
 }
 
-/// A pseudo-random number from −1 to 1.
+/// Returns a pseudo-random number from −1 to 1.
 fn noise(sample: usize, n: usize) -> f64 {
     let mixed = (n as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (sample as u64 + 1).wrapping_mul(0xD1B5_4A32_D192_ED03);

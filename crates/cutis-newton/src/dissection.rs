@@ -21,13 +21,13 @@ pub(crate) struct Graph {
 }
 
 impl Graph {
-    /// The neighbors of `v`.
+    /// Returns the neighbors of `v`.
     pub fn neighbors(&self, v: u32) -> &[u32] {
         &self.targets[self.offsets[v as usize]..self.offsets[v as usize + 1]]
     }
 }
 
-/// The vertices of `graph` in the order of elimination.
+/// Returns the vertices of `graph` in the order of elimination.
 pub(crate) fn order(graph: &Graph, positions: &[Point3<f64>]) -> Vec<u32> {
     let mut vertices: Vec<u32> = (0..positions.len() as u32).collect();
     let mut dissection = Dissection { graph, positions, side: vec![Side::Outside; positions.len()] };
@@ -73,8 +73,8 @@ impl Dissection<'_> {
         self.divide(&mut vertices[lower..upper]);
     }
 
-    /// The axis, and the number of vertices below the plane, of the plane with the best compromise
-    /// between a small separator and equal halves.
+    /// Returns the axis, and the number of vertices below the plane, of the plane with the best
+    /// compromise between a small separator and equal halves.
     fn best_plane(&mut self, vertices: &mut [u32]) -> (usize, usize) {
         let mut best = (f64::INFINITY, 0, vertices.len() / 2);
         for axis in 0..3 {
@@ -99,8 +99,8 @@ impl Dissection<'_> {
         (best.1, best.2)
     }
 
-    /// `middle`, moved to the nearest position where the coordinate changes, unless the halves
-    /// would become too unequal.
+    /// Returns `middle`, moved to the nearest position where the coordinate changes, unless the
+    /// halves would become too unequal.
     fn between_planes(&self, vertices: &[u32], axis: usize, middle: usize) -> usize {
         let at = |n: usize| self.positions[vertices[n] as usize][axis];
         let value = at(middle);

@@ -26,7 +26,7 @@ pub(crate) struct Evaluated {
 }
 
 impl Elements {
-    /// The constraints of a kind. Refuses those without a finite energy.
+    /// Returns the constraints of a kind. Refuses those without a finite energy.
     pub fn new(kind: Kind<f64>) -> Result<Self, NewtonError> {
         let Stiffness::Compliance(compliance) = kind.stiffness().clone() else {
             return Err(NewtonError::PbdStiffness { kind: kind.name() });
@@ -42,22 +42,22 @@ impl Elements {
         Ok(elements)
     }
 
-    /// Vertices of one constraint.
+    /// Returns the vertices of one constraint.
     pub fn arity(&self) -> usize {
         self.kind.arity()
     }
 
-    /// Number of constraints.
+    /// Returns the number of constraints.
     pub fn len(&self) -> usize {
         self.kind.len()
     }
 
-    /// The vertices of constraint `k`.
+    /// Returns the vertices of constraint `k`.
     pub fn vertices(&self, k: usize) -> &[u32] {
         &self.kind.indices()[k * self.arity()..][..self.arity()]
     }
 
-    /// `α` of constraint `k`.
+    /// Returns `α` of constraint `k`.
     pub fn compliance(&self, k: usize) -> f64 {
         self.compliance.at(k)
     }
@@ -69,7 +69,7 @@ impl Elements {
         }
     }
 
-    /// `C` of constraint `k` with its vertices at `places`. Writes `∇C` to `gradients`.
+    /// Returns `C` of constraint `k` with its vertices at `places`. Writes `∇C` to `gradients`.
     pub fn evaluate_one(&self, k: usize, places: &[Point3<f64>], gradients: &mut [Vector3<f64>]) -> f64 {
         self.kind.evaluate(k, places, gradients)
     }

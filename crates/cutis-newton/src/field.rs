@@ -31,13 +31,13 @@ pub(crate) struct Field {
 }
 
 impl Elastic {
-    /// The constraints of a system. Refuses kinds without a finite energy.
+    /// Returns the constraints of a system. Refuses kinds without a finite energy.
     pub fn of(system: &System<f64>) -> Result<Self, NewtonError> {
         let kinds = system.kinds().iter().map(|kind| Elements::new(kind.clone()));
         Ok(Self { kinds: kinds.collect::<Result<_, _>>()? })
     }
 
-    /// `Σ ½C²/α` at `x`, in J.
+    /// Returns `Σ ½C²/α` at `x`, in J.
     pub fn energy(&self, x: &[Point3<f64>]) -> f64 {
         let mut energy = 0.0;
         for elements in &self.kinds {
@@ -48,7 +48,7 @@ impl Elastic {
         energy
     }
 
-    /// The values and gradients at the placement `x`.
+    /// Returns the values and gradients at the placement `x`.
     pub fn at(&self, x: &[Point3<f64>]) -> Field {
         let mut field = Field {
             kinds: Vec::with_capacity(self.kinds.len()),
@@ -81,8 +81,8 @@ impl Elastic {
         field
     }
 
-    /// The elastic energy at `to` minus that at `from`. It sums the differences of the constraints,
-    /// so it is accurate to the rounding of the difference and not of the energies.
+    /// Returns the elastic energy at `to` minus that at `from`. It sums the differences of the
+    /// constraints, so it is accurate to the rounding of the difference and not of the energies.
     pub fn difference(&self, from: &Field, to: &Field) -> f64 {
         let mut sum = 0.0;
         for (elements, (from, to)) in self.kinds.iter().zip(from.kinds.iter().zip(&to.kinds)) {

@@ -45,7 +45,8 @@ pub(crate) fn refuse(problem: &Problem, x: &[Point3<f64>]) -> Result<(), NewtonE
     }
 }
 
-/// The lowest vertex of the part of `v` so far. Shortens the path to it.
+/// Returns the lowest vertex of the part that contains `v`, as far as it is known. Shortens the
+/// path to it.
 fn root(parents: &mut [u32], mut v: u32) -> u32 {
     while parents[v as usize] != v {
         let above = parents[parents[v as usize] as usize];

@@ -127,7 +127,7 @@ impl Workspace {
     }
 }
 
-/// The size of an element in m: the largest distance of a vertex from the first one. For a
+/// Returns the size of an element in m: the largest distance of a vertex from the first one. For a
 /// constraint on one vertex, it is the distance at which the constraint is met. Zero if there is no
 /// size.
 pub(crate) fn extent(points: &[Point3<f64>], c: f64, gradients: &[Vector3<f64>]) -> f64 {

@@ -73,7 +73,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The next state, which is lower than `state`; `None` if no step lowers it.
+    /// Returns the next state, which is lower than `state`; `None` if no step lowers it.
     fn step(&mut self, state: &State) -> Option<State> {
         let plain = self.factorize(state, 0.0, 0.0);
         self.definite = Some(plain);
@@ -128,7 +128,8 @@ impl Search<'_> {
         self.factors.factorize()
     }
 
-    /// A step along the direction that the factors give, and its length relative to the full step.
+    /// Returns a step along the direction that the factors give, and its length relative to the
+    /// full step.
     fn along_direction(&mut self, state: &State) -> Option<(State, f64)> {
         let descent: Vec<f64> = state.gradient.iter().map(|g| -g).collect();
         let direction = self.factors.solve(&descent);
@@ -152,10 +153,10 @@ impl Search<'_> {
     }
 }
 
-/// Whether a step of `length` lowers the objective enough. Where the change of the energy is below
-/// the rounding `noise`, the slope at the end decides, which is equivalent for a parabola (Hager
-/// and Zhang, *A new conjugate gradient method with guaranteed descent*, SIAM J. Optim. 16 (2005),
-/// eq. 4.1).
+/// Returns whether a step of `length` lowers the objective enough. Where the change of the energy
+/// is below the rounding `noise`, the slope at the end decides, which is equivalent for a parabola
+/// (Hager and Zhang, *A new conjugate gradient method with guaranteed descent*, SIAM J. Optim. 16
+/// (2005), eq. 4.1).
 fn decreases(change: f64, slope: f64, length: f64, noise: f64, end_slope: f64) -> bool {
     if !(change.is_finite() && end_slope.is_finite()) {
         return false;

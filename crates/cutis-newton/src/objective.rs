@@ -45,8 +45,8 @@ pub(crate) struct State {
 }
 
 impl Objective<'_> {
-    /// Stiffness of the inertia of `mass` in N/m, which the outer energy adds to the diagonal of
-    /// the Hessian.
+    /// Returns the stiffness of the inertia of `mass` in N/m, which the outer energy adds to the
+    /// diagonal of the Hessian.
     pub fn inertia(&self, mass: f64) -> f64 {
         match self.outer {
             Outer::Gravity(_) => 0.0,
@@ -54,8 +54,8 @@ impl Objective<'_> {
         }
     }
 
-    /// Gradient of the outer energy at vertex `v`, and the size of its rounding error in units of
-    /// the machine epsilon.
+    /// Returns the gradient of the outer energy at vertex `v`, and the size of its rounding error
+    /// in units of the machine epsilon.
     fn outer_gradient(&self, v: usize, x: &Point3<f64>) -> (Vector3<f64>, f64) {
         let mass = self.problem.masses()[v];
         match &self.outer {
@@ -67,7 +67,7 @@ impl Objective<'_> {
         }
     }
 
-    /// The objective and its derivatives at the placement `x`.
+    /// Returns the objective and its derivatives at the placement `x`.
     pub fn at(&self, x: Vec<Point3<f64>>) -> State {
         let field = self.problem.elastic.at(&x);
         let free = &self.problem.free;
@@ -90,7 +90,7 @@ impl Objective<'_> {
         State { x, field, gradient, parts, norm, scale, floor, noise }
     }
 
-    /// The objective at `to` minus the objective at `from`, accurate to the rounding of the
+    /// Returns the objective at `to` minus the objective at `from`, accurate to the rounding of the
     /// difference.
     pub fn difference(&self, from: &State, to: &State) -> f64 {
         let mut sum = self.problem.elastic.difference(&from.field, &to.field);
@@ -108,7 +108,7 @@ impl Objective<'_> {
         sum
     }
 
-    /// `from` with the free vertices displaced by `length · direction`.
+    /// Returns `from` with the free vertices displaced by `length · direction`.
     pub fn moved(&self, from: &State, direction: &[f64], length: f64) -> State {
         let mut x = from.x.clone();
         for (&v, step) in self.problem.free.iter().zip(direction.chunks_exact(3)) {

@@ -58,7 +58,7 @@ pub struct Minimum {
     pub definite: bool,
 }
 
-/// The distance of `found` from `reference`, relative to the displacement from `start` to
+/// Returns the distance of `found` from `reference`, relative to the displacement from `start` to
 /// `reference`: the root of `Σ |found − reference|²` over `Σ |reference − start|²`.
 ///
 /// The result has no unit. It is 0 if `found` equals the reference, and infinite if only the

@@ -45,8 +45,8 @@ pub(crate) struct Factors<'a> {
 }
 
 impl Pattern {
-    /// The pattern of a problem with vertices near `x`. The positions only affect the order of
-    /// elimination.
+    /// Returns the pattern of a problem with vertices near `x`. The positions only affect the order
+    /// of elimination.
     pub fn of(problem: &Problem, x: &[Point3<f64>]) -> Result<Self, NewtonError> {
         let free = &problem.free;
         let mut numbers = vec![u32::MAX; x.len()];
@@ -93,12 +93,13 @@ impl Pattern {
         by_rank
     }
 
-    /// The inverse of [`permuted`](Self::permuted).
+    /// Returns the numbers in the order of the free vertices. Reverses
+    /// [`permuted`](Self::permuted).
     pub fn restored(&self, by_rank: &[f64]) -> Vec<f64> {
         self.ranks.iter().flat_map(|&rank| &by_rank[3 * rank as usize..][..3]).copied().collect()
     }
 
-    /// Number of entries in the factors.
+    /// Returns the number of entries in the factors.
     pub fn factor_len(&self) -> usize {
         self.symbolic.len_val()
     }
@@ -124,7 +125,7 @@ impl Pattern {
     }
 }
 
-/// The free vertices, by number, and their neighbors.
+/// Returns the free vertices, by number, and their neighbors.
 fn graph(problem: &Problem, numbers: &[u32]) -> Graph {
     let mut pairs = Vec::new();
     for elements in &problem.elastic.kinds {
@@ -146,7 +147,7 @@ fn graph(problem: &Problem, numbers: &[u32]) -> Graph {
     Graph { offsets, targets: pairs.into_iter().map(|(_, to)| to).collect() }
 }
 
-/// Column starts and row indices of the single numbers of the blocks.
+/// Returns the column starts and row indices of the single numbers of the blocks.
 fn single(starts: &[usize], rows: &[u32]) -> (Vec<usize>, Vec<usize>) {
     let (mut column_starts, mut row_indices) = (vec![0], Vec::with_capacity(9 * rows.len()));
     for column in starts.windows(2) {
@@ -183,13 +184,13 @@ impl Factors<'_> {
         }
     }
 
-    /// Index of the diagonal entry `n` among the numbers of the Hessian.
+    /// Returns the index of the diagonal entry `n` among the numbers of the Hessian.
     pub fn diagonal(&self, n: usize) -> usize {
         // The diagonal block is the last of its columns.
         self.pattern.column_starts[n + 1] - 3 + n % 3
     }
 
-    /// The Hessian times `x`: three numbers for each free vertex, in their order.
+    /// Returns the Hessian times `x`: three numbers for each free vertex, in their order.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let pattern = self.pattern;
         let x = pattern.permuted(x);
@@ -225,7 +226,7 @@ impl Factors<'_> {
         done.is_ok() && self.pivots_exceed_rounding()
     }
 
-    /// Whether every pivot is larger than the rounding error of its diagonal entry.
+    /// Returns whether every pivot is larger than the rounding error of its diagonal entry.
     fn pivots_exceed_rounding(&self) -> bool {
         let SymbolicCholeskyRaw::Supernodal(symbolic) = self.pattern.symbolic.raw() else { return true };
         let factors = SupernodalLltRef::new(symbolic, &self.factors);
@@ -239,8 +240,8 @@ impl Factors<'_> {
         })
     }
 
-    /// The solution of `H x = b` with the last factorized Hessian. `b` has three numbers for each
-    /// free vertex, in their order.
+    /// Returns the solution of `H x = b` with the last factorized Hessian. `b` has three numbers
+    /// for each free vertex, in their order.
     pub fn solve(&mut self, b: &[f64]) -> Vec<f64> {
         let mut x = self.pattern.permuted(b);
         let factors = faer::sparse::linalg::cholesky::LltRef::new(&self.pattern.symbolic, &self.factors);
@@ -259,7 +260,7 @@ mod tests {
 
     use super::*;
 
-    /// A lattice of `n³` vertices with springs on its edges. The first vertex is fixed.
+    /// Returns a lattice of `n³` vertices with springs on its edges. The first vertex is fixed.
     fn lattice(n: usize) -> Problem {
         let Kuhn { positions, edges: springs, .. } = Kuhn::new([n; 3], 1.0);
         let inverse_masses: Vec<f64> = (0..positions.len()).map(|v| f64::from(v > 0)).collect();

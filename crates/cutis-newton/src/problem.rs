@@ -30,8 +30,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// The problem of `system`, with the parameters and stiffnesses that it stores, under a gravity
-    /// in m/s².
+    /// Returns the problem of `system`, with the parameters and stiffnesses that it stores, under a
+    /// gravity in m/s².
     ///
     /// # Errors
     /// A kind with a PBD stiffness, a constraint with compliance 0, no free vertex, or a gravity
@@ -62,17 +62,18 @@ impl Problem {
         })
     }
 
-    /// The positions of the system, in m.
+    /// Returns the positions of the system, in m.
     pub fn positions(&self) -> &[Point3<f64>] {
         &self.positions
     }
 
-    /// Mass of each vertex in kg; infinity for fixed vertices.
+    /// Returns the mass of each vertex in kg; infinity for fixed vertices.
     pub fn masses(&self) -> &[f64] {
         &self.masses
     }
 
-    /// Bytes of the factors of the Hessian, the largest part of the memory of a minimization.
+    /// Returns the size of the Hessian's factors in bytes. They are the largest part of the memory
+    /// of a minimization.
     ///
     /// # Errors
     /// [`NewtonError::Memory`] if the factors cannot be indexed.
@@ -80,12 +81,12 @@ impl Problem {
         Ok(self.pattern()?.factor_len().saturating_mul(size_of::<f64>()))
     }
 
-    /// Number of free vertices.
+    /// Returns the number of free vertices.
     pub fn free_count(&self) -> usize {
         self.free.len()
     }
 
-    /// `Σ ½C²/α − Σ m g·x` in J. The second sum is over the free vertices.
+    /// Returns `Σ ½C²/α − Σ m g·x` in J. The second sum is over the free vertices.
     ///
     /// # Panics
     /// If `x` does not have one position per vertex.
@@ -94,8 +95,8 @@ impl Problem {
         self.elastic.energy(&self.local(x)) - self.free.iter().map(weight).sum::<f64>()
     }
 
-    /// `−∂U/∂x` of the elastic energy at each vertex, in N. At fixed vertices it is the force that
-    /// the body exerts on its support.
+    /// Returns `−∂U/∂x` of the elastic energy at each vertex, in N. At fixed vertices it is the
+    /// force that the body exerts on its support.
     ///
     /// # Panics
     /// If `x` does not have one position per vertex.
@@ -103,8 +104,8 @@ impl Problem {
         self.elastic.at(&self.local(x)).gradient.into_iter().map(|gradient| -gradient).collect()
     }
 
-    /// `x̃ = x + h·v + h²·g` of the free vertices, for a step of `h` seconds from the positions `x`
-    /// with the velocities `v` (m/s). Fixed vertices stay at `x`.
+    /// Returns `x̃ = x + h·v + h²·g` of the free vertices, for a step of `h` seconds from the
+    /// positions `x` with the velocities `v` (m/s). Fixed vertices stay at `x`.
     ///
     /// # Panics
     /// If `x` or `v` does not have one entry per vertex.
@@ -118,9 +119,9 @@ impl Problem {
         predicted
     }
 
-    /// An implicit Euler step of `h` seconds: the minimizer of `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`,
-    /// found from `start`. Gravity is part of `x̃`, see [`predicted`](Self::predicted). Fixed
-    /// vertices stay at `start`.
+    /// Returns an implicit Euler step of `h` seconds: the minimizer of
+    /// `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`, found from `start`. Gravity is part of `x̃`, see
+    /// [`predicted`](Self::predicted). Fixed vertices stay at `start`.
     ///
     /// # Errors
     /// Different lengths, numbers that are not finite, an `h` of 0 or less, a lack of memory, or no
@@ -143,8 +144,8 @@ impl Problem {
         self.minimum(start, outer, options)
     }
 
-    /// Static equilibrium under gravity: a minimum of [`energy`](Self::energy), found from `start`.
-    /// Fixed vertices stay at `start`.
+    /// Returns the static equilibrium under gravity: a minimum of [`energy`](Self::energy), found
+    /// from `start`. Fixed vertices stay at `start`.
     ///
     /// # Errors
     /// The errors of [`step`](Self::step), and [`NewtonError::Floating`] for a part of the body
@@ -173,13 +174,14 @@ impl Problem {
         Ok(Minimum { positions, gradient, iterations, energy_j, definite })
     }
 
-    /// The sparsity pattern of the Hessian and of its factors, found at the first call.
+    /// Returns the sparsity pattern of the Hessian and of its factors, found at the first call.
     pub(crate) fn pattern(&self) -> Result<&Pattern, NewtonError> {
         let pattern = self.pattern.get_or_init(|| Pattern::of(self, &self.local(&self.positions)));
         pattern.as_ref().map_err(Clone::clone)
     }
 
-    /// Positions relative to the system's origin. The parameters of its constraints refer to these.
+    /// Returns the positions relative to the system's origin. The parameters of its constraints
+    /// refer to these.
     pub(crate) fn local(&self, x: &[Point3<f64>]) -> Vec<Point3<f64>> {
         assert_eq!(x.len(), self.masses.len(), "one position per vertex");
         x.iter().map(|x| x - self.origin).collect()

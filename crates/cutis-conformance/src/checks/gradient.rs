@@ -36,7 +36,7 @@ pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
     report
 }
 
-/// Central differences of the value in every coordinate.
+/// Returns the central differences of the value in every coordinate.
 fn differences<C: Constraint<N>, const N: usize>(case: &Case<N>) -> [Vector3<f64>; N] {
     let step = STEP * case.scale;
     let mut result = [Vector3::zeros(); N];

@@ -53,7 +53,7 @@ where
     Eval { c: in_lanes.c.extract(lane), grad }
 }
 
-/// Whether the bits are equal. All NaN count as equal.
+/// Returns whether the bits are equal. All NaN count as equal.
 fn same_bits<T: Scalar, const N: usize>(a: &Eval<T, N>, b: &Eval<T, N>) -> bool {
     let bits = |value: T| if value.to_f64().is_nan() { u64::MAX } else { value.to_f64().to_bits() };
     numbers(a).map(bits).eq(numbers(b).map(bits))

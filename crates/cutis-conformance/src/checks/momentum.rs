@@ -51,7 +51,8 @@ fn force<const N: usize>(grad: &[Vector3<f64>; N]) -> f64 {
     grad.iter().sum::<Vector3<f64>>().norm() / length(grad)
 }
 
-/// The torque about the first point, so that the position of the shape adds no rounding error.
+/// Returns the torque about the first point, so that the position of the shape adds no rounding
+/// error.
 fn torque<const N: usize>(case: &Case<N>, grad: [Vector3<f64>; N]) -> f64 {
     let torque: Vector3<f64> = (0..N).map(|i| (case.x[i] - case.x[0]).cross(&grad[i])).sum();
     torque.norm() / (case.scale * length(&grad))

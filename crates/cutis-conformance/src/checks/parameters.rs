@@ -27,7 +27,7 @@ pub fn parameters<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> 
     report
 }
 
-/// The effect of a change of parameter `k`, relative to the size of the sample.
+/// Returns the effect of a change of parameter `k`, relative to the size of the sample.
 fn effect<C: Constraint<N>, const N: usize>(case: &Case<N>, k: usize) -> f64 {
     let mut changed = case.clone();
     changed.params[k] *= FACTOR;

@@ -34,7 +34,7 @@ pub fn projection<C: Constraint<N>, const N: usize>(
     Ok(report)
 }
 
-/// The bodies for the solvers.
+/// Returns the bodies for the solvers.
 pub(crate) fn bodies<C: Constraint<N>, const N: usize>(
     subject: &Subject<C, N>,
 ) -> Result<Vec<TestBody<N>>, ConformanceError> {

@@ -45,8 +45,8 @@ pub fn scale<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Repor
     report
 }
 
-/// Value over rest size and gradients times length over rest size, followed by the reach over
-/// length if the constraint has a reach. One coordinate is moved by an absolute length.
+/// Returns the value over rest size and the gradients times length over rest size, followed by the
+/// reach over length if the constraint has a reach. One coordinate is moved by an absolute length.
 fn without_unit<C: Constraint<N>, const N: usize>(case: &Case<N>, absolute: f64) -> Vec<Vec<f64>> {
     let mut moved = case.clone();
     moved.x[0].x += absolute;

@@ -112,7 +112,8 @@ fn with_extra_parameter(wgsl: &str) -> String {
     source
 }
 
-/// The difference between `struct Params` and `scalars` numbers of type `f32`, if there is one.
+/// Returns the difference between `struct Params` and `scalars` numbers of type `f32`, if there is
+/// one.
 fn fault_of_params(module: &Module, scalars: usize) -> Option<String> {
     let params = module.types.iter().find(|(_, one)| one.name.as_deref() == Some("Params"));
     let Some((_, params)) = params else { return Some("there is no `struct Params`".to_owned()) };

@@ -56,7 +56,8 @@ pub fn evaluation<C: Constraint<N>, const N: usize>(
     Ok(report)
 }
 
-/// Value and gradients of the samples on the device, from the WGSL source of a constraint.
+/// Returns the value and gradients of the samples on the device, from the WGSL source of a
+/// constraint.
 ///
 /// # Errors
 /// [`GpuError::Shader`] if the source is refused, and the errors of the device.
@@ -85,12 +86,13 @@ pub(super) fn evaluate<C: Constraint<N>, const N: usize>(
     Ok(found.chunks_exact(N).map(eval).collect())
 }
 
-/// Number of numbers that are not equal.
+/// Returns the number of unequal numbers.
 pub(super) fn differing<const N: usize>(a: &[Eval<f32, N>], b: &[Eval<f32, N>]) -> usize {
     a.iter().flat_map(numbers).zip(b.iter().flat_map(numbers)).filter(|(a, b)| a != b).count()
 }
 
-/// The deviation of value or gradient divided by its tolerance, at the scale where it is smallest.
+/// Returns the deviation of value or gradient divided by its tolerance, at the scale where it is
+/// smallest.
 fn least_excess(found: &[Errors], cpu: &[Errors]) -> f64 {
     let of = |found: Deviation, cpu: Deviation| excess(found, tolerance(cpu, f32::EPSILON.into()));
     let both = |(found, cpu): (&Errors, &Errors)| {

@@ -21,7 +21,7 @@ pub use projection::projection;
 
 pub use crate::measure::ALLOWANCE;
 
-/// Whether the adapter rounds as the CPU does, so that every number must be equal.
+/// Returns whether the adapter rounds as the CPU does, so that every number must be equal.
 pub(crate) fn is_exact(gpu: &Gpu) -> bool {
     gpu.adapter().kind == AdapterKind::Software
 }
