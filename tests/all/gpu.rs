@@ -203,7 +203,7 @@ fn a_lost_device_leaves_the_last_checkpoint() {
         run_in(whole.path(), &loaded("2"), false).unwrap();
         assert!(agree(gpu, whole.path(), folder.path()));
 
-        // A lost device starts no run. Without a checkpoint the message says so.
+        // A run does not start on a lost device. If there is no checkpoint, the message says so.
         let error = run_on(gpu, without.path(), &loaded("2"), false).unwrap_err();
         assert!(!error.is_bad_input() && error.to_string().contains("lost"), "{error}");
         assert!(names(without.path()).is_empty());

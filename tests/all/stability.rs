@@ -31,8 +31,8 @@ fn extreme_cases_end_as_expected_in_double_precision() {
     check(|keep| stability::run_reference(&cases, &[1e-3], keep));
 }
 
-/// One case of each sort at the scale where an absolute length would show, since a software adapter
-/// is slow.
+/// One case of each sort, because a software adapter is slow. The scale is the one at which an
+/// absolute length would cause a failure.
 #[test]
 fn extreme_cases_end_as_they_must_on_a_gpu() {
     const ON_GPU: [&str; 11] = [

@@ -22,7 +22,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         bail!("the examples do not compile");
     }
     let programs = programs(&String::from_utf8_lossy(&output.stdout))?;
-    // Examples may write files to the current folder: not into the checkout.
+    // Examples may write files to the current folder, which must not be the checkout.
     let folder = workspace.target_dir()?.join("examples-output");
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     for (name, program) in &programs {

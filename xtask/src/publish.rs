@@ -1,9 +1,9 @@
 //! `cargo xtask publish --dry-run`: packs every publishable crate and compiles each from its
 //! package.
 //!
-//! `cargo publish --dry-run` can compile packages, too, but it unpacks them into cargo's home
-//! folder and takes the packages of an earlier run for the same, because name and version are the
-//! same. So this module unpacks them into the target folder and compiles them there.
+//! `cargo publish --dry-run` can compile packages too. But it unpacks them into cargo's home folder
+//! and reuses the packages of an earlier run, because name and version are the same. So this module
+//! unpacks them into the target folder and compiles them there.
 
 use std::fs;
 use std::path::Path;

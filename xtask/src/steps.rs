@@ -149,8 +149,8 @@ fn tests(workspace: &Workspace) -> Result<()> {
     execute(vulkan::for_gpu_tests(workspace.cargo("test").args(["--workspace", "--no-fail-fast"])))
 }
 
-/// The crate that adds constraints from outside, as a user's crate would. It shares the build
-/// folder of the workspace, so that cargo builds common dependencies only once.
+/// The crate that adds constraints from outside the workspace, like the crate of a user. It shares
+/// the build folder of the workspace, so that cargo builds common dependencies only once.
 fn third_party(workspace: &Workspace) -> Result<()> {
     let (manifest, target) = (workspace.third_party_manifest(), workspace.target_dir()?);
     let cargo = |subcommand: &str| {

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use crate::python::PYTHON;
 use crate::workspace::Workspace;
 
-/// Lists the devices of the Vulkan loader. A file, because `.ci/run` runs it too.
+/// Lists the devices of the Vulkan loader. It is a file of its own because `.ci/run` runs it too.
 const LIST_DEVICES: &str = "xtask/vulkan.py";
 
 /// Variables by which a user names the drivers that the loader may use.
@@ -59,8 +59,7 @@ pub fn require(workspace: &Workspace) -> Result<String> {
     bail!(remedy(reason, named_by))
 }
 
-/// What to do about a machine without an adapter. `named_by` is the variable that names the
-/// drivers.
+/// Advice for a machine without an adapter. `named_by` is the variable that names the drivers.
 fn remedy(reason: &str, named_by: Option<&str>) -> String {
     match named_by {
         Some(variable) => format!(

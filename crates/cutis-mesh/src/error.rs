@@ -164,7 +164,7 @@ pub enum MeshError {
     FineZone {
         /// Index axis.
         axis: usize,
-        /// Begin of the zone in steps of the even lattice.
+        /// Start of the zone in steps of the even lattice.
         from: f64,
         /// End of the zone in steps of the even lattice.
         to: f64,

@@ -53,7 +53,7 @@ impl Planes {
     /// Computes planes over the extent of the lattice `even`. In the zone `fine` they are the
     /// planes of `even`, outside it there are fewer.
     ///
-    /// `fine` holds the begin and end of the zone along each axis in steps of `even`, and is
+    /// `fine` holds the start and end of the zone along each axis in steps of `even`, and is
     /// rounded outwards. On each side of the zone there are as few planes as the grading allows.
     /// Their steps grow by one common factor, chosen such that the last plane is the last plane of
     /// `even`.

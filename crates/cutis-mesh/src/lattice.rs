@@ -59,7 +59,7 @@ impl Lattice {
     /// in steps of `even`.
     ///
     /// # Errors
-    /// As [`Lattice::new`].
+    /// The errors of [`Lattice::new`].
     pub fn graded(even: Grid, split: Split, planes: Planes) -> Result<Self, MeshError> {
         Self::check(&even, even.shape)?;
         let grid = Grid { shape: planes.shape(), affine: even.affine };

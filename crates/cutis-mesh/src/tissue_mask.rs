@@ -131,7 +131,8 @@ impl TissueMask {
     /// of the mesh depends on the region.
     ///
     /// # Errors
-    /// As [`TissueMask::mesh`], and [`MeshError::RegionEmpty`] if no vertex of the body is inside.
+    /// The errors of [`TissueMask::mesh`], and [`MeshError::RegionEmpty`] if no vertex of the body
+    /// is inside.
     pub fn mesh_within(&self, hu: &[f32], inside: &[bool]) -> Result<TetMesh, MeshError> {
         let (lattice, grid) = (&self.lattice, self.lattice.grid());
         if inside.len() != grid.len() {

@@ -96,7 +96,7 @@ pub fn write_vtu(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), Mes
 /// Writes a surface (`.vtp`) of triangles.
 ///
 /// # Errors
-/// As [`write_vtu`], and [`MeshError::NotASurface`] if the cells are tets.
+/// The errors of [`write_vtu`], and [`MeshError::NotASurface`] if the cells are tets.
 pub fn write_vtp(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), MeshError> {
     if let Cells::Tets(_) = piece.cells {
         return Err(MeshError::NotASurface { path: path.to_path_buf() });

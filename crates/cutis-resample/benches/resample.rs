@@ -1,5 +1,5 @@
 //! A volume of 256³ voxels through a lattice of 1.5 million tets on one thread: with all tets
-//! moving, with a ball of them moving, and with none.
+//! moving, with a ball of moving tets, and with none moving.
 
 use std::hint::black_box;
 

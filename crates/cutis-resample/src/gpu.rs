@@ -17,10 +17,10 @@
 //!    the body may have left.
 //! 5. `gather` runs with one thread per two voxels and computes their values through their owners.
 //!
-//! The CPU computes in `f64`. Two results may differ from it. First, the owner of a center that is
-//! within a few `f32` roundings of a face. Second, values, by the rounding of the place at rest. A
-//! tet takes no part if `f32` cannot distinguish its volume from zero, because it is too flat or a
-//! corner is too far away.
+//! The CPU computes in `f64`. Two results may differ from those of the CPU. First, a center that is
+//! within a few `f32` roundings of a face may have another owner. Second, values change with the
+//! rounding of the place at rest. A tet takes no part if `f32` cannot distinguish its volume from
+//! zero, because it is too flat or a corner is too far away.
 
 mod bound;
 mod kernels;

@@ -35,8 +35,8 @@ struct Crossings {
     slack: [f64; 4],
 }
 
-/// Ranges of columns of a row, as first and end, by how firmly the tet holds their centers. Each
-/// range lies in the one before.
+/// Ranges of columns of a row, as first and end, for three strictness levels of the test whether
+/// the tet holds a center. Each range lies within the previous one.
 #[derive(Clone, Copy)]
 pub struct HeldColumns {
     /// Inside, or outside by at most the tolerance.
@@ -148,7 +148,7 @@ pub struct RowCrossings<'a> {
 }
 
 impl RowCrossings<'_> {
-    /// The ranges of columns by how firmly the tet holds them.
+    /// The ranges of columns for the three strictness levels.
     #[inline]
     pub fn columns(&self) -> HeldColumns {
         let level = |times: f64| {

@@ -107,8 +107,8 @@ impl<'a> Slab<'a> {
         });
     }
 
-    /// Sets voxels to air that a tet covers at rest and no deformed tet covers. Call it after every
-    /// [`Slab::deform`].
+    /// Sets the voxels to air that a tet covers at rest and no deformed tet covers. Call it after
+    /// every [`Slab::deform`].
     pub fn vacate(&mut self, vertices: [u32; 4]) {
         let Source { warp, space, air, .. } = *self.source;
         let rest = vertices.map(|v| space.index(warp.rest[v as usize]));

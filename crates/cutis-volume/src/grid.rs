@@ -52,8 +52,8 @@ impl Grid {
     /// Views one value per point as an `ndarray` array, without a copy.
     ///
     /// The view has the shape `shape` and is indexed `[i, j, k]`: axis 0 is `i`, which varies
-    /// fastest in memory, axis 2 is `k`. It serves for any field over a volume or a lattice, such
-    /// as the result of [`sample::to_grid`](crate::sample::to_grid).
+    /// fastest in memory, axis 2 is `k`. It works for any field over a volume or a lattice, such as
+    /// the result of [`sample::to_grid`](crate::sample::to_grid).
     ///
     /// ```
     /// use cutis_volume::{Affine, Grid};

@@ -85,9 +85,9 @@ impl Volume {
     /// HU at a continuous voxel index, by trilinear interpolation.
     ///
     /// The value at a voxel center is exactly that of the voxel. An index outside the volume is
-    /// moved to the nearest point of it. The value at an index that is not finite is air. If some
-    /// of the eight voxels are padding (below −1024 HU) and others are not, the padding counts as
-    /// −1024.
+    /// moved to the nearest point of the volume. The value at an index that is not finite is air.
+    /// If some of the eight voxels are padding (below −1024 HU) and others are not, the padding
+    /// counts as −1024.
     pub fn trilinear(&self, index: Point3<f64>) -> f32 {
         if !index.iter().all(|x| x.is_finite()) {
             return AIR_HU;

@@ -145,7 +145,7 @@ pub enum Error {
     Checkpoint {
         /// The checkpoint file.
         path: PathBuf,
-        /// What does not match.
+        /// The mismatch or the damage.
         why: String,
     },
 }
@@ -172,7 +172,7 @@ impl Error {
             Self::Solver(e) => !matches!(e, SolverError::NotFinite { .. } | SolverError::Device { .. }),
             Self::Cpu(e) => !matches!(e, CpuError::ThreadPool { .. }),
             Self::File { action, .. } => *action == "read",
-            // These say that the scene does not fit the GPU. All others are faults of the GPU or
+            // In these cases the scene does not fit the GPU. All others are faults of the GPU or
             // the program.
             #[cfg(feature = "gpu")]
             Self::Gpu(e) => matches!(

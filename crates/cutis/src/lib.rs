@@ -11,10 +11,10 @@
 //! # Ok::<(), cutis::Error>(())
 //! ```
 //!
-//! A run is a walk through the modules of this crate: `scene` (the scene file), `ct` (the volume),
-//! `body` (lattice, skin, incisions), `model` (constraints or ChainMail), `backend` (CPU or GPU),
-//! `run` (frames), `output` (files and report), and next to them `cost` (plans and costs) and
-//! `tune` (the choice of a setting). Start reading at `run`.
+//! A run goes through the modules of this crate in this order: `scene` (the scene file), `ct` (the
+//! volume), `body` (lattice, skin, incisions), `model` (constraints or ChainMail), `backend` (CPU
+//! or GPU), `run` (frames) and `output` (files and report). Two more modules use these: `cost`
+//! (plans and costs) and `tune` (the choice of a setting). Start reading at `run`.
 //!
 //! The parts are crates of their own, re-exported here: [`volume`] (CT in and out), [`mesh`]
 //! (lattice, skin, incisions), [`constraints`], [`coloring`], [`solver`] and [`solver_cpu`],

@@ -8,7 +8,7 @@ pub trait Progress: Sync {
     fn advance(&self, done: u64);
     /// The current stage is finished.
     fn end(&self);
-    /// A note to the user, given once.
+    /// A note to the user. Each note is sent once.
     fn note(&self, message: &str);
 }
 

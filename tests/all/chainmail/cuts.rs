@@ -152,7 +152,7 @@ fn overlapping_incisions_cut_at_their_own_times() {
     }
 }
 
-/// There is no contact, so lips can pass through each other.
+/// There is no contact, so the lips can pass through each other.
 #[test]
 fn lips_that_pass_through_each_other_are_reported() {
     let over = "[{ at_mm = [-18, 97, 0], radius_mm = 22, move_mm = [40, 0, 0], over_s = 0.5 }]";

@@ -25,7 +25,7 @@ use super::nifti::Nifti;
 
 /// Lowest and highest corner of the body.
 pub const BODY_MM: [[f64; 3]; 2] = [[-90.0, -48.0, -90.0], [58.0, 40.0, 70.0]];
-/// The notch at the upper right edge begins here: x and z.
+/// Start of the notch at the upper right edge: x and z.
 pub const NOTCH_MM: [f64; 2] = [30.0, 54.0];
 /// Centers of the markers, the patient's right one first.
 pub const MARKERS_MM: [[f64; 3]; 2] = [[44.0, 6.0, 20.0], [-24.0, 6.0, 20.0]];
@@ -42,7 +42,7 @@ pub const FRAMES: usize = 12;
 pub const DT_S: f64 = 0.02;
 /// Voxel size.
 pub const VOXEL_MM: f64 = 4.0;
-/// Lattice spacing that the scene asks for; the lattice takes a little less.
+/// Lattice spacing of the scene. The lattice rounds it to a slightly smaller value.
 pub const STEP_MM: f64 = 8.0;
 
 const SCENE: &str = r#"
@@ -110,9 +110,9 @@ pub fn ct() -> Nifti {
     ct
 }
 
-/// What a run left.
+/// The results of a finished run.
 pub struct Finished {
-    /// `report.json`, where it was asked for.
+    /// `report.json`, if the scene asks for it.
     pub report: Value,
     /// Contents of the files by name.
     pub files: BTreeMap<String, Vec<u8>>,

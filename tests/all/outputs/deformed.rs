@@ -42,8 +42,7 @@ fn markers_are_where_the_handle_took_them() {
     }
 }
 
-/// What is fixed keeps its voxels, but at its edges; there are no values but those between air and
-/// the markers.
+/// Fixed tissue keeps its voxels except at its edges. All values lie between air and the markers.
 #[test]
 fn what_is_fixed_is_unchanged() {
     let (before, after) = (ct(), deformed());
@@ -56,7 +55,8 @@ fn what_is_fixed_is_unchanged() {
     assert!(after.voxels.iter().all(|voxel| (-1000..=HU[1]).contains(voxel)));
 }
 
-/// Voxels that changed from tissue to air, and voxels of tissue, as the report counts them.
+/// Voxels that changed from tissue to air, and voxels of tissue, compared with the counts of the
+/// report.
 #[test]
 fn counts_of_voxels_are_those_of_the_file() {
     let (run, before, after) = (finished(), ct(), deformed());
@@ -64,7 +64,7 @@ fn counts_of_voxels_are_those_of_the_file() {
     let count =
         |counts: &dyn Fn(usize) -> bool| (0..before.voxels.len()).filter(|&n| counts(n)).count() as f64;
     let (covered, vacated) = (run.number("/resample/covered_voxels"), run.number("/resample/vacated_voxels"));
-    // The body with a shell of one lattice step around it, which moves along.
+    // The body and the shell of one lattice step around it, which moves with the body.
     let tissue = count(&|n| is_tissue(&after, n));
     assert!((1.0..1.3).contains(&(covered / tissue)), "{covered} covered, {tissue} of tissue");
     let left = count(&|n| is_tissue(&before, n) && !is_tissue(&after, n));

@@ -1,9 +1,11 @@
-//! Skin settings that no figure of a report names: values near an incision, and stiffness by HU.
+//! Skin settings whose effect no number of the report shows directly: values near an incision, and
+//! stiffness by HU.
 
 use super::body::{Finished, run};
 use super::vtu::Vtu;
 
-/// No handle, one incision along z at x = 20, nothing written but the skin.
+/// Overrides for a run without a handle, with one incision along z at x = 20, that writes only the
+/// skin.
 const COMMON: [(&str, &str); 4] = [
     ("handle", "[]"),
     ("incision", "[{ from_mm = [20, 40, -20], to_mm = [20, 40, 60], depth_mm = 15, width_mm = 8 }]"),
@@ -71,7 +73,7 @@ fn stiffness_by_hu_multiplies_the_modulus() {
             .files["skin.vtu"]
             .clone()
     };
-    // Tissue has −449 to 150 HU: there the table is 2, and far from it elsewhere.
+    // Tissue has −449 to 150 HU: in this range the table is 2, and outside it rises towards 9.
     let doubled = skin("50.0", "[[-1000, 9.0], [-449, 2.0], [150, 2.0], [1000, 9.0]]");
     assert!(doubled == skin("100.0", "\"uniform\""), "50 N/m times 2 is 100 N/m");
     assert!(doubled != skin("50.0", "\"uniform\""), "the table has an effect");

@@ -1,8 +1,8 @@
-//! `frames.csv` and the times: each column against another output that holds the same quantity.
+//! `frames.csv` and the times: each column is compared with another output of the same quantity.
 
 use super::body::{DT_S, FRAMES, Finished, finished};
 
-/// The rows of `frames.csv` under their names.
+/// The values of `frames.csv` by the name of their column.
 pub fn column(run: &Finished, name: &str) -> Vec<f64> {
     let mut lines = run.text("frames.csv").lines();
     let place = lines.next().unwrap().split(',').position(|column| column == name);
@@ -27,7 +27,8 @@ fn frames_and_times_count_up() {
     }
 }
 
-/// The first row is the body at rest, the last one the result; mean and middle are not exchanged.
+/// The first row is the body at rest, and the last row is the result. The mean and the middle
+/// opening are not swapped.
 #[test]
 fn openings_are_those_of_the_report() {
     let run = finished();
@@ -51,7 +52,8 @@ fn openings_are_those_of_the_report() {
     assert_eq!(run.report["wound"], run.report["wounds"][0], "`wound` is the first one");
 }
 
-/// Count, mean and shortest time of the report are those of the table, and they fit into the stage.
+/// Frame count, mean and shortest time in the report equal those of the table, and fit into the
+/// time of the stage.
 #[test]
 fn times_per_frame_are_those_of_the_table() {
     let run = finished();

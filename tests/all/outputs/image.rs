@@ -96,7 +96,7 @@ impl Picture {
         around.all(|(x, y)| self.pixel(x, y) != WHITE)
     }
 
-    /// True if all pixels of a cell are pure white, or none is.
+    /// True if all pixels of a cell are pure white (with `white`), or if none of them is (without).
     fn is_white(&self, left: usize, top: usize, size: usize, white: bool) -> bool {
         (top..top + size).all(|y| (left..left + size).all(|x| (self.pixel(x, y) == WHITE) == white))
     }

@@ -1,5 +1,5 @@
-//! `cutis inspect`, `skin`, `check` and single slices, against the body and against the phantom's
-//! anatomy.
+//! `cutis inspect`, `skin`, `check` and single slices, compared with the body and with the
+//! phantom's anatomy.
 
 use cutis::mesh::{SkinMode, Split};
 use cutis::render::{Plane, SliceView, slice};
@@ -37,8 +37,8 @@ fn an_inspection_describes_the_file() {
     assert_eq!(found["nan_count"], 0);
 }
 
-/// The skin of the body: its file has the frame, the place and the triangles that the report
-/// counts.
+/// The skin file of the body has the right frame and position, and as many triangles as the report
+/// says.
 #[test]
 fn the_skin_of_a_file_is_where_the_body_is() {
     let request = SkinRequest { lattice: LatticeSize::Native, split: Split::Kuhn6, mode: SkinMode::Exterior };
@@ -63,7 +63,7 @@ fn the_skin_of_a_file_is_where_the_body_is() {
     assert_eq!((report.coverage, report.enclosed_share), (1.0, 0.0));
 }
 
-/// A plan counts what the run of the same scene then reports.
+/// The counts of a plan equal those that the run of the same scene reports.
 #[test]
 fn a_plan_counts_what_the_run_reports() {
     let run = finished();
@@ -90,7 +90,7 @@ fn toml_of(scene: &cutis::Scene) -> String {
 }
 
 /// The spine is posterior, the lungs are superior, and the liver is on the patient's right: the
-/// letters must say so.
+/// orientation letters must agree.
 #[test]
 fn slices_of_the_phantom_have_the_letters_of_its_anatomy() {
     let volume = Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap();
@@ -98,7 +98,7 @@ fn slices_of_the_phantom_have_the_letters_of_its_anatomy() {
         let view = SliceView { long_side: Some(480), ..SliceView::new(plane, 0.0) };
         Picture::of_bytes(&slice(&volume, &view).unwrap().to_png().unwrap())
     };
-    // Mean place of bone, from 0 at the left or top to 1.
+    // Mean position of bone, from 0 at the left or top to 1 at the right or bottom.
     let bone = |picture: &Picture, axis: usize| {
         let size = [picture.width, picture.height];
         // Without the letters at the edges and the scale bar.

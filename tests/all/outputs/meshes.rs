@@ -1,5 +1,5 @@
-//! `skin.vtu` and `tissue.vtu`: frame, signs, units, arrays and orientation, against the landmarks
-//! of the body.
+//! `skin.vtu` and `tissue.vtu`: frame, signs, units, arrays and orientation, compared with the
+//! landmarks of the body.
 
 use super::body::{BODY_MM, Finished, HANDLE_MM, MARKERS_MM, MOVE_MM, STEP_MM, finished, hu_at};
 use super::vtu::Vtu;
@@ -67,7 +67,7 @@ fn displacements_are_those_of_the_handle_and_of_what_is_fixed() {
     }
 }
 
-/// Where the CT has one value for a lattice step around, a vertex has it too.
+/// A vertex has the HU of the CT where the CT is constant within one lattice step.
 #[test]
 fn vertices_have_the_hu_of_their_place_at_rest() {
     for name in ["skin.vtu", "tissue.vtu"] {
@@ -91,14 +91,15 @@ fn vertices_have_the_hu_of_their_place_at_rest() {
     }
 }
 
-/// Tetrahedra have positive volume, and together that of the body; skin triangles face outwards.
+/// Each tetrahedron has a positive volume, and all together have the volume of the body. Skin
+/// triangles face outwards.
 #[test]
 fn cells_are_oriented_and_fill_the_body() {
     let volume = |corners: &[[f64; 3]]| {
         let [a, b, c, d] = [0, 1, 2, 3].map(|n| nalgebra::Vector3::from(corners[n]));
         (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
     };
-    // What the lattice covers: a step less than the body along each axis, at the most.
+    // The lattice covers at least the body less one step along each axis.
     let size = |less: f64| (0..3).map(|axis| BODY_MM[1][axis] - BODY_MM[0][axis] - less).product::<f64>();
     let plausible = size(2.0 * STEP_MM) * 0.97..size(0.0);
 

@@ -1,5 +1,6 @@
-//! What users look at: pictures, meshes, tables and reports of a run, checked against a body whose
-//! landmarks are known in millimeters. The files are read here without the product's own readers.
+//! Tests of the outputs that users look at: pictures, meshes, tables and reports of a run. They are
+//! compared with a body whose landmarks are known in millimeters. The tests read the files without
+//! the product's own readers.
 
 mod body;
 mod deformed;

@@ -1,9 +1,9 @@
-//! `report.html`: its sentences, tables and chart say what `report.json` and `frames.csv` say.
+//! `report.html`: its sentences, tables and chart agree with `report.json` and `frames.csv`.
 
 use super::body::{DT_S, FRAMES, finished};
 use super::frames::column;
 
-/// Text between two others, at its first place.
+/// The text between the first `from` and the next `to`.
 fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
     let rest = text.split_once(from).unwrap_or_else(|| panic!("no {from:?}")).1;
     rest.split_once(to).unwrap_or_else(|| panic!("no {to:?} after {from:?}")).0
@@ -134,8 +134,8 @@ fn lists_and_the_scene_are_shown_in_full() {
     }
 }
 
-/// The chart's lines against its ticks: what they show at the first and the last frame is in
-/// `frames.csv`.
+/// The chart's lines, read by its ticks, have the values of `frames.csv` at the first and the last
+/// frame.
 #[test]
 fn the_chart_shows_the_openings_over_time() {
     let svg = between(html(), "<figure><svg", "</svg>");
@@ -151,7 +151,7 @@ fn the_chart_shows_the_openings_over_time() {
         };
         texts.iter().filter_map(of).collect()
     };
-    // Value at a place in the picture, by the first and the last tick of an axis.
+    // Value at a position in the picture, from the first and the last tick of an axis.
     let scale = |ticks: &[[f64; 2]], place: f64| {
         let [[a, x], [b, y]] = [ticks[0], ticks[ticks.len() - 1]];
         a + (place - x) / (y - x) * (b - a)
@@ -166,7 +166,7 @@ fn the_chart_shows_the_openings_over_time() {
             let points = between(tag, "M", "\"").split('L');
             let point = |point: &str| {
                 let (x, y) = point.split_once(' ').unwrap();
-                // A label stands half a line below its tick.
+                // A label is half a line below its tick.
                 [scale(&across, number(x)), scale(&upward, number(y) + 4.5)]
             };
             (points.map(point).collect(), between(tag, "stroke=\"", "\""))

@@ -1,4 +1,4 @@
-//! The pictures of a run: which side is which, how long a millimeter is, and which state is shown.
+//! The pictures of a run: their orientation, their scale, and the state that they show.
 
 use base64::Engine;
 
@@ -116,7 +116,7 @@ fn slices_show_their_markers_where_the_letters_and_the_scale_bar_say() {
         let black = slice.part(w / 8..7 * w / 8, h / 8..h / 3).find(|pixel| pixel == [0; 3]).len();
         assert!(black > w * h / 10, "{state}: air is at the top");
     }
-    // The right marker moves with the handle, the left one follows a part of the way.
+    // The right marker moves with the handle. The left one moves less.
     let per_mm = before.scale_bar();
     assert!((per_mm - after.scale_bar()).abs() < 1e-9);
     let apart_mm = (found[0][1][0] - found[0][0][0]) / per_mm;
@@ -168,14 +168,14 @@ fn lines_follow_the_skin_of_their_state() {
     assert_eq!(first(&after, LINES[0]), Some(rest), "the skin at rest is the same in both");
     let deformed = first(&after, LINES[1]).unwrap();
     assert!(((rest - deformed) / per_mm - MOVE_MM[0]).abs() < 1.0, "{rest} and {deformed}");
-    // The skin of the lattice and the edge of the voxels are apart by less than a voxel.
+    // The skin of the lattice and the edge of the voxels differ by less than a voxel.
     for (line, slice) in [(rest, &before), (deformed, &after)] {
         let inside_mm = (line - tissue(slice) as f64) / per_mm;
         assert!((-4.0..4.0).contains(&inside_mm), "the line is {inside_mm} mm inside");
     }
 }
 
-/// Flesh shows in the wound only, and in both pictures.
+/// The colors of tissue appear only in the wound, in both pictures.
 #[test]
 fn only_the_wound_has_the_color_of_flesh() {
     for name in ["before.png", "after.png"] {
@@ -190,7 +190,7 @@ fn only_the_wound_has_the_color_of_flesh() {
     }
 }
 
-/// The page holds the same pictures as the folder, each over its own caption.
+/// The page holds the same pictures as the folder, each above its own caption.
 #[test]
 fn the_page_shows_the_pictures_of_the_folder() {
     let html = finished().text("report.html");

@@ -1,4 +1,4 @@
-//! `report.json`: figures against counts that are made here.
+//! `report.json`: its numbers compared with counts that these tests make themselves.
 
 use std::collections::BTreeSet;
 
@@ -65,8 +65,8 @@ fn what_went_in_is_named() {
     assert!(run.number("/backend/threads") >= 1.0 && run.number("/machine/cores") >= 1.0);
 }
 
-/// Bytes of the cost report are those of the memory lists, and times are there for what was
-/// stepped.
+/// The bytes in the cost report equal those of the memory lists, and each part that was stepped has
+/// a time.
 #[test]
 fn memory_and_costs_agree() {
     let run = finished();
@@ -117,7 +117,7 @@ fn residuals_are_ratios_of_the_right_kind() {
     }
 }
 
-/// Outside a region nothing moves, and its vertices are counted apart.
+/// Nothing moves outside a region, and the vertices there are counted separately.
 #[test]
 fn a_region_counts_what_it_leaves_out() {
     let run = run(&[

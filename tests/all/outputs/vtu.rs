@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-/// A mesh file. Coordinates and vectors are as they stand in the file.
+/// A mesh file. Coordinates and vectors are not converted.
 pub struct Vtu {
     /// Frame of the coordinates: `LPS` or `RAS`.
     pub space: String,

@@ -1,9 +1,9 @@
 //! P7: a block of incompressible tetrahedra is pulled at one end. Its volume error vanishes with
 //! the number of iterations.
 //!
-//! The block is one cube wide: its 36 tetrahedra leave free some of its 60 coordinates. A wide
-//! block of linear tetrahedra has more of them than coordinates and cannot be stretched without a
-//! change of volume (locking).
+//! The block is one cube wide: its 36 tetrahedra do not determine all of its 60 coordinates. A wide
+//! block has more linear tetrahedra than coordinates and cannot be stretched without a change of
+//! volume (locking).
 
 use cutis_coloring::greedy;
 use cutis_constraints::{Distance, Scalar, Volume};

@@ -30,7 +30,8 @@ pub fn on_each_adapter(test: impl FnMut(&Gpu)) {
     on_each_adapter_with(&GpuOptions::default(), test);
 }
 
-/// True if the device gives the CPU's bits. Software adapters do; hardware may fuse operations.
+/// True if the device gives the same bits as the CPU. Software adapters do; hardware may fuse
+/// operations.
 #[must_use]
 pub fn is_exact(gpu: &Gpu) -> bool {
     gpu.adapter().kind == AdapterKind::Software

@@ -1,5 +1,5 @@
 //! A block of cubes cut into six tetrahedra each (Kuhn), with its colors in closed form. Shared by
-//! tests and benches; it knows nothing of volumes, so that solver tests do not depend on how meshes
+//! tests and benches. It does not use volumes, so that solver tests do not depend on the way meshes
 //! are made from scans.
 
 use nalgebra::Point3;
@@ -7,9 +7,9 @@ use nalgebra::Point3;
 /// Steps of the edges: along the axes, across the faces, through the cube.
 const DIRECTIONS: [[usize; 3]; 7] =
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1], [1, 1, 1]];
-/// Orders in which a tetrahedron's corners walk along the axes, from the lowest to the highest
-/// corner of the cube: the even permutations, whose tetrahedra are positively oriented, then the
-/// odd ones.
+/// Orders of the axes along which the corners of a tetrahedron go from the lowest to the highest
+/// corner of the cube. The even permutations, whose tetrahedra are positively oriented, come before
+/// the odd ones.
 const WALKS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 0, 2], [2, 1, 0]];
 
 /// Vertices in rows along x, then y, then z.

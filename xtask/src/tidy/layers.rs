@@ -129,7 +129,7 @@ pub fn packages(metadata: &Value) -> Result<Vec<Package>> {
         .collect()
 }
 
-/// Finds arrows that do not point down, crates without a row, and rows without a crate.
+/// Finds dependencies that do not point down, crates without a row, and rows without a crate.
 pub fn check(packages: &[Package]) -> Vec<Finding> {
     let mut findings = Vec::new();
     for package in packages.iter().filter(|package| is_unpublished(&package.name) && package.publish) {

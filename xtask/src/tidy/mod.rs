@@ -27,7 +27,7 @@ use source::Source;
 use text::Text;
 use words::Words;
 
-/// Something a rule found.
+/// A violation of a rule.
 #[derive(Debug, PartialEq)]
 pub struct Finding {
     severity: Severity,

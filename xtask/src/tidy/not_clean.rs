@@ -14,7 +14,7 @@ pub enum Rule {
     PathAttribute,
 }
 
-/// Rules and the starts of the paths that they do not hold for yet.
+/// Rules with the paths, by their first parts, that do not follow them yet.
 const NOT_CLEAN: &[(Rule, &[&str])] = &[];
 
 /// Findings by rule, without those in exempt paths, which are only counted.

@@ -1,4 +1,5 @@
-//! Rules about the form of prose: the width of its lines, and doc comments that are no full phrase.
+//! Rules about the form of prose: the width of its lines, and doc comments that are not full
+//! phrases.
 
 use super::Finding;
 use super::source::Source;

@@ -1,5 +1,5 @@
 //! Splits a source in Rust or WGSL into code, comments and literals, line by line. Rules then never
-//! take a string or a comment for code.
+//! mistake a string or a comment for code.
 
 /// One source file.
 pub struct Source {

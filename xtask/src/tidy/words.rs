@@ -13,7 +13,7 @@ pub const TABLE: &str = "xtask/words.toml";
 struct Entry {
     phrases: Vec<Vec<String>>,
     instead: String,
-    /// The only part of a text that the entry holds for.
+    /// The only kind of text to which the entry applies.
     only: Option<Part>,
     /// Paths in which the words are allowed.
     except: Vec<String>,

@@ -155,7 +155,7 @@ pub(crate) fn resample(scene: &Path, change: &Change, request: ResampleRequest) 
 }
 
 impl Change {
-    /// The changes that override keys. A later one wins.
+    /// The overrides of scene keys. If a key occurs twice, the later value is used.
     pub(super) fn overrides(&self, lattice: Option<LatticeSize>) -> Vec<Override> {
         let mut list = self.set.clone();
         let mut set = |key: &str, value: String| list.push(Override { key: key.into(), value });

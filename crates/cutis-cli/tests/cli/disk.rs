@@ -109,7 +109,7 @@ fn a_full_disk_leaves_nothing() {
     assert!(desk.names("out").is_empty());
 }
 
-/// Root can write almost anywhere. Nobody can write below a file or in /proc.
+/// Root can write almost anywhere, but nobody can write below a file or in /proc.
 #[test]
 fn a_folder_that_cannot_be_written_is_named() {
     let desk = prepared();

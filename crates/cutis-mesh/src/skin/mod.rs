@@ -13,8 +13,8 @@ use crate::select::{HalfSpace, present};
 use crate::surface::faces;
 use crate::{Lattice, MeshError};
 
-/// The rule by which triangles are skin. In every mode, lattice points in `cut_away` half-spaces
-/// count as air.
+/// The rule that selects the skin triangles. In every mode, lattice points in `cut_away`
+/// half-spaces count as air.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SkinMode {
@@ -42,7 +42,7 @@ pub enum SkinMode {
     Exterior,
 }
 
-/// Options of skin detection besides the mode.
+/// Options of skin detection in addition to the mode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SkinOptions {
     /// Half-spaces that count as air, for example below a plane between a body and the board it

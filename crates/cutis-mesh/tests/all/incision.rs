@@ -249,7 +249,7 @@ fn invalid_incisions_are_refused() {
     assert!(matches!(empty, MeshError::IncisionEmpty { .. }), "{empty}");
     let all = refuse(incision(a, b, 6.0, 400.0));
     assert!(matches!(all, MeshError::IncisionWithoutLips { left: 0, right: 0, .. }), "{all}");
-    // A huge length is refused in short time.
+    // A huge length is refused quickly.
     let long = plan(&mesh, &triangles, &[incision([-1e12, 20.0, 20.0], [1e12, 20.0, 20.0], 6.0, 4.0)]);
     assert!(long.is_err());
     let wrong_index = [[0, 1, u32::MAX]];

@@ -1,5 +1,4 @@
-//! A region of a body: what is left of mesh, skin, shell and cut, and that it is the same there as
-//! in the whole body.
+//! Tests of a region of a body: its mesh, skin, shell and cut equal those of the whole body there.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -53,8 +53,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
 
 /// Reads a volume as [`read`] does, and passes the raw bytes of its files to `observe` on the way.
 ///
-/// This serves to hash a file without reading it twice. `observe` receives the path of the file and
-/// the next portion of its bytes as they are on the disk, before decompression. When the function
+/// Use it to hash a file without reading it twice. `observe` receives the path of the file and the
+/// next portion of its bytes as they are on the disk, before decompression. When the function
 /// succeeds, it has received every byte of the file, in order, including bytes after the last
 /// voxel. Of a pair it receives first the whole `.hdr` file and then the whole `.img` file. One of
 /// the two paths is exactly `path`.
@@ -73,7 +73,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
 /// ```
 ///
 /// # Errors
-/// As [`read`]. After an error `observe` may have received only a part of the bytes.
+/// The errors of [`read`]. After an error `observe` may have received only a part of the bytes.
 pub fn read_observed(
     path: impl AsRef<Path>,
     mut observe: impl FnMut(&Path, &[u8]),
@@ -146,8 +146,8 @@ fn load(mut source: Source<'_>, header_path: &Path, header: &Header) -> Result<L
         let received = (done / dtype.bytes() as u64) as usize;
         if received > reserved {
             // The size of an uncompressed file is known to suffice. For a compressed file, the
-            // reserved memory grows with the voxels received, so that a false header cannot make
-            // the program allocate too much.
+            // reserved memory grows with the voxels received, so that a header with wrong sizes
+            // cannot make the program allocate too much.
             let capacity =
                 if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
             if !converter.reserve(capacity) {

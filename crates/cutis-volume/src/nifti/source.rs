@@ -122,7 +122,8 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// Shows the observer the raw bytes that were not read yet; without an observer, does nothing.
+    /// Reads the remaining raw bytes and passes them to the observer. Does nothing without an
+    /// observer.
     pub(super) fn finish(self) -> Result<(), VolumeError> {
         let mut raw = match self.stream {
             Stream::Plain(raw) => raw,

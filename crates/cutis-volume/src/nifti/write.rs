@@ -17,7 +17,7 @@ const PORTION: usize = 1 << 16;
 /// appears under its name when it is complete.
 ///
 /// # Errors
-/// As [`Writer::create`] and [`Writer::push_slices`].
+/// The errors of [`Writer::create`] and [`Writer::push_slices`].
 pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), VolumeError> {
     let path = path.as_ref();
     let whole = |hu: f32| hu == hu.trunc() && (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&hu);
@@ -92,7 +92,7 @@ impl Writer {
     /// Opens the file and writes a header for stored values with `HU = slope · stored + intercept`.
     ///
     /// # Errors
-    /// As [`Writer::create`].
+    /// The errors of [`Writer::create`].
     pub fn create_scaled(
         path: impl AsRef<Path>,
         grid: Grid,

@@ -116,8 +116,8 @@ impl Phantom {
     /// Computes the whole scan. It takes two bytes of memory per voxel.
     ///
     /// # Errors
-    /// [`VolumeError::PhantomShape`] if the memory does not suffice. [`Phantom::write`] needs
-    /// little memory.
+    /// [`VolumeError::PhantomShape`] if there is not enough memory. [`Phantom::write`] needs little
+    /// memory.
     pub fn volume(&self) -> Result<Volume, VolumeError> {
         let mut voxels = zeros(self.grid.shape)?;
         self.fill_slices(0..self.grid.shape[2], &mut voxels)?;
@@ -128,7 +128,7 @@ impl Phantom {
     /// the number of finished slices and of all slices.
     ///
     /// # Errors
-    /// As [`nifti::Writer`].
+    /// The errors of [`nifti::Writer`].
     pub fn write(
         &self,
         path: impl AsRef<Path>,
@@ -158,8 +158,8 @@ fn voxel_count(shape: [usize; 3]) -> Result<usize, VolumeError> {
     shape.iter().try_fold(1_usize, |count, &n| count.checked_mul(n)).ok_or(refused)
 }
 
-/// Zeroed voxels of a shape, or an error if the shape exceeds the limits or the memory does not
-/// suffice.
+/// Zeroed voxels of a shape, or an error if the shape exceeds the limits or there is not enough
+/// memory.
 fn zeros(shape: [usize; 3]) -> Result<Vec<i16>, VolumeError> {
     let count = voxel_count(shape)?;
     let mut voxels = Vec::new();

@@ -12,7 +12,7 @@ const SAMPLE_MM: f64 = 2.5;
 const BACKGROUND_HU: f32 = -1000.0;
 /// Highest value of a 12-bit scanner in HU.
 const HIGHEST_HU: f32 = 3071.0;
-/// Standard deviation of the noise in HU: at the edge of the field of view, and the addition in the
+/// Standard deviation of the noise in HU at the edge of the field of view, and its increase in the
 /// middle.
 const NOISE_HU: [f32; 2] = [6.0, 7.0];
 /// Number of the random stream for the noise.

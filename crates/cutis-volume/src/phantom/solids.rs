@@ -38,7 +38,7 @@ pub fn sphere(
 /// order. Only the outermost sphere is an exterior surface.
 ///
 /// # Errors
-/// As [`sphere`], and [`VolumeError::SphereRadii`] if the radii do not decrease.
+/// The errors of [`sphere`], and [`VolumeError::SphereRadii`] if the radii do not decrease.
 pub fn nested_spheres(
     shape: [usize; 3],
     spacing_mm: [f64; 3],

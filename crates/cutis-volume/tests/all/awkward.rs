@@ -1,4 +1,4 @@
-//! Compares how unusual NIfTI files are read with nibabel 5.4.2.
+//! Reads unusual NIfTI files and compares the results with nibabel 5.4.2.
 //!
 //! The expected values are those of nibabel except for `no_form`. Without a form, nibabel mirrors
 //! and centers the volume, ITK reads the axes as LPS, and Cutis follows method 1 of the standard

@@ -11,17 +11,17 @@ use crate::output::report::DeviceWork;
 use crate::scene::{SceneFile, SolverSection};
 use crate::{Devices, Error};
 
-/// Why there is no GPU.
+/// The reason why there is no GPU.
 pub(crate) const ABSENT: Option<&str> = Some("this build has no GPU backend");
 
-/// An open GPU; there is no value of this type.
+/// An open GPU. No value of this type exists.
 #[derive(Clone)]
 pub(crate) enum Gpu {}
 
-/// A GPU to be used; there is no value of this type.
+/// The GPU to use. No value of this type exists.
 pub(super) enum Device {}
 
-/// Positions on a GPU; there is no value of this type.
+/// Positions on a GPU. No value of this type exists.
 pub(crate) enum DevicePositions {}
 
 impl DevicePositions {

@@ -23,9 +23,9 @@ const MIN_PER_SWEEP: u64 = 16_384;
 /// upload the body, which a shorter run never earns back. This is an estimate too.
 const MIN_EVALUATIONS: u64 = 100_000_000;
 
-/// Factor on [`MIN_PER_SWEEP`] for a GPU that shares the memory of the CPU. Projections wait for
-/// memory rather than for arithmetic, and there both wait for the same memory. This is an estimate
-/// too.
+/// Factor on [`MIN_PER_SWEEP`] for a GPU that shares the memory of the CPU. Memory limits
+/// projections more than arithmetic does, and here both processors share one memory. This is an
+/// estimate too.
 const SHARED_MEMORY_FACTOR: u64 = 4;
 
 /// The decision of `auto`, with its reason.

@@ -16,7 +16,7 @@ use crate::{Devices, Error};
 pub(crate) use cutis_gpu::Gpu;
 pub(super) use cutis_render::raymarch_gpu as raymarch;
 
-/// Why there is no GPU: this build has the backend.
+/// The reason why there is no GPU: none, because this build has the backend.
 pub(crate) const ABSENT: Option<&str> = None;
 
 /// The GPU to use.
@@ -158,7 +158,7 @@ pub(super) fn open(device: &Device) -> Result<Gpu, Error> {
 pub(crate) struct DevicePositions(Buffer<[f32; 4]>);
 
 impl DevicePositions {
-    /// Copies positions on the GPU and uploads further ones after them.
+    /// Copies positions on the GPU and appends further positions from the host.
     ///
     /// # Errors
     /// [`GpuError`] if the GPU has no room or is lost.
@@ -177,7 +177,7 @@ impl DevicePositions {
         Ok(Self(all))
     }
 
-    /// The same positions, with further ones uploaded after them.
+    /// The same positions, followed by further positions that are uploaded.
     ///
     /// # Errors
     /// [`Error::Gpu`] if the GPU has no room or is lost.
@@ -202,8 +202,7 @@ pub(super) fn resample(
     Ok((resampler.volume(progress)?, resampler.report()?))
 }
 
-/// Whether a stage failed for lack of memory or because the GPU is gone, and not by a faulty
-/// kernel.
+/// True if a stage failed because memory was short or the GPU was lost. False for a faulty kernel.
 pub(super) fn lacks_device(error: &Error) -> bool {
     match error {
         Error::Resample(ResampleError::TooLarge { .. }) => true,

@@ -1,7 +1,7 @@
 //! The choice of the backend that runs a scene, and why it was chosen.
 //!
-//! A backend or adapter that the scene names is settled before any work is done ([`Request::of`]);
-//! if it does not exist, the scene is refused. `auto` is settled when the size of the work is known
+//! A backend or adapter that the scene names is looked up before any other work ([`Request::of`]).
+//! If it does not exist, the scene is refused. `auto` is decided when the amount of work is known
 //! ([`Request::settle`]), so that a small scene never looks for a GPU. No device is opened before
 //! [`Chosen::open`].
 
@@ -20,28 +20,28 @@ pub use devices::{Device, DeviceLimits, Devices, devices};
 pub(crate) use gpu::{ABSENT, DevicePositions, Gpu};
 pub(crate) use stages::Stages;
 
-/// The backend that a scene asks for, as far as it can be settled without a body.
+/// The backend that a scene requests, as far as it is known before the body is built.
 pub(crate) enum Request {
     Settled(Chosen),
     /// The best backend for the size of the work.
     Auto,
 }
 
-/// The amount of work, as far as it matters to the choice.
+/// The amount of work, from which `auto` decides.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only a build with GPUs has a choice"))]
 pub(crate) struct Work {
     pub(crate) vertices: u64,
-    /// What a thread handles: constraints, or vertices in vertex block descent.
+    /// Name of the elements that threads process: constraints, or vertices in vertex block descent.
     pub(crate) element: &'static str,
-    /// Elements of an iteration.
+    /// Number of elements in an iteration.
     pub(crate) elements: u64,
-    /// Colors that an iteration executes one after the other.
+    /// Number of colors that an iteration executes one after the other.
     pub(crate) sweeps: u64,
-    /// Projections of the whole run, or steps of a vertex.
+    /// Number of projections in the whole run, or of vertex steps in vertex block descent.
     pub(crate) projections: u64,
-    /// Evaluations of a constraint in the whole run: one per projection, and one for each
-    /// constraint of a vertex in the step of that vertex.
+    /// Number of constraint evaluations in the whole run: one per projection, or one for each
+    /// constraint of a vertex in each step of that vertex.
     pub(crate) evaluations: u64,
 }
 
@@ -67,7 +67,7 @@ pub(crate) struct DeviceMeter {
 }
 
 impl Request {
-    /// Settles the backend that the scene names.
+    /// Looks up the backend that the scene names.
     ///
     /// # Errors
     /// [`Error::Backend`] if this build or this machine does not have it.
@@ -88,7 +88,7 @@ impl Request {
     /// decides by the size of a simulation.
     ///
     /// # Errors
-    /// As the GPU gives them.
+    /// The errors of the GPU.
     pub(crate) fn open(&self) -> Result<Option<Gpu>, Error> {
         match self {
             Self::Settled(chosen) => chosen.device(),
@@ -102,7 +102,7 @@ impl Request {
         Self::Settled(gpu::opened(gpu))
     }
 
-    /// Settles `auto` by the amount of work.
+    /// Decides `auto` by the amount of work.
     ///
     /// # Errors
     /// [`Error::Backend`] if the scene names an adapter that does not exist.
@@ -118,7 +118,7 @@ impl Request {
         }
     }
 
-    /// Settles `auto` on the CPU, for this reason.
+    /// Decides `auto` for the CPU, with this reason.
     pub(crate) fn settle_on_cpu(self, solver: &SolverSection, reason: &str) -> Chosen {
         match self {
             Self::Settled(chosen) => chosen,
@@ -144,7 +144,7 @@ impl Chosen {
         matches!(self.place, Place::Reference)
     }
 
-    /// `gpu` or `cpu`, as the stages of a report name the place of their work.
+    /// `gpu` or `cpu`, the place of work that a report shows for each stage.
     pub(crate) fn place(&self) -> &'static str {
         if self.on_gpu() { "gpu" } else { "cpu" }
     }
@@ -152,7 +152,7 @@ impl Chosen {
     /// The same backend with its GPU open, if it is one, so that every start uses the same GPU.
     ///
     /// # Errors
-    /// As the GPU gives them.
+    /// The errors of the GPU.
     pub(crate) fn kept_open(self) -> Result<Self, Error> {
         Ok(match self.place {
             Place::Gpu(device) => Self { place: Place::Gpu(gpu::kept_open(device)?), ..self },
@@ -163,7 +163,7 @@ impl Chosen {
     /// Opens the GPU, if it is one.
     ///
     /// # Errors
-    /// As the GPU gives them.
+    /// The errors of the GPU.
     pub(crate) fn device(&self) -> Result<Option<Gpu>, Error> {
         match &self.place {
             Place::Gpu(device) => gpu::open(device).map(Some),
@@ -174,7 +174,7 @@ impl Chosen {
     /// Opens the GPU, if it is one, and counts its work from now on.
     ///
     /// # Errors
-    /// As the GPU gives them.
+    /// The errors of the GPU.
     pub(crate) fn open(&self) -> Result<Option<DeviceMeter>, Error> {
         let meter = |gpu| DeviceMeter { before: gpu::work(&gpu), gpu };
         Ok(self.device()?.map(meter))

@@ -12,7 +12,7 @@ use crate::backend::DevicePositions;
 /// The GPU of the stages after the simulation, if they have one.
 pub(crate) struct Stages {
     gpu: Option<Gpu>,
-    /// Stages that the GPU could not run, and that the CPU ran instead.
+    /// Stages that the CPU ran because the GPU could not.
     pub(crate) notes: Vec<String>,
 }
 

@@ -10,7 +10,7 @@ use crate::Error;
 use crate::scene::{LatticeSection, Zone};
 
 impl LatticeSection {
-    /// The section as a size of a lattice.
+    /// The size of the lattice that the section describes.
     fn size(&self) -> LatticeSize {
         match (self.vertices, self.spacing_mm) {
             (Some(vertices), _) => LatticeSize::Vertices(vertices),

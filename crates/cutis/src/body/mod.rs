@@ -19,8 +19,8 @@ pub(crate) use lattice::even_shape;
 pub(crate) use lattice::lattice;
 pub(crate) use sections::{BodySections, needs_skin};
 
-/// HU below which a lattice point is air, unless a scene says otherwise: the foot of the ramp in
-/// the paper's table of opacity. A point with exactly this HU is tissue.
+/// HU below which a lattice point is air, unless a scene says otherwise: the HU at which opacity
+/// begins to rise in the paper's table. A point with exactly this HU is tissue.
 pub(crate) const AIR_BELOW_HU: f32 = -449.0;
 
 /// Per lattice point: whether it is air. `hu` holds a value per point.

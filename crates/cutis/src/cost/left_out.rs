@@ -6,7 +6,7 @@ use crate::model::constraints::kinds::KINDS;
 use crate::output::report::MemoryPart;
 use crate::scene::Scene;
 
-/// Sections that the scene does not name, with what is not done for that reason.
+/// Sections that the scene does not name, each with the work that is skipped for that reason.
 pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
     let output = &scene.output;
     let gpu = format!("gpu: {}", backend::ABSENT.unwrap_or("no device is opened"));
@@ -29,8 +29,8 @@ pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
     lines.into_iter().filter(|(absent, _)| *absent).map(|(_, line)| line.to_owned()).collect()
 }
 
-/// What a region of interest and a graded lattice leave out. `memory` is the memory of the solver
-/// by part.
+/// The parts that a region of interest and a graded lattice leave out. `memory` is the memory of
+/// the solver by part.
 pub(super) fn of_lattice(body: &Body, memory: &[MemoryPart]) -> Vec<String> {
     [region(body, memory), grading(body)].into_iter().flatten().collect()
 }

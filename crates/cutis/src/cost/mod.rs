@@ -1,5 +1,5 @@
-//! What a run costs. `cutis check` counts and measures before a run; the report of a run has the
-//! measured cost of each part.
+//! The cost of a run. `cutis check` counts and measures it before a run. The report of a run has
+//! the measured cost of each part.
 
 mod cost_report;
 mod left_out;

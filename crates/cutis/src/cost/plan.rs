@@ -39,8 +39,9 @@ pub struct Plan {
     pub costs: CostReport,
     /// Bytes of the volume's voxels.
     pub volume_bytes: usize,
-    /// Projections of the run, steps of a vertex in vertex block descent, or at most so many visits
-    /// of elements by the relaxation of ChainMail. The largest 64-bit number if there are more.
+    /// Number of projections in the run. In vertex block descent the number of vertex steps; with
+    /// ChainMail the largest possible number of element visits by relaxation. Saturates at the
+    /// largest 64-bit number.
     pub projections: u64,
     /// Parts that the scene leaves out, which therefore cost nothing.
     pub left_out: Vec<String>,
@@ -54,7 +55,7 @@ pub struct Plan {
 /// On a CPU backend it steps the body for a moment to measure the time of a frame.
 ///
 /// # Errors
-/// [`Error`] as a run of the scene would give it before its first frame.
+/// The errors that a run of the scene returns before its first frame.
 pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Error> {
     let mut clock = Clock::new(progress);
     let Prepared { body, model, backend, mut plan, .. } = prepare(loaded, Request::of(loaded)?, &mut clock)?;
@@ -104,8 +105,8 @@ fn idle_adapter(scene: &Scene, backend: &Chosen) -> Option<String> {
     ))
 }
 
-/// Warnings about incisions narrower than a lattice step, whose lips begin wider apart than the
-/// scene says.
+/// Warnings about incisions narrower than a lattice step, whose lips are farther apart at the start
+/// than the scene says.
 fn narrow_incisions(incisions: &[IncisionSection], body: &Body) -> Vec<String> {
     let step = body.mesh.lattice.longest_step_mm();
     let all = incisions.iter().enumerate();

@@ -12,7 +12,7 @@ use crate::scene::{LoadedScene, PhantomSection, SceneFile, TableChoice, VolumeSe
 /// The CT and its origin.
 pub(crate) struct Source {
     pub(crate) volume: Volume,
-    /// SHA-256 that identifies the volume: of the file's bytes, or of the phantom's voxels.
+    /// SHA-256 of the file's bytes or of the phantom's voxels. It identifies the volume.
     pub(crate) sha256: String,
     /// The scene file and the CT, for the report.
     pub(crate) inputs: Vec<Input>,

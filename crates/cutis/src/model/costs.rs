@@ -1,4 +1,4 @@
-//! What a model costs, and the counts and warnings that models share.
+//! The cost of a model, and the counts and warnings that models share.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use crate::body::Body;
 use crate::output::report::{MemoryPart, Sizes};
 use crate::scene::Scene;
 
-/// What a plan says about the model.
+/// The model's part of a plan.
 pub(crate) struct ModelCosts {
     pub(crate) backend: Chosen,
     pub(crate) sizes: Sizes,
@@ -22,7 +22,8 @@ pub(crate) struct ModelCosts {
     pub(crate) warnings: Vec<String>,
 }
 
-/// Element counts of a body with `fixed` vertices that do not move, apart from the removed ones.
+/// Element counts of a body. `fixed` is the number of vertices that do not move, without the
+/// removed vertices.
 pub(super) fn sizes(body: &Body, fixed: usize) -> Sizes {
     let mesh = &body.mesh;
     let inactive = mesh.inactive.as_ref();
@@ -53,7 +54,7 @@ pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> 
     })
 }
 
-/// The lines whose condition holds.
+/// The lines whose condition is true.
 pub(crate) fn lines_that_hold(lines: &[(bool, &str)]) -> Vec<String> {
     lines.iter().filter(|(holds, _)| *holds).map(|(_, line)| (*line).to_owned()).collect()
 }

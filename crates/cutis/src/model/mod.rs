@@ -1,7 +1,7 @@
-//! Deformation models: what moves the body from frame to frame.
+//! Deformation models, which move the body from frame to frame.
 //!
-//! A model is a type that is a [`Model`], in a folder of its own. [`build`] makes the model that
-//! the scene names; nothing after it needs to know which one it is. A started model is a
+//! Each model has its own folder with a type that implements [`Model`]. [`build`] makes the model
+//! that the scene names. Later code does not need to know which model it is. A started model is a
 //! [`Simulation`], which the stage `run` steps.
 
 pub(crate) mod chainmail;
@@ -27,7 +27,7 @@ pub(crate) use costs::ModelCosts;
 pub(crate) use scene_system::needs_system;
 pub use scene_system::{SceneSystem, build_system};
 
-/// What a model is built and run from.
+/// The inputs from which a model is built and run.
 #[derive(Clone, Copy)]
 pub(crate) struct ModelInput<'a> {
     pub(crate) file: SceneFile<'a>,
@@ -46,7 +46,7 @@ pub(crate) trait Model {
     /// Measures the time of a frame on a backend of the host, and adds it to the cost report.
     ///
     /// # Errors
-    /// As the backend gives them.
+    /// The errors of the backend.
     fn measure(
         self: Box<Self>,
         input: &ModelInput<'_>,
@@ -58,7 +58,7 @@ pub(crate) trait Model {
     /// Puts the body into the backend.
     ///
     /// # Errors
-    /// As the backend gives them.
+    /// The errors of the backend.
     fn start<'a>(
         self: Box<Self>,
         input: &ModelInput<'a>,
@@ -74,7 +74,7 @@ pub(crate) struct Started<'a> {
     pub(crate) device: Option<DeviceMeter>,
 }
 
-/// A body that moves.
+/// A running simulation of a body.
 pub(crate) trait Simulation {
     /// Restores the state of a checkpoint.
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error>;

@@ -37,7 +37,7 @@ pub struct SceneSystem {
 /// ```
 ///
 /// # Errors
-/// [`Error`] as a run of the scene would give it before its first frame; [`Error::SceneKey`] for a
+/// The errors that a run of the scene returns before its first frame; [`Error::SceneKey`] for a
 /// model without a system.
 pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
     needs_system(loaded)?;

@@ -170,7 +170,7 @@ fn facts((title, rows): (&str, Vec<(&str, String)>)) -> String {
     format!("<h2>{title}</h2><table>{}</table>", rows.iter().map(row).collect::<String>())
 }
 
-/// The cost report.
+/// The cost report as a table.
 fn cost_table(costs: &CostReport) -> String {
     let mut out = String::from(
         "<h2>What the solver costs</h2><table><tr><th>part</th><th>memory</th><th>on the GPU</th><th>per frame</th></tr>",

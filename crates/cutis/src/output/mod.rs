@@ -26,7 +26,7 @@ use warp::BodyWarp;
 
 pub use resample_run::{ResampleRequest, resample_run};
 
-/// A deformed body, and what its files are made from.
+/// A deformed body, and the data from which its files are made.
 pub(crate) struct DeformedBody<'a> {
     pub(crate) body: &'a Body,
     /// Local meters, one per mesh vertex.

@@ -25,7 +25,7 @@ const COLORS: [[u8; 3]; 2] = [[90, 160, 255], [255, 170, 60]];
 /// has not moved. `after` is the deformed CT.
 ///
 /// # Errors
-/// As resampler and renderer give them.
+/// The errors of the resampler and the renderer.
 pub(super) fn draw(
     deformed: &DeformedBody<'_>,
     warp: &BodyWarp<'_>,

@@ -61,7 +61,7 @@ pub struct Report {
     /// Results of the model `chainmail`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chainmail: Option<ChainmailReport>,
-    /// Constraint errors at the end; none with the model `chainmail`.
+    /// Constraint errors at the end. `None` with the model `chainmail`.
     pub residuals: Vec<KindResidual>,
     /// Largest distance that a vertex moved, mm.
     pub max_displacement_mm: f64,

@@ -1,4 +1,4 @@
-//! `cutis resample`: another volume through the deformation of a finished run.
+//! `cutis resample`: resamples another volume through the deformation of a finished run.
 
 use std::path::PathBuf;
 
@@ -26,7 +26,7 @@ pub struct ResampleRequest {
     pub out: PathBuf,
 }
 
-/// Deforms a volume as a finished run deformed its own.
+/// Deforms a volume in the same way as a finished run deformed its own volume.
 ///
 /// # Errors
 /// [`Error::Checkpoint`] if the run's checkpoint belongs to another scene; other [`Error`]s as for

@@ -1,4 +1,5 @@
-//! The deformation of a body as the resampler takes it: the mesh and the shell of air around it.
+//! The deformation of a body in the form that the resampler needs: the mesh and the shell of air
+//! around it.
 
 use std::borrow::Cow;
 
@@ -20,8 +21,8 @@ pub(crate) struct BodyWarp<'a> {
     rest: Vec<Point3<f32>>,
     deformed: Vec<Point3<f32>>,
     removed: Vec<[u32; 4]>,
-    /// The deformed positions of mesh and shell on the GPU, if the simulation left those of the
-    /// mesh there.
+    /// The deformed positions of mesh and shell on the GPU, if the simulation left the positions of
+    /// the mesh there.
     on_device: Option<DevicePositions>,
 }
 
@@ -30,7 +31,7 @@ impl<'a> BodyWarp<'a> {
     /// `on_device` are the same positions on the GPU of the stages.
     ///
     /// # Errors
-    /// As [`Shell::new`].
+    /// The errors of [`Shell::new`].
     pub(crate) fn new(
         body: &'a Body,
         deformed: &[Point3<f32>],
@@ -54,7 +55,7 @@ impl<'a> BodyWarp<'a> {
     /// Resamples a volume through the deformation.
     ///
     /// # Errors
-    /// As the resampler gives them.
+    /// The errors of the resampler.
     pub(crate) fn apply(
         &self,
         volume: &Volume,
@@ -79,7 +80,7 @@ impl<'a> BodyWarp<'a> {
     /// keep their values, so only the tetrahedra around them take part.
     ///
     /// # Errors
-    /// As the resampler gives them.
+    /// The errors of the resampler.
     pub(crate) fn cut_at_rest<'v>(
         &self,
         volume: &'v Volume,

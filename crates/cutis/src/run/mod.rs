@@ -47,10 +47,10 @@ pub fn run(loaded: &LoadedScene, options: &RunOptions, progress: &dyn Progress) 
 }
 
 /// Does the same as [`run`] on a GPU that the caller opened. It ignores the scene's backend and
-/// adapter. This serves many runs on one device, or a device with other options.
+/// adapter. Use it for many runs on one device, or for a device with other options.
 ///
 /// # Errors
-/// As [`run`].
+/// The errors of [`run`].
 #[cfg(feature = "gpu")]
 pub fn run_on(
     gpu: &cutis_gpu::Gpu,

@@ -9,7 +9,7 @@ use crate::ct::source::{self, Source};
 use crate::model::{self, Model, ModelInput};
 use crate::scene::LoadedScene;
 
-/// Everything that a run starts from.
+/// Everything that a run needs before its first frame.
 pub(crate) struct Prepared {
     pub(crate) source: Source,
     pub(crate) body: Body,

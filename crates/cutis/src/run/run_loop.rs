@@ -14,7 +14,7 @@ use crate::model::{Simulation, SimulationEnd};
 use crate::scene::RunSection;
 use crate::{Error, Progress};
 
-/// What the frames need in addition to the simulation.
+/// Inputs of the frames in addition to the simulation.
 pub(super) struct RunLoop<'a> {
     pub(super) run: &'a RunSection,
     pub(super) folder: &'a RunFolder,

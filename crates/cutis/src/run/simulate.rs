@@ -14,7 +14,7 @@ use crate::model::{Model, ModelInput, Simulation, Started};
 use crate::scene::LoadedScene;
 use crate::{Error, Progress};
 
-/// What a run consists of before its first frame.
+/// A run before its first frame.
 pub(super) struct Setup<'a> {
     pub(super) loaded: &'a LoadedScene,
     pub(super) options: &'a RunOptions,

@@ -11,8 +11,8 @@ pub(super) enum Timing {
     No,
     /// In every frame, where timing does not slow a frame.
     EveryFrame,
-    /// In one more frame, whose result is discarded. On a GPU each part is waited for, which a
-    /// normal frame does not do.
+    /// In one more frame, whose result is discarded. On a GPU the host waits for each part, which
+    /// it does not do in a normal frame.
     ExtraFrame,
 }
 

@@ -9,7 +9,7 @@ const SCENE: &str = include_str!("demo.toml");
 /// Returns the demo's scene, with overrides applied.
 ///
 /// # Errors
-/// As [`Scene::load`], for an override that cannot be used.
+/// The errors of [`Scene::load`], for an override that cannot be used.
 pub fn demo(overrides: &[Override]) -> Result<LoadedScene, Error> {
     Scene::parse(SCENE, Path::new("demo.toml"), Path::new(""), overrides)
 }

@@ -57,8 +57,8 @@ impl LoadedScene {
 pub(crate) struct SceneFile<'a>(pub(crate) &'a Path);
 
 impl SceneFile<'_> {
-    /// Turns an error into one that names the section of the scene which asked for the impossible.
-    /// An error that names a key already stays as it is.
+    /// Turns an error into one that names the section of the scene that caused it. An error that
+    /// already names a key stays unchanged.
     pub(crate) fn blame<E: Into<Error>>(self, section: &str) -> impl FnOnce(E) -> Error {
         move |error| match error.into() {
             named @ Error::SceneKey { .. } => named,
@@ -69,7 +69,7 @@ impl SceneFile<'_> {
     }
 
     /// The error for a key whose value cannot be used. `value` is the value found, or empty if
-    /// there is none to show; `why` says what would be right.
+    /// there is none to show. `why` describes the valid values.
     pub(crate) fn bad_key(self, key: &str, value: &str, why: &str) -> Error {
         Error::SceneKey { file: self.0.into(), key: key.into(), value: value.into(), why: why.into() }
     }
@@ -100,7 +100,7 @@ impl Scene {
     /// relative path of the volume starts from `directory`.
     ///
     /// # Errors
-    /// As [`Scene::load`].
+    /// The errors of [`Scene::load`].
     pub fn parse(
         text: &str,
         file: &Path,

@@ -76,7 +76,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Runs a setting on the scene's backend. `go_on` decides at each sampled frame, except the
-    /// last, whether the run continues.
+    /// last one, whether the run continues.
     pub(super) fn run(
         &self,
         setting: Setting,

@@ -152,7 +152,7 @@ impl Tuning {
             .then(|| Error::NoSetting { demand: self.demand.to_string(), nearest: nearest.join("; ") })
     }
 
-    /// What would meet the target error, if the picked setting does not.
+    /// Advice on how to meet the target error, if the picked setting does not meet it.
     pub(super) fn needed(&self) -> Option<String> {
         let demanded = self.demand.error()?;
         let error = self.picked.as_ref().and_then(|picked| picked.error);

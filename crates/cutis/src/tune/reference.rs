@@ -3,7 +3,8 @@
 //!
 //! Displacements with `S`, `2S` and `4S` substeps converge as `x + c/Sᵖ`. Two differences give the
 //! order `p` and the limit `x` (Richardson extrapolation). The uncertainty is the distance between
-//! the limit and the finest run. This trusts the direction of the extrapolation, not its length.
+//! the limit and the finest run. This estimate relies on the direction of the extrapolation, not on
+//! its length.
 //!
 //! If the differences do not shrink, or shrink faster than any method converges, no limit is
 //! visible. The finest run is then the reference. Its uncertainty is its difference from the run

@@ -6,9 +6,9 @@ use std::ops::Range;
 use cutis_mesh::TetMesh;
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Tolerance for points outside all tetrahedra, over the height of the nearest one and over its
-/// cell. Within it a point takes the displacement of that tetrahedron, because the surfaces of two
-/// lattices lie within one step of each other but do not coincide.
+/// Tolerance for points outside all tetrahedra, relative to the height and to the cell of the
+/// nearest one. Within this tolerance a point takes the displacement of that tetrahedron, because
+/// the surfaces of two lattices lie within one step of each other but do not coincide.
 const OUTSIDE: f64 = 0.5;
 
 /// Finds the tetrahedra at a point by the cell of the lattice that they fill.

@@ -19,7 +19,7 @@ const CUTS: &str = "cuts";
 const PROPAGATION: &str = "propagation";
 const RELAXATION: &str = "relaxation";
 
-/// Words of a checkpoint that hold the energy after the last drag.
+/// Number of checkpoint words that hold the energy after the last drag.
 const ENERGY_WORDS: usize = 2;
 
 /// A chain, the body that it moves, and the state of its frames.
@@ -31,7 +31,7 @@ pub(super) struct ChainmailRun<'a> {
     dt_s: f64,
     order: Order,
     pool: ThreadPool,
-    /// Relaxation on a GPU; none relaxes on the host.
+    /// Relaxation on a GPU. `None` if the host relaxes the chain.
     relaxer: Option<Relaxer>,
     /// All elements that handles grab.
     held: Vec<u32>,
@@ -40,7 +40,7 @@ pub(super) struct ChainmailRun<'a> {
     last_drag: u32,
     /// Number of cuts that have been made.
     cuts_made: usize,
-    /// Relaxation has ended.
+    /// True if relaxation has ended.
     settled: bool,
     report: ChainmailReport,
 }
@@ -111,7 +111,7 @@ impl<'a> ChainmailRun<'a> {
         drags
     }
 
-    /// Moves the handles, and the elements that their links pull along.
+    /// Moves the handles, and the elements that links pull along.
     fn propagate(&mut self) -> Result<(), Error> {
         let drags = self.drags(self.frame);
         let Self { model, pool, order, .. } = self;

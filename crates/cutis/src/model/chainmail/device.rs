@@ -15,7 +15,7 @@ use crate::output::report::MemoryPart;
 /// Opens the GPU, if the backend is one, and reserves memory for the chain.
 ///
 /// # Errors
-/// As the GPU gives them.
+/// The errors of the GPU.
 pub(super) fn start(backend: &Chosen, chain: &Chain) -> Result<Option<(Relaxer, DeviceMeter)>, Error> {
     let Some(device) = backend.open()? else { return Ok(None) };
     let relaxer = start_on(device.gpu(), chain)?;
@@ -40,7 +40,7 @@ fn memory_on_gpu(chain: &Chain) -> Vec<MemoryPart> {
     vec![MemoryPart { part: "relaxation".into(), bytes: Relaxer::BYTES_PER_PLACE * chain.places() }]
 }
 
-/// Relaxation on a GPU in a build without GPUs: there is no value of this type.
+/// Relaxation on a GPU, in a build without GPU support. No value of this type exists.
 #[cfg(not(feature = "gpu"))]
 pub(super) enum Relaxer {}
 

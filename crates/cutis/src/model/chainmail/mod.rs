@@ -1,4 +1,5 @@
-//! The model `chainmail`: links between lattice points, which follow only beyond a limit.
+//! The model `chainmail`: lattice points are linked to their neighbors, and follow a neighbor only
+//! when a link reaches its limit.
 
 mod build;
 mod chainmail_run;
@@ -118,7 +119,7 @@ fn threads(backend: &Chosen) -> Option<usize> {
     (!backend.is_reference()).then(|| backend.host_threads())
 }
 
-/// Warnings about parts of the scene that will not act as they look.
+/// Warnings about parts of the scene that do not have the effect that they seem to have.
 fn scene_warnings(scene: &Scene) -> Vec<String> {
     lines_that_hold(&[
         (scene.constraints != Default::default(), "constraints have no effect with model = \"chainmail\""),

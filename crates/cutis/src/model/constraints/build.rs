@@ -13,7 +13,7 @@ use crate::model::ModelInput;
 use crate::scene::{FormulationChoice, SolverSection};
 
 impl SolverSection {
-    /// The section as settings of a solver.
+    /// The solver settings that the section describes.
     pub(crate) fn settings(&self) -> Settings {
         Settings {
             formulation: match self.formulation {
@@ -32,7 +32,7 @@ impl SolverSection {
 }
 
 impl ConstraintModel {
-    /// Builds what the scene names and nothing else.
+    /// Builds the parts that the scene names and no others.
     ///
     /// # Errors
     /// [`Error`] for a value of the scene that does not work with this body.

@@ -11,7 +11,7 @@ use crate::{CostReport, Error};
 /// Time after which a measurement ends, s. At least one substep is measured.
 const LONG_ENOUGH_S: f64 = 0.1;
 
-/// Most iterations of a substep that are measured; further ones are taken to last as long.
+/// Most iterations of a substep that are measured; further ones are assumed to take as long.
 const MOST_ITERATIONS: u32 = 4;
 
 /// Measures substeps of a system that is no longer needed, on a backend of the host. The first
@@ -19,7 +19,7 @@ const MOST_ITERATIONS: u32 = 4;
 /// second.
 ///
 /// # Errors
-/// As the backend gives them. Numbers that explode are an error of the run, not of its plan.
+/// The errors of the backend. Exploding numbers are an error of the run, not of its plan.
 pub(super) fn substeps(
     backend: &Chosen,
     system: System<f32>,

@@ -93,7 +93,7 @@ impl Model for ConstraintModel {
     }
 }
 
-/// What the scene does not name, and what is therefore not stored or computed.
+/// Parts that the scene does not name, and that are therefore neither stored nor computed.
 fn left_out(scene: &Scene) -> Vec<String> {
     let absent = kinds::KINDS.iter().filter(|row| (row.section)(&scene.constraints).is_none());
     let mut lines: Vec<String> = absent
@@ -105,7 +105,7 @@ fn left_out(scene: &Scene) -> Vec<String> {
     lines
 }
 
-/// Warnings about parts of the scene that will not act as they look.
+/// Warnings about parts of the scene that do not have the effect that they seem to have.
 fn scene_warnings(scene: &Scene) -> Vec<String> {
     let gravity = scene.solver.gravity_m_s2 != [0.0; 3];
     let nothing_fixed = scene.fixed == Default::default();

@@ -25,7 +25,7 @@ impl StartedSolver {
         }
     }
 
-    /// The solver for reading.
+    /// The solver, for reading only.
     pub(crate) fn reader(&self) -> &dyn Solver<f32> {
         match self {
             Self::Host(solver) => &**solver,
@@ -54,7 +54,7 @@ impl StartedSolver {
 /// Opens the device, if the backend is a GPU, and puts the system into the backend.
 ///
 /// # Errors
-/// As the backend gives them.
+/// The errors of the backend.
 pub(crate) fn start(
     backend: &Chosen,
     system: System<f32>,

@@ -68,15 +68,15 @@ pub(crate) struct KindRow {
     remove: fn(&mut ConstraintsSection),
 }
 
-/// What the rest of the program needs to know about a constraint kind.
+/// Facts about a constraint kind that the rest of the program needs.
 pub(crate) struct KindFacts {
-    /// Names of its constraint types in the solver; one of them is in a system.
+    /// Names of its constraint types in the solver. A system contains one of them.
     pub(crate) solver_names: &'static [&'static str],
-    /// What one constraint acts on, for messages.
+    /// Name of the element on which one constraint acts, for messages.
     pub(crate) element: &'static str,
     /// Whether it acts on skin triangles, so that the skin must be found.
     pub(crate) needs_skin: bool,
-    /// Elements in the body, and elements that a region of interest leaves out.
+    /// Number of elements in the body, and of elements that a region of interest leaves out.
     pub(crate) counts: fn(&Body) -> [usize; 2],
 }
 
@@ -104,7 +104,7 @@ pub(crate) trait ConstraintKind {
     }
 }
 
-/// What a constraint kind is built from.
+/// The inputs from which a constraint kind is built.
 pub(crate) struct BodyParts<'a> {
     pub(crate) file: SceneFile<'a>,
     pub(crate) solver: &'a SolverSection,
