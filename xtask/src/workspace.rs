@@ -117,7 +117,7 @@ impl Workspace {
         Ok(program)
     }
 
-    /// Where builds go; follows `CARGO_TARGET_DIR`.
+    /// The build folder. `CARGO_TARGET_DIR` can change it.
     pub fn target_dir(&self) -> Result<PathBuf> {
         let metadata = self.metadata(&self.root.join("Cargo.toml"), Scope::Members)?;
         let folder =

@@ -1,6 +1,6 @@
 //! Errors of the ChainMail model.
 
-/// Why a chain could not be created, or could not do what was asked.
+/// Errors of creating a chain and of using it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChainError {
@@ -128,7 +128,7 @@ pub enum ChainError {
         /// Number of its materials.
         of_materials: usize,
     },
-    /// The GPU refused or failed.
+    /// The GPU rejected the work or failed.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] cutis_gpu::GpuError),

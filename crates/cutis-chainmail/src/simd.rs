@@ -2,7 +2,7 @@
 //!
 //! This is the only file of the crate with unsafe code. A function that is compiled for an
 //! instruction set must not run on a processor that lacks it. Here a [`SimdLevel`] is the proof
-//! that the processor has the instructions: it is only created after the processor was asked.
+//! that the processor has the instructions: it is only created after a check of the processor.
 #![allow(unsafe_code)]
 
 use crate::plane::Plane;
@@ -14,7 +14,7 @@ pub(crate) struct SimdLevel(InstructionSet);
 /// The instruction sets that the relaxation is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum InstructionSet {
-    /// What every processor of the architecture has.
+    /// The instructions that every processor of the architecture has.
     Baseline,
     /// Eight coordinates at once.
     #[cfg(target_arch = "x86_64")]

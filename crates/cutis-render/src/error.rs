@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use cutis_volume::VolumeError;
 
-/// Why a picture could not be drawn or written.
+/// Errors of drawing and writing pictures.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
@@ -56,7 +56,7 @@ pub enum RenderError {
     /// A file could not be created or replaced, or a derived volume is invalid.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// The GPU refused or failed.
+    /// The GPU rejected the work or failed.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] cutis_gpu::GpuError),

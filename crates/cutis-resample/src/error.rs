@@ -2,7 +2,7 @@
 
 use cutis_volume::VolumeError;
 
-/// Why a volume could not be resampled.
+/// Errors of resampling a volume.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ResampleError {
@@ -71,7 +71,7 @@ pub enum ResampleError {
     /// The result is not a valid volume.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// The GPU refused or failed.
+    /// The GPU rejected the work or failed.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] cutis_gpu::GpuError),

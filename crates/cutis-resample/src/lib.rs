@@ -3,7 +3,7 @@
 //! The inverse warp is evaluated by rasterizing the deformed tetrahedra. An output voxel whose
 //! center lies in a deformed tet takes the trilinear value of the input at the matching rest
 //! position, rounded to the nearest stored `int16`. Barycentric coordinates map between the two
-//! positions. The tests hold these rules:
+//! positions. The tests check these rules:
 //!
 //! * a tet that did not move copies the input bit for bit;
 //! * if several tets hold a voxel center, the tet with the lowest index owns the voxel;

@@ -43,7 +43,7 @@ pub enum Error {
         key: String,
         /// The value that was found, as text; empty if there is none to show.
         value: String,
-        /// What would be right.
+        /// The valid values.
         why: String,
     },
     /// A section of the scene is well formed, but asks for something that cannot be done.
@@ -61,7 +61,7 @@ pub enum Error {
     Request {
         /// The request.
         what: String,
-        /// What would be right.
+        /// The valid requests, or the reason for the refusal.
         why: String,
     },
     /// The scene names a backend that this build lacks, or an adapter that this machine lacks.
@@ -69,7 +69,7 @@ pub enum Error {
     Backend {
         /// The backend that the scene names.
         backend: String,
-        /// What would be right.
+        /// The reason, and what to use instead.
         why: String,
     },
     /// An error of a volume, its file or a table.
@@ -93,7 +93,7 @@ pub enum Error {
     /// An error of the ChainMail model.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// A GPU could not be opened, or has no room for the body.
+    /// A GPU could not be opened, or has too little memory for the body.
     #[cfg(feature = "gpu")]
     #[error("{0}; the backend \"cpu\" needs no GPU")]
     Gpu(#[from] GpuError),

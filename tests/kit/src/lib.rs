@@ -1,5 +1,5 @@
 //! Helpers that the tests and benches of several crates share: real CT volumes, GPU adapters,
-//! random numbers and a small lattice. It depends on no crate that it helps to test, except
+//! random numbers and a small lattice. The kit depends on no crate that it helps to test, except
 //! `cutis-gpu`.
 
 #[cfg(feature = "gpu")]

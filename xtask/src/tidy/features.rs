@@ -1,5 +1,4 @@
-//! `cargo test --workspace` must have every feature of every member on. Otherwise tests are
-//! missing.
+//! `cargo test --workspace` must enable every feature of every member. Otherwise tests are missing.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Paths that do not follow a rule yet. The list is empty; keep it so.
+//! Paths that do not follow a rule yet. The list is empty and should stay empty.
 
 use std::collections::BTreeMap;
 

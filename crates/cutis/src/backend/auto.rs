@@ -20,7 +20,7 @@ const MIN_PER_SWEEP: u64 = 16_384;
 
 /// Number of constraint evaluations of a run above which `auto` takes a GPU: one or two seconds on
 /// the CPU backend with two cores. A GPU takes part of a second to open, to compile kernels and to
-/// upload the body, which a shorter run never earns back. This is an estimate too.
+/// upload the body, and a shorter run does not save that much time. This is an estimate too.
 const MIN_EVALUATIONS: u64 = 100_000_000;
 
 /// Factor on [`MIN_PER_SWEEP`] for a GPU that shares the memory of the CPU. Memory limits

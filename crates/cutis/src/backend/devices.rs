@@ -16,7 +16,7 @@ pub struct Devices {
     /// Index of the GPU that `backend = "auto"` takes for a large scene; none if it takes the CPU
     /// backend.
     pub auto: Option<usize>,
-    /// What `auto` takes and why, or what to install.
+    /// The choice of `auto` with its reason, or the software to install.
     pub note: String,
 }
 

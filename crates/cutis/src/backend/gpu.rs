@@ -161,7 +161,7 @@ impl DevicePositions {
     /// Copies positions on the GPU and appends further positions from the host.
     ///
     /// # Errors
-    /// [`GpuError`] if the GPU has no room or is lost.
+    /// [`GpuError`] if the GPU has too little memory or is lost.
     pub(crate) fn copy(
         gpu: &Gpu,
         positions: &Buffer<[f32; 4]>,
@@ -180,7 +180,7 @@ impl DevicePositions {
     /// The same positions, followed by further positions that are uploaded.
     ///
     /// # Errors
-    /// [`Error::Gpu`] if the GPU has no room or is lost.
+    /// [`Error::Gpu`] if the GPU has too little memory or is lost.
     pub(crate) fn with(&self, gpu: &Gpu, further: &[Point3<f32>]) -> Result<Self, Error> {
         Ok(Self::copy(gpu, &self.0, further)?)
     }

@@ -26,7 +26,8 @@ impl Stages {
         if self.gpu.is_some() { "gpu" } else { "cpu" }
     }
 
-    /// Appends uploaded positions to those on the GPU. None if the GPU is not used or has no room.
+    /// Appends uploaded positions to those on the GPU. `None` if the GPU is not used or has too
+    /// little memory.
     pub(crate) fn append(
         &self,
         positions: &DevicePositions,

@@ -14,7 +14,7 @@ pub(crate) struct ModelCosts {
     pub(crate) colors: BTreeMap<String, usize>,
     /// Memory on the host by part, bytes.
     pub(crate) memory: Vec<MemoryPart>,
-    /// Memory on the GPU by part, bytes; empty on a backend of the host.
+    /// Memory on the GPU by part, bytes; empty on a CPU backend.
     pub(crate) device_memory: Vec<MemoryPart>,
     /// Projections of the run, or the model's unit of work that corresponds to them.
     pub(crate) projections: u64,

@@ -43,7 +43,7 @@ pub(crate) trait Model {
     /// [`Error`] if the scene names a backend or an adapter that does not exist.
     fn costs(&self, input: &ModelInput<'_>, request: Request) -> Result<ModelCosts, Error>;
 
-    /// Measures the time of a frame on a backend of the host, and adds it to the cost report.
+    /// Measures the time of a frame on a CPU backend, and adds it to the cost report.
     ///
     /// # Errors
     /// The errors of the backend.

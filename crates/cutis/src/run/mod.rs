@@ -1,6 +1,6 @@
 //! A run of a scene, from the NIfTI file to the pictures.
 //!
-//! [`run_with`] is the whole walk. [`prepare`](prepare::prepare) reads the CT ([`ct`](crate::ct)),
+//! [`run_with`] contains all steps. [`prepare`](prepare::prepare) reads the CT ([`ct`](crate::ct)),
 //! builds the body ([`body`](crate::body)) and its model ([`model`](crate::model)).
 //! [`simulate`](simulate::simulate) computes the frames. [`output::write`] deforms the CT and draws
 //! it, and [`summary::report`] collects the report.

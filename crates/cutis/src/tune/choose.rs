@@ -82,8 +82,8 @@ impl Demand {
     }
 }
 
-/// Marks the Pareto front: no other setting is at least as cheap and as accurate, and better in
-/// one.
+/// Marks the Pareto front: no other setting is at least as cheap and as accurate, and better in one
+/// of the two.
 pub(super) fn mark_front(candidates: &mut [Candidate]) {
     let measured: Vec<Option<(f64, f64)>> =
         candidates.iter().map(|c| Some((c.ms_per_frame?, c.error?))).collect();

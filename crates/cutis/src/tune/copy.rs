@@ -40,7 +40,7 @@ impl<'a> SceneCopy<'a> {
         Ok(copy)
     }
 
-    /// Writes the scene's text, edited so that it means `scene`, below a comment.
+    /// Writes a comment, then the scene's text, edited so that it describes `scene`.
     ///
     /// # Errors
     /// [`Error::File`] if the file cannot be written.
@@ -55,7 +55,7 @@ impl<'a> SceneCopy<'a> {
     }
 }
 
-/// The text of a scene file that means `wanted` when it is read from `directory`.
+/// The text of a scene file that describes `wanted` when it is read from `directory`.
 fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<String, String> {
     let plain = |e: &dyn std::fmt::Display| e.to_string();
     let value = |scene: &Scene| toml::Table::try_from(without_path(scene)).map_err(|e| plain(&e));
@@ -88,8 +88,8 @@ fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.into())
 }
 
-/// Edits a table with the values `from` so that it has the values `to`. Equal keys stay untouched,
-/// written or not.
+/// Edits a table with the values `from` so that it has the values `to`. Keys with equal values stay
+/// unchanged, whether the file contains them or not.
 fn change(table: &mut dyn TableLike, from: &toml::Table, to: &toml::Table) {
     for key in from.keys().filter(|key| !to.contains_key(*key)) {
         table.remove(key);

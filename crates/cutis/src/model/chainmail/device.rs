@@ -22,7 +22,7 @@ pub(super) fn start(backend: &Chosen, chain: &Chain) -> Result<Option<(Relaxer, 
     Ok(Some((relaxer, device)))
 }
 
-/// Memory that a chain takes on the GPU, by part; none on a backend of the host.
+/// Memory that a chain takes on the GPU, by part; none on a CPU backend.
 pub(super) fn memory(backend: &Chosen, chain: &Chain) -> Vec<MemoryPart> {
     if backend.on_gpu() { memory_on_gpu(chain) } else { Vec::new() }
 }

@@ -14,7 +14,7 @@ const LONG_ENOUGH_S: f64 = 0.1;
 /// Most iterations of a substep that are measured; further ones are assumed to take as long.
 const MOST_ITERATIONS: u32 = 4;
 
-/// Measures substeps of a system that is no longer needed, on a backend of the host. The first
+/// Measures substeps of a system that is no longer needed, on a CPU backend. The first
 /// substep touches all memory and is not counted; then follow as many as fit into a tenth of a
 /// second.
 ///

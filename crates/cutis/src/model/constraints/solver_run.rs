@@ -55,8 +55,8 @@ impl Simulation for SolverRun {
         Ok(Checkpoint { frame, positions, words })
     }
 
-    /// Reads the whole body once. Residuals are measured on the host, so that they need no room on
-    /// a GPU and a full GPU cannot spoil a finished run.
+    /// Reads the whole body once. Residuals are measured on the host, so that they need no GPU
+    /// memory, and a full GPU cannot make a finished run fail.
     fn end(&mut self) -> Result<SimulationEnd, Error> {
         let system = self.solver.solver().system()?;
         let collapsed = system.check_collapsed(COLLAPSED).err().map(|error| error.to_string());

@@ -39,8 +39,8 @@ impl StartedSolver {
         !matches!(self, Self::Host(_))
     }
 
-    /// A copy of the present positions that stays on the GPU. None on the host, or if the GPU has
-    /// no room.
+    /// A copy of the present positions that stays on the GPU. `None` on the host, or if the GPU has
+    /// too little memory.
     pub(crate) fn positions_on_device(&self) -> Option<DevicePositions> {
         match self {
             Self::Host(_) => None,
@@ -72,7 +72,7 @@ pub(crate) fn start(
     Ok((StartedSolver::Host(solver), None))
 }
 
-/// Memory that a system takes on the GPU, by part; none on a backend of the host.
+/// Memory that a system takes on the GPU, by part; none on a CPU backend.
 pub(crate) fn device_memory(backend: &Chosen, system: &System<f32>, settings: &Settings) -> Vec<MemoryPart> {
     if backend.on_gpu() { memory_on_gpu(system, settings) } else { Vec::new() }
 }
