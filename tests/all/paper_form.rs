@@ -64,7 +64,9 @@ fn reports_have_its_colors_errors_and_cost() {
 /// The line about the region counts the memory of all parts that it leaves out.
 #[test]
 fn a_region_counts_the_memory_of_the_skin_that_it_leaves_out() {
-    let (whole, region) = (plan(&[]), plan(&[("lattice.region.around_mm", "30")]));
+    // The scene's own lattice: on the coarser one the skin takes less than the line can show.
+    let fine = ("lattice.spacing_mm", "9");
+    let (whole, region) = (plan(&[fine]), plan(&[fine, ("lattice.region.around_mm", "30")]));
     let line = region.left_out.iter().find(|line| line.starts_with("region:")).unwrap();
     let saved_mb: f64 = {
         let end = line.find(" MB").unwrap();
