@@ -208,7 +208,7 @@ fn scenes_that_cannot_be_tuned_are_refused_early() {
     refused(&[("run.frames", "0")], Demand::Default, &["run.frames"]);
     refused(&[], Demand::Error(f64::NAN), &["an error of NaN %", "100 %"]);
     refused(&[], Demand::BudgetMs(-1.0), &["a budget of -1 ms"]);
-    refused(&[("constraints", "{}"), ("run.frames", "1")], Demand::Default, &["nothing moves"]);
+    refused(&[("constraints", "{}"), ("run.frames", "1")], Demand::Default, &["nothing in this scene moves"]);
     std::fs::write(&out, "# mine").unwrap();
     refused(&[], Demand::Default, &["tuned.toml", "--force"]);
     assert_eq!(std::fs::read_to_string(&out).unwrap(), "# mine");
@@ -224,14 +224,14 @@ fn a_target_that_no_setting_meets_is_reported_and_writes_nothing() {
     assert!(matches!(&error, Error::NoSetting { .. }) && !error.is_bad_input(), "{error}");
     assert!(tuning.picked.is_none() && tuning.scene_file.is_none() && !options.out.exists());
     assert!(tuning.candidates.iter().any(|candidate| candidate.own && candidate.error.is_some()));
-    assert!(!error.to_string().contains("could afford") && tuning.reference.needs_minutes.is_none());
+    assert!(!error.to_string().contains("reached only") && tuning.reference.needs_minutes.is_none());
 
     // The time limit allows no reference that is finer than the scene.
     let loaded = scene(&[("run.frames", "2"), ("solver.substeps", "400")]);
     let tuning = cutis::tune(&loaded, &TuneOptions { minutes: 1e-6, ..options }, &Silent).unwrap();
     assert_eq!(tuning.reference.substeps, [4, 8, 16]);
     let error = tuning.unmet().unwrap().to_string();
-    for words in ["could afford 16 substeps a frame, the scene has 400", "--minutes"] {
+    for words in ["reached only 16 substeps a frame and the scene has 400", "--minutes"] {
         assert!(error.contains(words), "no {words:?} in {error}");
     }
 }
@@ -247,9 +247,9 @@ fn a_time_limit_that_is_too_short_is_reported() {
     let tuning = cutis::tune(&loaded, &hurried, &Silent).unwrap();
     let picked = tuning.picked.as_ref().unwrap();
     assert!(picked.own && picked.error > Some(0.05), "{picked:?}");
-    let note = tuning.warnings.iter().find(|line| line.contains("not that near")).expect("no note");
+    let note = tuning.warnings.iter().find(|line| line.contains("misses the target")).expect("no note");
     let late = tuning.candidates.iter().filter(|candidate| !candidate.own).count();
-    let late = format!("{late} settings were not run for want of time (--minutes)");
+    let late = format!("{late} settings were not run for lack of time (--minutes)");
     for words in ["needs about ", "substeps a frame for an error of 5 %", &late] {
         assert!(note.contains(words), "no {words:?} in {note}");
     }

@@ -116,8 +116,8 @@ pub enum Error {
         /// The error, with the time of the last state that was read.
         source: SolverError,
     },
-    /// No setting of a scene meets the demand.
-    #[error("no setting meets the demand ({demand}): {nearest}; no scene was written")]
+    /// No setting of a scene meets the target.
+    #[error("no setting meets the target ({demand}): {nearest}; no scene was written")]
     NoSetting {
         /// The demand.
         demand: String,

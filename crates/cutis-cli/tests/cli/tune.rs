@@ -70,7 +70,7 @@ fn tune_ends_with_one_for_unmet_targets_and_with_two_for_bad_input() {
     let desk = Desk::new();
     let done = tune(&desk, "--budget-ms 0.000001 --settings-only --json");
     assert_eq!(done.code, 1, "{}", done.stderr);
-    assert!(done.stderr.contains("no setting meets the demand"), "{}", done.stderr);
+    assert!(done.stderr.contains("no setting meets the target"), "{}", done.stderr);
     let found: Value = serde_json::from_str(&done.stdout).unwrap();
     assert!(found["picked"].is_null() && found["candidates"][0]["error"].as_f64() > Some(0.0), "{found}");
     for (options, words) in [
