@@ -96,7 +96,7 @@ pub(crate) trait Simulation {
     /// Positions of chosen vertices, local meters.
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error>;
 
-    /// The state after `frame` frames.
+    /// The state after `frame` frames. A checkpoint has at least three words per vertex.
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error>;
 
     /// The state and the measurements at the end of a run.

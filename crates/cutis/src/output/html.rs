@@ -146,6 +146,9 @@ fn tables(report: &Report) -> String {
 }
 
 fn constraints(report: &Report) -> String {
+    if report.residuals.is_empty() {
+        return String::new();
+    }
     let mut out = String::from(
         "<h2>Constraints</h2><table><tr><th>kind</th><th>colors</th><th>RMS error / rest size</th><th>largest</th></tr>",
     );

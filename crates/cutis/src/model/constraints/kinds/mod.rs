@@ -171,3 +171,20 @@ fn compliances<const N: usize>(
 fn one() -> f64 {
     1.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reports find a kind by the solver's name. If two kinds had one name, the costs of both would
+    /// appear under the first.
+    #[test]
+    fn no_two_kinds_share_a_solver_name() {
+        let mut names: Vec<&str> = KINDS.iter().flat_map(|row| row.facts.solver_names).copied().collect();
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), count, "{names:?}");
+        assert!(count > KINDS.len(), "skin tension has two forms");
+    }
+}
