@@ -171,8 +171,9 @@ impl Scene {
     /// incision after the last frame would never be made.
     fn validate_time(&self, check: &Check<'_>, key: &str, at_s: f64) -> Result<(), Error> {
         check.not_negative(key, at_s)?;
-        let why = "must be 0: with this model incisions exist from the start";
-        check.require(at_s == 0.0 || self.model.cuts_later(), key, at_s, why)?;
+        let model = serde_json::json!(self.model);
+        let why = format!("must be 0: with model = {model} incisions exist from the start");
+        check.require(at_s == 0.0 || self.model.cuts_later(), key, at_s, &why)?;
         let last = f64::from(self.run.frames.saturating_sub(1)) * self.solver.dt_s;
         let why = format!("must not lie after the beginning of the last frame, at {last} s (run.frames)");
         check.require(at_s <= last || at_s == 0.0, key, at_s, &why)
