@@ -28,7 +28,6 @@ const STEPS: &[Step] = &[
     Step { name: "parity", quick: false, run: parity },
     Step { name: "miri", quick: false, run: miri::run },
     Step { name: "documentation", quick: false, run: documentation },
-    Step { name: "program", quick: false, run: build_program },
     Step { name: "python", quick: false, run: python::run },
     Step { name: "publish", quick: false, run: publish::dry_run },
 ];
@@ -194,10 +193,9 @@ fn documentation(workspace: &Workspace) -> Result<()> {
     execute(command.args(["--workspace", "--lib", "--no-deps", "--quiet"]).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Builds the programs of the Python checks: the release program and the studies.
+/// Builds the programs of the Python checks, as the step `tests` does.
 pub fn build_for_python(workspace: &Workspace) -> Result<()> {
-    build_program(workspace)?;
-    build_studies(workspace, &[])
+    execute(workspace.cargo("build").args(["--workspace", "--bins"]))
 }
 
 fn build_studies(workspace: &Workspace, more: &[&str]) -> Result<()> {
@@ -214,11 +212,6 @@ pub fn cantilever(workspace: &Workspace) -> Result<()> {
     command.env("CUTIS_STUDY", &study).arg("--json").arg(&compared);
     execute(vulkan::for_gpu_tests(&mut command))?;
     execute(workspace.command(study).args(["cantilever", "--compared"]).arg(&compared))
-}
-
-/// Builds the release program.
-pub fn build_program(workspace: &Workspace) -> Result<()> {
-    execute(workspace.cargo("build").args(["--release", "--package", "cutis-cli"]))
 }
 
 #[cfg(test)]

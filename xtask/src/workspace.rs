@@ -98,9 +98,10 @@ impl Workspace {
         serde_json::from_slice(&output.stdout).context("cargo metadata did not print JSON")
     }
 
-    /// The released `cutis` program.
+    /// The program `cutis` that `cargo test --workspace` builds: optimized, with checks of integer
+    /// overflow and debug assertions.
     pub fn program(&self) -> Result<PathBuf> {
-        self.built("release/cutis", "cargo build --release -p cutis-cli")
+        self.built("debug/cutis", "cargo build --workspace --bins")
     }
 
     /// The program of the studies. `cargo test --workspace` builds it with the profile `debug`.
