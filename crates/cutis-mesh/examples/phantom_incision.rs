@@ -4,7 +4,7 @@
 #![expect(clippy::print_stdout, reason = "an example that prints its results")]
 
 use cutis_mesh::vtk::{self, Cells, Piece, PointData, PointValues, Space};
-use cutis_mesh::{Cut, Incision, Lattice, SkinMode, SkinOptions, Slit, Split, Tissue, TissueMask, skin};
+use cutis_mesh::{Cut, Incision, Lattice, SkinMode, Slit, Split, Tissue, TissueMask};
 use cutis_volume::phantom::Phantom;
 use cutis_volume::{Table, TableKind, sample};
 
@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let air: Vec<bool> = hu.iter().map(|&hu| alpha.is_air(hu)).collect();
 
     // The body is the largest component. The scanner table is dropped.
-    let body = TissueMask::find(&lattice, &Tissue { air: &air, cut_away: &[], largest_component: true })?;
+    let tissue = Tissue { air: &air, cut_away: &[], largest_component: true };
+    let (body, skin) = TissueMask::find_with_skin(&lattice, &tissue, SkinMode::Exterior, None)?;
     let mut mesh = body.mesh(&hu)?;
     println!("mesh   {} vertices, {} tetrahedra", mesh.positions.len(), mesh.tets.len());
     println!("other  {} tetrahedra of {} components dropped", body.dropped_tets(), body.components() - 1);
@@ -27,9 +28,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mass_kg: f32 = mesh.masses(&|hu| density.at(hu)).iter().sum();
     println!("mass   {mass_kg:.1} kg");
 
-    let found = skin::detect(&lattice, &air, SkinMode::Exterior, &SkinOptions::default())?;
-    let (on_body, _) = body.skin(&found);
-    println!("skin   {} triangles, {:.1} % coverage", found.report.triangles, 100.0 * found.report.coverage);
+    let (on_body, _) = body.skin(&skin);
+    println!("skin   {} triangles, {:.1} % coverage", skin.report.triangles, 100.0 * skin.report.coverage);
 
     let (from, to) = phantom.incision_site();
     let incision = Incision { from_mm: from, to_mm: to, depth_mm: 24.0, width_mm: 4.0 };

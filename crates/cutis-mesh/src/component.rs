@@ -5,6 +5,8 @@ use crate::cells::CellMasks;
 /// The largest component of a set of tets.
 pub(crate) struct Largest {
     pub masks: CellMasks,
+    /// One flag per lattice point: true if the point is a corner of such a tet.
+    pub points: Vec<bool>,
     /// Number of all components.
     pub components: usize,
 }
@@ -28,15 +30,15 @@ pub(crate) fn largest(masks: CellMasks) -> Largest {
             }
         });
     }
-    match best {
+    let masks = match best {
         Some((_, flat, parity, tet)) if components > 1 => {
             seen.fill(0);
             flood.fill(&mut seen, flat, parity, tet);
-            let (stencil, shape) = (masks.stencil, masks.shape);
-            Largest { masks: CellMasks { stencil, shape, bytes: seen }, components }
+            CellMasks { stencil: masks.stencil, shape: masks.shape, bytes: seen }
         }
-        _ => Largest { masks, components },
-    }
+        _ => masks,
+    };
+    Largest { points: masks.used_points(), masks, components }
 }
 
 /// A face that a tet shares with a tet of another cell.

@@ -24,6 +24,7 @@ mod slit;
 mod stencil;
 mod surface;
 mod tissue_mask;
+mod tissue_tets;
 pub mod vtk;
 
 pub use build::{NO_VERTEX, TetMesh, Tissue};

@@ -1,9 +1,9 @@
-//! Selection of points and vertices by half-space or box.
+//! Selection of vertices by half-space or box.
 
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::{Lattice, MeshError, TetMesh};
+use crate::{MeshError, TetMesh};
 
 /// The half-space on one side of a plane, in world millimeters. The normal points into it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,27 +33,6 @@ impl HalfSpace {
     pub fn contains(&self, mm: Point3<f64>) -> bool {
         (mm - Point3::from(self.point_mm)).dot(&Vector3::from(self.normal)) > 0.0
     }
-}
-
-/// One flag per lattice point: true if the point is not `air` and in none of the half-spaces
-/// `cut_away`.
-pub(crate) fn present(
-    lattice: &Lattice,
-    air: &[bool],
-    cut_away: &[HalfSpace],
-) -> Result<Vec<bool>, MeshError> {
-    let grid = lattice.grid();
-    if air.len() != grid.len() {
-        return Err(MeshError::Length { array: "air", expected: grid.len(), found: air.len() });
-    }
-    cut_away.iter().try_for_each(HalfSpace::validate)?;
-    let kept = |point: usize| {
-        cut_away.is_empty() || {
-            let mm = lattice.mm(grid.point(point));
-            !cut_away.iter().any(|half_space| half_space.contains(mm))
-        }
-    };
-    Ok(air.iter().enumerate().map(|(point, &air)| !air && kept(point)).collect())
 }
 
 impl TetMesh {

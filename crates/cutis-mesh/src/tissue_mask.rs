@@ -5,8 +5,9 @@ use rayon::prelude::*;
 
 use crate::build::NO_VERTEX;
 use crate::cells::{CellMasks, CornerBits};
-use crate::select::present;
-use crate::{Lattice, MeshError, Skin, TetMesh, Tissue, component, edges};
+use crate::component::{self, Largest};
+use crate::tissue_tets::TissueTets;
+use crate::{Lattice, MeshError, Skin, SkinMode, TetMesh, Tissue, edges, skin};
 
 /// The body: the tissue tets of a lattice. It is the input for meshes of the whole body or of a
 /// region.
@@ -54,25 +55,47 @@ impl TissueMask {
     /// [`MeshError::Plane`] if a half-space is not valid. [`MeshError::NoTissue`] if there is no
     /// such tet.
     pub fn find(lattice: &Lattice, tissue: &Tissue<'_>) -> Result<Self, MeshError> {
-        let present = present(lattice, tissue.air, tissue.cut_away)?;
-        let all = CellMasks::of_points(lattice, &present);
-        let before = all.tet_count();
-        if before == 0 {
-            return Err(MeshError::NoTissue {
-                tets: lattice.tet_count(),
-                tissue_vertices: present.iter().filter(|&&p| p).count(),
-                vertices: lattice.grid().len(),
-            });
-        }
-        drop(present);
-        let (masks, components) = if tissue.largest_component {
-            let largest = component::largest(all);
-            (largest.masks, largest.components)
+        let all = tissue_tets(lattice, tissue)?.masks;
+        Ok(if tissue.largest_component {
+            let tets = all.tet_count();
+            Self::of_largest(lattice, component::largest(all), tets)
         } else {
-            (all, 1)
+            Self::of_all(lattice, all)
+        })
+    }
+
+    /// Finds the body like [`TissueMask::find`], and the skin like [`skin::detect`], in less time
+    /// than the two. `through_axis` is that of [`SkinOptions`](crate::SkinOptions).
+    ///
+    /// # Errors
+    /// The errors of [`TissueMask::find`], and [`MeshError::Axis`] if the through axis is above 2.
+    pub fn find_with_skin(
+        lattice: &Lattice,
+        tissue: &Tissue<'_>,
+        mode: SkinMode,
+        through_axis: Option<usize>,
+    ) -> Result<(Self, Skin), MeshError> {
+        let all = tissue_tets(lattice, tissue)?;
+        let largest = component::largest(all.masks.clone());
+        let skin = skin::of_tissue(lattice, &all, &largest, mode, through_axis)?;
+        let mask = if tissue.largest_component {
+            Self::of_largest(lattice, largest, all.masks.tet_count())
+        } else {
+            Self::of_all(lattice, all.masks)
         };
-        let (vertices, dropped_tets) = (masks.used_points(), before - masks.tet_count());
-        Ok(Self { lattice: lattice.clone(), masks, vertices, components, dropped_tets })
+        Ok((mask, skin))
+    }
+
+    fn of_all(lattice: &Lattice, masks: CellMasks) -> Self {
+        let vertices = masks.used_points();
+        Self { lattice: lattice.clone(), masks, vertices, components: 1, dropped_tets: 0 }
+    }
+
+    /// `tets` is the number of tets of all components.
+    fn of_largest(lattice: &Lattice, largest: Largest, tets: usize) -> Self {
+        let Largest { masks, points, components } = largest;
+        let dropped_tets = tets - masks.tet_count();
+        Self { lattice: lattice.clone(), masks, vertices: points, components, dropped_tets }
     }
 
     /// The lattice of the body.
@@ -204,6 +227,19 @@ impl TetMesh {
         let inactive_skin = InactiveSkin { triangles, positions, lattice_index: points };
         (moving.iter().map(on_mesh).collect(), inactive_skin)
     }
+}
+
+/// The tissue of a lattice, with at least one tet.
+fn tissue_tets(lattice: &Lattice, tissue: &Tissue<'_>) -> Result<TissueTets, MeshError> {
+    let found = TissueTets::find(lattice, tissue.air, tissue.cut_away)?;
+    if found.masks.tet_count() == 0 {
+        return Err(MeshError::NoTissue {
+            tets: lattice.tet_count(),
+            tissue_vertices: found.points.iter().filter(|&&point| point).count(),
+            vertices: lattice.grid().len(),
+        });
+    }
+    Ok(found)
 }
 
 /// Removes the tets without a corner inside.

@@ -1,10 +1,10 @@
 //! The exterior skin: the faces of the body towards outside air.
 
 use crate::Lattice;
-use crate::cells::CellMasks;
-use crate::component;
+use crate::component::Largest;
 use crate::neighbors::Neighbors;
 use crate::surface::faces;
+use crate::tissue_tets::TissueTets;
 
 /// The exterior skin, with flags from which the report computes its coverage.
 pub(super) struct Exterior {
@@ -15,22 +15,20 @@ pub(super) struct Exterior {
     /// One flag per point: true if it is a vertex of the body, or tissue in no tet that a lattice
     /// edge joins to such a vertex.
     pub attached: Vec<bool>,
-    /// Number of face-connected components of the tets with four tissue corners.
-    pub bodies: usize,
 }
 
+/// The skin of `body`, the largest component of `tissue`.
 pub(super) fn find(
     lattice: &Lattice,
-    tissue: &[bool],
-    masks: &CellMasks,
+    tissue: &TissueTets,
+    body: &Largest,
     through_axis: Option<usize>,
 ) -> Exterior {
-    let largest = component::largest(masks.clone());
-    let body = largest.masks;
-    let body_points = body.used_points();
-    let mut rest = masks.clone();
-    rest.bytes.iter_mut().zip(&body.bytes).for_each(|(rest, body)| *rest &= !body);
+    let mut rest = tissue.masks.clone();
+    rest.bytes.iter_mut().zip(&body.masks.bytes).for_each(|(rest, body)| *rest &= !body);
     let rest_points = rest.used_points();
+    drop(rest);
+    let (tissue, body_points) = (&tissue.points, &body.points);
     let other = |point: usize| rest_points[point] && !body_points[point];
     let through = through_axis.unwrap_or_else(|| head_foot_axis(lattice));
     let shape = lattice.grid().shape;
@@ -46,14 +44,9 @@ pub(super) fn find(
     for point in points.filter(|&point| tissue[point] && !body_points[point] && !rest_points[point]) {
         neighbors.of(point, |neighbor| attached[point] |= body_points[neighbor]);
     }
-    let faces = faces(lattice, &body);
+    let faces = faces(lattice, &body.masks);
     let triangles = faces.iter().filter(|face| outside[face.opposite]).map(|face| face.triangle).collect();
-    Exterior {
-        triangles,
-        outside,
-        attached,
-        bodies: if body.tet_count() == 0 { 0 } else { largest.components },
-    }
+    Exterior { triangles, outside, attached }
 }
 
 /// The index axis whose direction is closest to the third world axis (head to foot).

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 pub use report::SkinReport;
 
-use crate::cells::CellMasks;
-use crate::select::{HalfSpace, present};
+use crate::component::{self, Largest};
 use crate::surface::faces;
-use crate::{Lattice, MeshError};
+use crate::tissue_tets::TissueTets;
+use crate::{HalfSpace, Lattice, MeshError};
 
 /// The rule that selects the skin triangles. In every mode, lattice points in `cut_away`
 /// half-spaces count as air.
@@ -67,7 +67,8 @@ pub struct Skin {
 ///
 /// [`TissueMask::skin`](crate::TissueMask::skin) and
 /// [`TetMesh::divide_skin`](crate::TetMesh::divide_skin) convert the triangles to vertices of a
-/// mesh.
+/// mesh. [`TissueMask::find_with_skin`](crate::TissueMask::find_with_skin) finds body and skin
+/// together.
 ///
 /// ```
 /// use cutis_mesh::{Lattice, SkinMode, SkinOptions, Split, skin};
@@ -90,21 +91,34 @@ pub fn detect(
     mode: SkinMode,
     options: &SkinOptions,
 ) -> Result<Skin, MeshError> {
-    if let Some(axis) = options.through_axis.filter(|&axis| axis > 2) {
+    let tissue = TissueTets::find(lattice, air, &options.cut_away)?;
+    let body = component::largest(tissue.masks.clone());
+    of_tissue(lattice, &tissue, &body, mode, options.through_axis)
+}
+
+/// The skin of tissue whose largest component is `body`.
+pub(crate) fn of_tissue(
+    lattice: &Lattice,
+    tissue: &TissueTets,
+    body: &Largest,
+    mode: SkinMode,
+    through_axis: Option<usize>,
+) -> Result<Skin, MeshError> {
+    if let Some(axis) = through_axis.filter(|&axis| axis > 2) {
         return Err(MeshError::Axis { axis });
     }
-    let tissue = present(lattice, air, &options.cut_away)?;
-    let masks = CellMasks::of_points(lattice, &tissue);
-    let literal = paper::count(lattice, &tissue);
+    let TissueTets { points, masks } = tissue;
+    let literal = paper::count(lattice, points);
     let boundary_triangles =
-        || faces(lattice, &masks).into_iter().map(|face| face.triangle).collect::<Vec<_>>();
-    let exterior = exterior::find(lattice, &tissue, &masks, options.through_axis);
+        || faces(lattice, masks).into_iter().map(|face| face.triangle).collect::<Vec<_>>();
+    let exterior = exterior::find(lattice, tissue, body, through_axis);
     let (triangles, considered) = match mode {
-        SkinMode::Paper => (paper::triangles(lattice, &tissue), None),
+        SkinMode::Paper => (paper::triangles(lattice, points), None),
         SkinMode::Boundary => (boundary_triangles(), None),
         SkinMode::Exterior => (exterior.triangles.clone(), Some(boundary_triangles().len())),
     };
     let considered = considered.unwrap_or(triangles.len());
-    let report = report::report(lattice, mode, &tissue, &triangles, considered, &literal, &exterior);
+    let bodies = body.components;
+    let report = report::report(lattice, mode, points, &triangles, considered, bodies, &literal, &exterior);
     Ok(Skin { triangles, report })
 }

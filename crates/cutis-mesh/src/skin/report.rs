@@ -58,6 +58,7 @@ pub(super) fn report(
     tissue: &[bool],
     triangles: &[[u32; 3]],
     considered: usize,
+    bodies: usize,
     literal: &AirCorners,
     exterior: &Exterior,
 ) -> SkinReport {
@@ -76,7 +77,7 @@ pub(super) fn report(
         non_manifold_edges: topology.non_manifold_edges,
         components: topology.components,
         euler_characteristic: topology.euler_characteristic,
-        bodies: exterior.bodies,
+        bodies,
         enclosed_share: share(considered - exterior.triangles.len(), considered).unwrap_or(0.0),
         coverage: coverage(lattice, tissue, triangles, exterior),
     }

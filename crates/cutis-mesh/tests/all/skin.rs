@@ -3,7 +3,9 @@
 
 use std::collections::BTreeSet;
 
-use cutis_mesh::{HalfSpace, MeshError, Skin, SkinMode, SkinOptions, Split, Topology, skin};
+use cutis_mesh::{
+    HalfSpace, MeshError, Skin, SkinMode, SkinOptions, Split, Tissue, TissueMask, Topology, skin,
+};
 use proptest::prelude::*;
 
 use crate::oracle::{
@@ -182,6 +184,45 @@ fn a_cut_plane_separates_the_body_from_a_board_under_it() {
     let options = SkinOptions { cut_away: vec![below], ..SkinOptions::default() };
     let separated = skin::detect(&lattice, &air, SkinMode::Exterior, &options).unwrap();
     assert_eq!(separated.triangles.len(), walls);
+}
+
+#[test]
+fn skin_found_with_the_body_equals_skin_found_alone() {
+    let lattice = chest_lattice();
+    // A chest, a table, and a sheet that is one vertex thick.
+    let air = air(&lattice, |p| chest(p) || p[1] == 36.0);
+    let end = HalfSpace { point_mm: [28.0, 0.0, 0.0], normal: [2.0, 0.0, 0.0] };
+    let front = HalfSpace { point_mm: [0.0, 27.0, 9.0], normal: [0.0, 1.0, 0.5] };
+    let mut seen = Vec::new();
+    for cut_away in [vec![], vec![end], vec![end, front]] {
+        for through_axis in [None, Some(0)] {
+            for mode in [SkinMode::Paper, SkinMode::Boundary, SkinMode::Exterior] {
+                let options = SkinOptions { cut_away: cut_away.clone(), through_axis };
+                let alone = skin::detect(&lattice, &air, mode, &options).unwrap();
+                for largest_component in [true, false] {
+                    let tissue = Tissue { air: &air, cut_away: &cut_away, largest_component };
+                    let (body, skin) =
+                        TissueMask::find_with_skin(&lattice, &tissue, mode, through_axis).unwrap();
+                    assert_eq!(skin.triangles, alone.triangles);
+                    assert_eq!(skin.report, alone.report);
+                    let found = TissueMask::find(&lattice, &tissue).unwrap();
+                    assert_eq!(body.vertices(), found.vertices());
+                    let figures = |mask: &TissueMask| (mask.components(), mask.dropped_tets());
+                    assert_eq!(figures(&body), figures(&found));
+                }
+                seen.push(alone);
+            }
+        }
+    }
+    // Control: the mode, the axis and the half-spaces change the skin.
+    let differ = |a: usize, b: usize| set(&seen[a].triangles) != set(&seen[b].triangles);
+    assert!(differ(0, 1) && differ(1, 2) && differ(2, 5) && differ(2, 8) && differ(8, 14));
+    let tissue = Tissue { air: &air, cut_away: &[], largest_component: true };
+    let invalid = TissueMask::find_with_skin(&lattice, &tissue, SkinMode::Paper, Some(3));
+    assert!(matches!(invalid, Err(MeshError::Axis { axis: 3 })));
+    let nothing = Tissue { air: &vec![true; air.len()], ..tissue };
+    let empty = TissueMask::find_with_skin(&lattice, &nothing, SkinMode::Paper, None);
+    assert!(matches!(empty, Err(MeshError::NoTissue { .. })));
 }
 
 #[test]

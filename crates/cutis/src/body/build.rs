@@ -1,8 +1,6 @@
 //! Builds a body from its CT.
 
-use cutis_mesh::{
-    Cut, HalfSpace, Incision, SkinOptions, SkinReport, Slit, TetMesh, Tissue, TissueMask, skin,
-};
+use cutis_mesh::{Cut, HalfSpace, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask};
 use cutis_volume::{TableKind, Volume};
 
 use super::lattice::lattice;
@@ -23,9 +21,10 @@ impl Body {
         let cut_away: Vec<HalfSpace> = tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = tissue.keep == Keep::Largest;
         let found = Tissue { air: &air, cut_away: &cut_away, largest_component };
-        let whole = TissueMask::find(&lattice, &found).map_err(file.blame("tissue"))?;
         let mut warnings = Vec::new();
-        let (skin, skin_report) = find_skin(sections, &whole, &air, &cut_away, &mut warnings)?;
+        let (whole, skin) = find_tissue(sections, &lattice, &found, &mut warnings)?;
+        let (skin, skin_report) = skin.map(|skin| (skin.triangles, skin.report)).unzip();
+        let skin: Vec<[u32; 3]> = skin.unwrap_or_default();
         let incisions: Vec<Incision> = incisions.iter().map(Incision::from).collect();
         let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(file.blame("incision"))?;
         let mut mesh = region::mesh(sections, &whole, &hu, &slits)?;
@@ -56,26 +55,26 @@ impl Body {
     }
 }
 
-/// Skin triangles of the body in lattice points, and their report; empty if the scene does not need
-/// the skin.
-fn find_skin(
+/// The tissue of the body and, if the scene needs it, the skin of the body.
+fn find_tissue(
     sections: &BodySections<'_>,
-    whole: &TissueMask,
-    air: &[bool],
-    cut_away: &[HalfSpace],
+    lattice: &Lattice,
+    tissue: &Tissue<'_>,
     warnings: &mut Vec<String>,
-) -> Result<(Vec<[u32; 3]>, Option<SkinReport>), Error> {
-    let Some(mode) = sections.skin else { return Ok((Vec::new(), None)) };
-    let options = SkinOptions { cut_away: cut_away.to_vec(), ..SkinOptions::default() };
-    let found =
-        skin::detect(whole.lattice(), air, mode.into(), &options).map_err(sections.file.blame("skin"))?;
-    let (on_body, dropped) = whole.skin(&found);
+) -> Result<(TissueMask, Option<Skin>), Error> {
+    let blame = sections.file.blame("tissue");
+    let Some(mode) = sections.skin else {
+        return Ok((TissueMask::find(lattice, tissue).map_err(blame)?, None));
+    };
+    let (whole, mut skin) = TissueMask::find_with_skin(lattice, tissue, mode.into(), None).map_err(blame)?;
+    let (on_body, dropped) = whole.skin(&skin);
     if dropped > 0 {
         warnings.push(format!(
             "{dropped} skin triangles have no tissue tetrahedron behind them and were left out"
         ));
     }
-    Ok((on_body, Some(found.report)))
+    skin.triangles = on_body;
+    Ok((whole, Some(skin)))
 }
 
 /// Warning about tissue that is not connected with the largest part.
