@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::builder::PossibleValuesParser;
-use clap::{Args as Group, Parser, Subcommand, ValueEnum};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args as Group, Parser, Subcommand};
+use cutis::mesh::{SkinMode, Split};
+use cutis::render::Side;
 use cutis::scene::{Override, constraint_kinds};
 use cutis::volume::sample::LatticeSize;
 
@@ -87,10 +89,10 @@ pub(crate) enum Command {
         #[arg(long, default_value = "native")]
         lattice: LatticeSize,
         /// Detection rule
-        #[arg(long, value_enum, default_value_t = Mode::Exterior)]
-        mode: Mode,
+        #[arg(long, value_parser = one_of(&MODES), default_value = "exterior")]
+        mode: SkinMode,
         /// How a lattice cell is split
-        #[arg(long, value_enum, default_value_t = Split::Kuhn6)]
+        #[arg(long, value_parser = one_of(&SPLITS), default_value = "kuhn6")]
         split: Split,
         /// Write the triangles (.vtu or .vtp)
         #[arg(long)]
@@ -135,7 +137,7 @@ pub(crate) enum Command {
         #[arg(long)]
         out: PathBuf,
         /// Side to look from
-        #[arg(long, value_enum, default_value_t = Side::Anterior, conflicts_with = "slice")]
+        #[arg(long, value_parser = one_of(&SIDES), default_value = "anterior", conflicts_with = "slice")]
         side: Side,
         /// Draw a slice: axial@MM, coronal@MM or sagittal@MM
         #[arg(long)]
@@ -222,30 +224,36 @@ pub(crate) struct Change {
     pub(crate) without: Vec<String>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Mode {
-    /// The paper's rule, taken literally
-    Paper,
-    /// All faces between tissue and everything else
-    Boundary,
-    /// The outer skin of the body
-    Exterior,
-}
+/// The name of a value on the command line, the value, and its description in the help.
+type Named<T> = (&'static str, T, &'static str);
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Split {
-    Kuhn6,
-    Five,
-}
+const MODES: [Named<SkinMode>; 3] = [
+    ("paper", SkinMode::Paper, "The paper's rule, taken literally"),
+    ("boundary", SkinMode::Boundary, "All faces between tissue and everything else"),
+    ("exterior", SkinMode::Exterior, "The outer skin of the body"),
+];
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Side {
-    Anterior,
-    Posterior,
-    Left,
-    Right,
-    Superior,
-    Inferior,
+const SPLITS: [Named<Split>; 2] = [
+    ("kuhn6", Split::Kuhn6, "Six tetrahedra around the main diagonal"),
+    ("five", Split::Five, "Five tetrahedra, mirrored in every other cell"),
+];
+
+const SIDES: [Named<Side>; 6] = [
+    ("anterior", Side::Anterior, "In front of the patient"),
+    ("posterior", Side::Posterior, "Behind the patient"),
+    ("left", Side::Left, "At the patient's left"),
+    ("right", Side::Right, "At the patient's right"),
+    ("superior", Side::Superior, "Above the head"),
+    ("inferior", Side::Inferior, "Below the feet"),
+];
+
+/// Parses the name of one of the values.
+fn one_of<T: Copy + Send + Sync>(values: &'static [Named<T>]) -> impl TypedValueParser<Value = T> {
+    let names = values.iter().map(|&(name, _, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(names).try_map(|text| {
+        let named = values.iter().find(|(name, ..)| *name == text);
+        named.map(|&(_, value, _)| value).ok_or("not one of the values")
+    })
 }
 
 fn size(text: &str) -> Result<[usize; 3], String> {

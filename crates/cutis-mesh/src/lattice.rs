@@ -10,18 +10,20 @@ use crate::MeshError;
 use crate::grading::Planes;
 use crate::stencil::Stencil;
 
-/// The split of a cell into tetrahedra.
+/// The split of a lattice cell into tetrahedra.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// Six tets around the diagonal from the corner with the lowest index to the corner with the
-    /// highest index (Kuhn).
+    /// Six tetrahedra around the main diagonal (Kuhn).
+    ///
+    /// The diagonal joins the corners with the lowest and the highest index.
     #[default]
     Kuhn6,
-    /// One tet in the middle and one at each of four corners, mirrored in cells with odd `i + j +
-    /// k`.
+    /// Five tetrahedra, mirrored in every other cell.
     ///
-    /// All face diagonals join lattice points with even `i + j + k`.
+    /// One is in the middle and one at each of four corners. Cells with odd `i + j + k` are
+    /// mirrored, so that all face diagonals join lattice points with even `i + j + k`.
     Five,
 }
 

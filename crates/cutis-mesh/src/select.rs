@@ -5,13 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::{MeshError, TetMesh};
 
-/// The half-space on one side of a plane, in world millimeters. The normal points into it.
+/// The half-space on one side of a plane, in world millimeters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct HalfSpace {
-    /// A point of the plane in mm.
+    /// A point of the plane, mm.
     pub point_mm: [f64; 3],
-    /// Normal of the plane, pointing into the half-space. Its length must not be zero.
+    /// Normal of the plane, pointing into the half-space; any length but zero.
     pub normal: [f64; 3],
 }
 

@@ -3,17 +3,25 @@
 use crate::SolverError;
 
 /// The method that turns the value of a constraint into a correction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "schema",
+    derive(serde::Serialize, serde::Deserialize, schemars::JsonSchema),
+    serde(rename_all = "lowercase")
+)]
 pub enum Formulation {
     /// PBD with a stiffness in `[0, 1]` per iteration (Müller et al. 2007). The result depends on
     /// the number of iterations and the time step.
     Pbd,
-    /// XPBD with a compliance `1/k` of the energy `½kC²`, in m/N for a length (Macklin et al.
-    /// 2016).
+    /// XPBD, which has compliances in physical units (Macklin et al. 2016).
+    ///
+    /// The energy `½kC²` has the compliance `1/k`, in m/N for a length.
+    #[default]
     Xpbd,
-    /// Vertex block descent with the compliances of XPBD (Chen et al. 2024). It lowers the energy
-    /// of the step vertex by vertex. A body at rest is in equilibrium for any number of iterations
-    /// and substeps.
+    /// Vertex block descent with the compliances of XPBD (Chen et al. 2024). A body at rest is in
+    /// equilibrium for any number of iterations and substeps.
+    ///
+    /// It lowers the energy of the step vertex by vertex.
     Vbd,
 }
 
@@ -41,7 +49,7 @@ impl Default for Settings {
     /// Returns XPBD at 60 Hz with 10 substeps of one iteration, without gravity and damping.
     fn default() -> Self {
         Self {
-            formulation: Formulation::Xpbd,
+            formulation: Formulation::default(),
             dt_s: 1.0 / 60.0,
             substeps: 10,
             iterations: 1,

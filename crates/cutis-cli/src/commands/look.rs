@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use cutis::mesh::SkinReport;
-use cutis::render::{Focus, Plane, SliceView, View, raymarch, slice};
+use cutis::mesh::{SkinMode, SkinReport, Split};
+use cutis::render::{Focus, Plane, Side, SliceView, View, raymarch, slice};
 use cutis::volume::{nifti, phantom::Phantom, sample::LatticeSize};
 use cutis::{Error, Inspection, Progress, SkinRequest};
 
 use super::pretty;
-use crate::args::{Mode, Side, Split};
 use crate::terminal::{Terminal, print};
 
 pub(crate) fn inspect(volume: &Path, json: bool) -> Result<(), Error> {
@@ -41,12 +40,12 @@ fn page(found: &Inspection) -> String {
 pub(crate) fn skin(
     volume: &Path,
     lattice: LatticeSize,
-    mode: Mode,
+    mode: SkinMode,
     split: Split,
     out: Option<&Path>,
     json: bool,
 ) -> Result<(), Error> {
-    let request = SkinRequest { lattice, split: split.into(), mode: mode.into() };
+    let request = SkinRequest { lattice, split, mode };
     let report = cutis::find_skin(volume, &request, out, &Terminal::new())?;
     print(&if json { pretty(&report) } else { skin_page(&report, out) });
     Ok(())
@@ -97,25 +96,6 @@ pub(crate) struct Look {
     pub(crate) pixels: usize,
 }
 
-impl From<Mode> for cutis::mesh::SkinMode {
-    fn from(mode: Mode) -> Self {
-        match mode {
-            Mode::Paper => Self::Paper,
-            Mode::Boundary => Self::Boundary,
-            Mode::Exterior => Self::Exterior,
-        }
-    }
-}
-
-impl From<Split> for cutis::mesh::Split {
-    fn from(split: Split) -> Self {
-        match split {
-            Split::Kuhn6 => Self::Kuhn6,
-            Split::Five => Self::Five,
-        }
-    }
-}
-
 /// Draws a volume and writes a PNG.
 pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error> {
     let focus = match (&look.focus, look.zoom) {
@@ -143,7 +123,7 @@ pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error
         }
         None => {
             let (width, height) = (look.pixels, look.pixels);
-            raymarch(&volume, &View { width, height, focus, ..View::new(look.side.into()) })?
+            raymarch(&volume, &View { width, height, focus, ..View::new(look.side) })?
         }
     };
     image.write_png(out)?;
@@ -181,17 +161,4 @@ fn numbers<const N: usize>(
         what: format!("{option} {text}"),
         why: format!("must be {expected}"),
     })
-}
-
-impl From<Side> for cutis::render::Side {
-    fn from(side: Side) -> Self {
-        match side {
-            Side::Anterior => Self::Anterior,
-            Side::Posterior => Self::Posterior,
-            Side::Left => Self::Left,
-            Side::Right => Self::Right,
-            Side::Superior => Self::Superior,
-            Side::Inferior => Self::Inferior,
-        }
-    }
 }

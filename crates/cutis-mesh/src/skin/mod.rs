@@ -13,20 +13,24 @@ use crate::surface::faces;
 use crate::tissue_tets::TissueTets;
 use crate::{HalfSpace, Lattice, MeshError};
 
-/// The rule that selects the skin triangles. In every mode, lattice points in `cut_away`
-/// half-spaces count as air.
+/// The rule that selects the skin triangles.
+///
+/// In every mode, lattice points in half-spaces that are cut away count as air.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum SkinMode {
-    /// The literal rule of the STC paper (Algorithm 2): a tet with exactly one air corner gives the
-    /// triangle of its other three corners. A triangle given by two tets is kept once.
+    /// The rule of the STC paper (Algorithm 2), taken literally: a tetrahedron with exactly one air
+    /// corner gives the triangle of its other three corners.
     ///
-    /// The result includes both sides of the scanner table, the lungs and the bowel. It is the
-    /// surface of the `Boundary` mode plus stray sheets. A stray sheet is a triangle between two
-    /// tets that both have an air corner, for example where tissue is one vertex thick.
+    /// A triangle given by two tets is kept once. The result includes both sides of the scanner
+    /// table, the lungs and the bowel. It is the surface of the `Boundary` mode plus stray sheets.
+    /// A stray sheet is a triangle between two tets that both have an air corner, for example where
+    /// tissue is one vertex thick.
     Paper,
-    /// Every face between a tet with four tissue corners and another tet. Faces on the box of the
-    /// lattice, where the scan ends, are not skin.
+    /// Every face between a tetrahedron with four tissue corners and another tetrahedron.
+    ///
+    /// Faces on the box of the lattice, where the scan ends, are not skin.
     Boundary,
     /// The faces of the body that touch outside air.
     ///

@@ -1,6 +1,6 @@
 //! Builds a body from its CT.
 
-use cutis_mesh::{Cut, HalfSpace, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask};
+use cutis_mesh::{Cut, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask};
 use cutis_volume::{TableKind, Volume};
 
 use super::lattice::lattice;
@@ -18,9 +18,8 @@ impl Body {
         let lattice = lattice(sections, volume)?;
         let hu = lattice.sample(volume)?;
         let air = air(&hu, tissue.air_below_hu);
-        let cut_away: Vec<HalfSpace> = tissue.cut_planes.iter().map(HalfSpace::from).collect();
         let largest_component = tissue.keep == Keep::Largest;
-        let found = Tissue { air: &air, cut_away: &cut_away, largest_component };
+        let found = Tissue { air: &air, cut_away: &tissue.cut_planes, largest_component };
         let mut warnings = Vec::new();
         let (whole, skin) = find_tissue(sections, &lattice, &found, &mut warnings)?;
         let (skin, skin_report) = skin.map(|skin| (skin.triangles, skin.report)).unzip();
@@ -66,7 +65,7 @@ fn find_tissue(
     let Some(mode) = sections.skin else {
         return Ok((TissueMask::find(lattice, tissue).map_err(blame)?, None));
     };
-    let (whole, mut skin) = TissueMask::find_with_skin(lattice, tissue, mode.into(), None).map_err(blame)?;
+    let (whole, mut skin) = TissueMask::find_with_skin(lattice, tissue, mode, None).map_err(blame)?;
     let (on_body, dropped) = whole.skin(&skin);
     if dropped > 0 {
         warnings.push(format!(

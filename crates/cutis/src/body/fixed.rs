@@ -44,7 +44,7 @@ impl Body {
             add(mesh.vertices_in_box_mm(b.min_mm, b.max_mm));
         }
         for plane in &section.planes {
-            add(mesh.vertices_beyond(&plane.into()).map_err(file.blame("fixed.planes"))?);
+            add(mesh.vertices_beyond(plane).map_err(file.blame("fixed.planes"))?);
         }
         for axis in section.end_layers.iter().map(|axis| axis.index()) {
             let last = mesh.lattice.grid().shape[axis] - 1;

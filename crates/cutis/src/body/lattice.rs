@@ -28,7 +28,7 @@ pub(crate) fn lattice(sections: &BodySections<'_>, volume: &Volume) -> Result<La
     let (file, section) = (sections.file, sections.lattice);
     let even = sample::lattice_grid(volume.grid(), section.size()).map_err(file.blame("lattice"))?;
     let lattice = match &section.grading {
-        None => Lattice::new(even, section.split.into()),
+        None => Lattice::new(even, section.split),
         Some(grading) => {
             let Some(zone) = grading.zone() else {
                 return Err(file.bad_key("lattice.grading", "", "it has no zone"));
@@ -36,7 +36,7 @@ pub(crate) fn lattice(sections: &BodySections<'_>, volume: &Volume) -> Result<La
             let fine = fine_zone(sections, zone, &even);
             let steps = Grading { growth: grading.growth, coarsest: grading.coarsest };
             let planes = Planes::new(&even, fine, &steps).map_err(file.blame("lattice.grading"))?;
-            Lattice::graded(even, section.split.into(), planes)
+            Lattice::graded(even, section.split, planes)
         }
     };
     lattice.map_err(file.blame("lattice"))

@@ -1,10 +1,9 @@
 //! The sections of a scene that a body is built from.
 
-use cutis_mesh::{HalfSpace, Incision, SkinMode, Split};
+use cutis_mesh::{Incision, SkinMode};
 
 use crate::scene::{
-    HandleSection, IncisionSection, LatticeSection, LoadedScene, PlaneSection, Scene, SceneFile, SkinChoice,
-    SplitChoice, TissueSection,
+    HandleSection, IncisionSection, LatticeSection, LoadedScene, Scene, SceneFile, TissueSection,
 };
 
 /// The sections of a scene that a body is built from.
@@ -14,7 +13,7 @@ pub(crate) struct BodySections<'a> {
     pub(crate) lattice: &'a LatticeSection,
     pub(crate) tissue: &'a TissueSection,
     /// Rule by which the skin is found; none if the scene does not need the skin.
-    pub(crate) skin: Option<SkinChoice>,
+    pub(crate) skin: Option<SkinMode>,
     pub(crate) incisions: &'a [IncisionSection],
     pub(crate) handles: &'a [HandleSection],
 }
@@ -41,34 +40,9 @@ pub(crate) fn needs_skin(scene: &Scene) -> bool {
         || scene.output.pictures
 }
 
-impl From<&PlaneSection> for HalfSpace {
-    fn from(plane: &PlaneSection) -> Self {
-        Self { point_mm: plane.point_mm, normal: plane.normal }
-    }
-}
-
 impl From<&IncisionSection> for Incision {
     fn from(section: &IncisionSection) -> Self {
         let IncisionSection { from_mm, to_mm, depth_mm, width_mm, at_s: _ } = *section;
         Self { from_mm, to_mm, depth_mm, width_mm }
-    }
-}
-
-impl From<SkinChoice> for SkinMode {
-    fn from(choice: SkinChoice) -> Self {
-        match choice {
-            SkinChoice::Paper => Self::Paper,
-            SkinChoice::Boundary => Self::Boundary,
-            SkinChoice::Exterior => Self::Exterior,
-        }
-    }
-}
-
-impl From<SplitChoice> for Split {
-    fn from(choice: SplitChoice) -> Self {
-        match choice {
-            SplitChoice::Kuhn6 => Self::Kuhn6,
-            SplitChoice::Five => Self::Five,
-        }
     }
 }

@@ -3,7 +3,9 @@
 //! Positions are world millimeters in the volume's RAS+ frame. Unknown keys are refused.
 //! [`Scene::load`] reads a file, applies overrides and checks every value. Each section is a struct
 //! of this module. The sections of constraint kinds and of models are defined next to the code that
-//! builds them, in the stage `model`.
+//! builds them, in the stage `model`. Values that also exist without a scene have the types of the
+//! library: [`Split`](crate::mesh::Split), [`SkinMode`](crate::mesh::SkinMode),
+//! [`HalfSpace`](crate::mesh::HalfSpace) and [`Formulation`](crate::solver::Formulation).
 
 mod choice;
 mod demo;

@@ -1,6 +1,7 @@
 //! The range of every number of a scene. A value out of range is an error that names its key.
 
-use cutis_mesh::Grading;
+use cutis_mesh::{Grading, HalfSpace};
+use cutis_solver::Formulation;
 
 use super::*;
 use crate::{Error, model};
@@ -68,7 +69,7 @@ impl Check<'_> {
         self.require(ordered, &format!("{key}.max_mm"), format!("{max_mm:?}"), "must not lie below min_mm")
     }
 
-    fn plane(&self, key: &str, plane: &PlaneSection) -> Result<(), Error> {
+    fn plane(&self, key: &str, plane: &HalfSpace) -> Result<(), Error> {
         self.point(&format!("{key}.point_mm"), plane.point_mm)?;
         self.point(&format!("{key}.normal"), plane.normal)?;
         let length = plane.normal.iter().map(|v| v * v).sum::<f64>();
@@ -197,7 +198,7 @@ impl Scene {
         check.positive("solver.dt_s", s.dt_s)?;
         check.require(s.substeps > 0, "solver.substeps", s.substeps, "must be 1 or more")?;
         check.require(s.iterations > 0, "solver.iterations", s.iterations, "must be 1 or more")?;
-        let (lowest, highest) = if s.formulation == FormulationChoice::Vbd { (0.0, 2.0) } else { (1.0, 1.0) };
+        let (lowest, highest) = if s.formulation == Formulation::Vbd { (0.0, 2.0) } else { (1.0, 1.0) };
         let relaxed = s.relaxation == 1.0 || (s.relaxation > lowest && s.relaxation < highest);
         let why = "must be above 0 and below 2 with solver.formulation = \"vbd\", and 1 otherwise";
         check.require(relaxed, "solver.relaxation", s.relaxation, why)?;

@@ -28,6 +28,8 @@ mod trials;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
+use cutis_solver::Formulation;
+
 use crate::backend::Request;
 use crate::model::ModelInput;
 use crate::model::constraints::ConstraintModel;
@@ -35,7 +37,7 @@ use crate::model::needs_system;
 use crate::report::Machine;
 use crate::run::clock::Clock;
 use crate::run::prepare::{Prepared, prepare};
-use crate::scene::{FormulationChoice, LoadedScene};
+use crate::scene::LoadedScene;
 use crate::{CostReport, Error, Progress};
 
 use ablation::Baseline;
@@ -88,7 +90,7 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
     let ConstraintModel { system, settings, .. } =
         clock.stage("constraints of all formulations", 0, |_| {
             let mut all = loaded.clone();
-            all.scene.solver.formulation = FormulationChoice::Vbd;
+            all.scene.solver.formulation = Formulation::Vbd;
             ConstraintModel::build(&ModelInput { file: all.file(), scene: &all.scene, body: &body })
         })?;
     let backend = backend.kept_open()?;
@@ -160,7 +162,7 @@ fn check(loaded: &LoadedScene, options: &TuneOptions) -> Result<(), Error> {
         })
     };
     let scene = &loaded.scene;
-    if scene.solver.formulation == FormulationChoice::Pbd {
+    if scene.solver.formulation == Formulation::Pbd {
         let why = "cannot be tuned: with \"pbd\" the stiffness depends on substeps and iterations, so finer settings do \
                    not converge to one solution; use \"xpbd\" or \"vbd\"";
         return key("solver.formulation", "\"pbd\"", why);

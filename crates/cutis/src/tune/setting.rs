@@ -4,7 +4,7 @@ use cutis_solver::{Formulation, Settings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::{FormulationChoice, SolverSection};
+use crate::scene::SolverSection;
 
 /// Over-relaxation of vertex block descent with several iterations. A single iteration has none.
 const RELAXATION: f64 = 1.3;
@@ -13,7 +13,7 @@ const RELAXATION: f64 = 1.3;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setting {
     /// `xpbd` or `vbd`.
-    pub formulation: FormulationChoice,
+    pub formulation: Formulation,
     /// Substeps per frame.
     pub substeps: u32,
     /// Iterations per substep.
@@ -25,9 +25,9 @@ pub struct Setting {
 impl std::fmt::Display for Setting {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let name = match self.formulation {
-            FormulationChoice::Pbd => "pbd",
-            FormulationChoice::Xpbd => "xpbd",
-            FormulationChoice::Vbd => "vbd",
+            Formulation::Pbd => "pbd",
+            Formulation::Xpbd => "xpbd",
+            Formulation::Vbd => "vbd",
         };
         write!(f, "{name} {} x {}", self.substeps, self.iterations)?;
         if self.relaxation == 1.0 { Ok(()) } else { write!(f, ", {}", self.relaxation) }
@@ -43,12 +43,12 @@ impl Setting {
 
     /// XPBD with one iteration per substep.
     pub(super) fn xpbd(substeps: u32) -> Self {
-        Self { formulation: FormulationChoice::Xpbd, substeps, iterations: 1, relaxation: 1.0 }
+        Self { formulation: Formulation::Xpbd, substeps, iterations: 1, relaxation: 1.0 }
     }
 
     fn vbd(substeps: u32, iterations: u32) -> Self {
         let relaxation = if iterations > 1 { RELAXATION } else { 1.0 };
-        Self { formulation: FormulationChoice::Vbd, substeps, iterations, relaxation }
+        Self { formulation: Formulation::Vbd, substeps, iterations, relaxation }
     }
 
     /// A copy of `solver` with this setting.
@@ -59,12 +59,7 @@ impl Setting {
 
     /// A copy of the solver's settings with this setting.
     pub(super) fn settings(self, others: &Settings) -> Settings {
-        let formulation = match self.formulation {
-            FormulationChoice::Pbd => Formulation::Pbd,
-            FormulationChoice::Xpbd => Formulation::Xpbd,
-            FormulationChoice::Vbd => Formulation::Vbd,
-        };
-        let Self { substeps, iterations, relaxation, .. } = self;
+        let Self { formulation, substeps, iterations, relaxation } = self;
         Settings { formulation, substeps, iterations, relaxation, ..*others }
     }
 
@@ -94,8 +89,8 @@ impl CostModel {
     /// Expected time of a frame, ms.
     pub(super) fn frame_ms(&self, setting: Setting) -> f64 {
         let line = match setting.formulation {
-            FormulationChoice::Vbd => self.vbd,
-            FormulationChoice::Pbd | FormulationChoice::Xpbd => self.xpbd,
+            Formulation::Vbd => self.vbd,
+            Formulation::Pbd | Formulation::Xpbd => self.xpbd,
         };
         f64::from(setting.substeps) * line.substep_ms + f64::from(setting.sweeps()) * line.iteration_ms
     }
@@ -151,8 +146,8 @@ mod tests {
                 found.sort();
                 found
             };
-            assert_eq!(single(FormulationChoice::Xpbd), [1, 2, 3, 4, 6, 8, 11, 16, 23]);
-            assert_eq!(single(FormulationChoice::Vbd), [1, 2, 4, 8]);
+            assert_eq!(single(Formulation::Xpbd), [1, 2, 3, 4, 6, 8, 11, 16, 23]);
+            assert_eq!(single(Formulation::Vbd), [1, 2, 4, 8]);
             assert!(list.contains(&Setting::vbd(1, 8)) && !list.contains(&Setting::vbd(1, 16)));
         }
     }

@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use cutis_solver::Formulation;
+
 use super::bench::{Bench, Run};
 use super::document::NO_TIME_LEFT;
 use super::field::Field;
@@ -10,7 +12,6 @@ use super::reference::Reference;
 use super::{Candidate, Demand, Setting, WoundError, setting};
 use crate::Error;
 use crate::run::clock::Clock;
-use crate::scene::FormulationChoice;
 
 /// A candidate is abandoned if a cheaper one of its formulation had an error smaller by this factor
 /// at the same frame.
@@ -30,7 +31,7 @@ pub(super) struct Trials<'a> {
 
 /// Errors of a run over time.
 struct ErrorHistory {
-    formulation: FormulationChoice,
+    formulation: Formulation,
     ms_per_frame: f64,
     /// Relative error at each sampled frame.
     errors: Vec<f64>,
@@ -158,11 +159,11 @@ impl Trials<'_> {
 
 #[cfg(test)]
 mod tests {
-    use FormulationChoice::{Vbd, Xpbd};
+    use Formulation::{Vbd, Xpbd};
 
     use super::*;
 
-    fn history(formulation: FormulationChoice, ms_per_frame: f64, errors: &[f64]) -> ErrorHistory {
+    fn history(formulation: Formulation, ms_per_frame: f64, errors: &[f64]) -> ErrorHistory {
         ErrorHistory { formulation, ms_per_frame, errors: errors.to_vec() }
     }
 

@@ -1,6 +1,7 @@
 //! Scenes of the outer ring.
 
-use cutis::scene::{FormulationChoice, HandleSection, OutputSection, StcForm};
+use cutis::scene::{HandleSection, OutputSection, StcForm};
+use cutis::solver::Formulation;
 use cutis::{LoadedScene, Override, Scene};
 
 use crate::kit::scene;
@@ -80,7 +81,7 @@ const SMALL: &[(&str, &str)] = &[
 fn kinds(frames: u32) -> Result<Vec<SceneCase>, Failure> {
     let mut cases = Vec::new();
     for (formula, formulation) in
-        [("XPBD", FormulationChoice::Xpbd), ("PBD", FormulationChoice::Pbd), ("VBD", FormulationChoice::Vbd)]
+        [("XPBD", Formulation::Xpbd), ("PBD", Formulation::Pbd), ("VBD", Formulation::Vbd)]
     {
         for (kind, kept) in [
             ("distance", [true, false, false]),
@@ -107,12 +108,12 @@ fn kinds(frames: u32) -> Result<Vec<SceneCase>, Failure> {
 }
 
 fn pbd(mut loaded: LoadedScene) -> LoadedScene {
-    loaded.scene.solver.formulation = FormulationChoice::Pbd;
+    loaded.scene.solver.formulation = Formulation::Pbd;
     loaded
 }
 
 fn vbd(mut loaded: LoadedScene) -> LoadedScene {
-    loaded.scene.solver.formulation = FormulationChoice::Vbd;
+    loaded.scene.solver.formulation = Formulation::Vbd;
     (loaded.scene.solver.iterations, loaded.scene.solver.relaxation) = (2, 1.3);
     loaded
 }

@@ -10,17 +10,13 @@ use super::ConstraintModel;
 use super::kinds::BodyParts;
 use crate::Error;
 use crate::model::ModelInput;
-use crate::scene::{FormulationChoice, SolverSection};
+use crate::scene::SolverSection;
 
 impl SolverSection {
     /// The solver settings that the section describes.
     pub(crate) fn settings(&self) -> Settings {
         Settings {
-            formulation: match self.formulation {
-                FormulationChoice::Pbd => Formulation::Pbd,
-                FormulationChoice::Xpbd => Formulation::Xpbd,
-                FormulationChoice::Vbd => Formulation::Vbd,
-            },
+            formulation: self.formulation,
             dt_s: self.dt_s,
             substeps: self.substeps,
             iterations: self.iterations,
@@ -57,7 +53,7 @@ impl ConstraintModel {
             colors.insert(row.key.to_owned(), number);
             warnings.extend(kind.warnings(&parts));
         }
-        if scene.solver.formulation == FormulationChoice::Vbd {
+        if scene.solver.formulation == Formulation::Vbd {
             builder = builder.vertex_groups(Groups::from_colors(&body.mesh.vertex_colors())?);
         }
         for (n, (handle, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {

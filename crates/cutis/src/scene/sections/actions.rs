@@ -1,5 +1,6 @@
 //! The sections that act on the body: fixed vertices, incisions, handles.
 
+use cutis_mesh::HalfSpace;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ pub struct FixedSection {
     pub boxes: Vec<BoxSection>,
     /// Vertices on the side of these planes to which the normal points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub planes: Vec<PlaneSection>,
+    pub planes: Vec<HalfSpace>,
     /// Vertices in the first and last layer of the lattice along these axes (`"i"`, `"j"`, `"k"`),
     /// where the scan ends.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -49,16 +50,6 @@ pub struct BoxSection {
     pub min_mm: [f64; 3],
     /// Highest corner, mm.
     pub max_mm: [f64; 3],
-}
-
-/// A half-space: the side of the plane to which the normal points.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PlaneSection {
-    /// A point of the plane, mm.
-    pub point_mm: [f64; 3],
-    /// Direction of the half-space; any length but zero.
-    pub normal: [f64; 3],
 }
 
 /// An incision as in the paper, with a mid-surface that always separates the lips. It is placed on

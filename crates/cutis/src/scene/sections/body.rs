@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use cutis_mesh::{HalfSpace, SkinMode, Split};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::PlaneSection;
 use crate::body::AIR_BELOW_HU;
 use crate::scene::choice::OneOr;
 
@@ -45,7 +45,7 @@ pub struct LatticeSection {
     pub vertices: Option<[usize; 3]>,
     /// How a cell is split into tetrahedra.
     #[serde(default)]
-    pub split: SplitChoice,
+    pub split: Split,
     /// The part of the body that is simulated: `around_mm`, or a box. Tissue outside it does not
     /// move and takes neither time nor memory of the solver. Skin and largest part are found on the
     /// whole body first. Left out: the whole body.
@@ -137,17 +137,6 @@ impl GradingSection {
     }
 }
 
-/// How a lattice cell is split.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum SplitChoice {
-    /// Six tetrahedra around the main diagonal.
-    #[default]
-    Kuhn6,
-    /// Five tetrahedra, mirrored on odd cells.
-    Five,
-}
-
 /// Which voxels are tissue, and their density.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -158,7 +147,7 @@ pub struct TissueSection {
     pub keep: Keep,
     /// Half-spaces that are removed first, for example a scanner table in contact with the body.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub cut_planes: Vec<PlaneSection>,
+    pub cut_planes: Vec<HalfSpace>,
     /// HU → density, kg/m³: preset `schneider2000` or `water`, or points.
     pub density: TableChoice,
 }
@@ -211,19 +200,5 @@ pub struct SkinSection {
     /// Rule by which skin triangles are chosen: the outer skin of the body, all faces between
     /// tissue and the rest, or the paper's rule, taken literally.
     #[serde(default)]
-    pub mode: SkinChoice,
-}
-
-/// Skin detection rule.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum SkinChoice {
-    /// The paper's rule, taken literally: every tetrahedron with exactly one air vertex gives a
-    /// triangle.
-    Paper,
-    /// All faces between a kept and a dropped tetrahedron.
-    Boundary,
-    /// Faces that touch the air around the largest body.
-    #[default]
-    Exterior,
+    pub mode: SkinMode,
 }

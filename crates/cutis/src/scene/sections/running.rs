@@ -1,5 +1,6 @@
 //! The sections of a run: time steps, number of frames, outputs.
 
+use cutis_solver::Formulation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ pub struct SolverSection {
     pub adapter: Option<String>,
     /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent. `vbd` has
     /// the materials of `xpbd`, and its state of rest is an equilibrium for any number of substeps.
-    pub formulation: FormulationChoice,
+    pub formulation: Formulation,
     /// Duration of a frame, s.
     pub dt_s: f64,
     /// Substeps per frame, 1 or more.
@@ -38,7 +39,7 @@ impl Default for SolverSection {
         Self {
             backend: BackendChoice::default(),
             adapter: None,
-            formulation: FormulationChoice::default(),
+            formulation: Formulation::default(),
             dt_s: 1.0 / 60.0,
             substeps: 10,
             iterations: 1,
@@ -63,20 +64,6 @@ pub enum BackendChoice {
     Reference,
     /// A GPU.
     Gpu,
-}
-
-/// Formulation of the projection.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum FormulationChoice {
-    /// Stiffness per iteration, as in the paper.
-    Pbd,
-    /// Compliance in physical units.
-    #[default]
-    Xpbd,
-    /// The materials of `xpbd`, solved vertex by vertex (vertex block descent). The state of rest
-    /// is an equilibrium for any number of substeps and iterations.
-    Vbd,
 }
 
 /// How long to run.

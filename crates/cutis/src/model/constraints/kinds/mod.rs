@@ -8,7 +8,7 @@ mod distance;
 mod skin_tension;
 mod tet_volume;
 
-use cutis_solver::{Stiffness, SystemBuilder, Values};
+use cutis_solver::{Formulation, Stiffness, SystemBuilder, Values};
 use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ pub use tet_volume::VolumeConstraintSection;
 use crate::Error;
 use crate::body::Body;
 use crate::scene::validate::Check;
-use crate::scene::{FormulationChoice, Scene, SceneFile, SolverSection};
+use crate::scene::{Scene, SceneFile, SolverSection};
 
 /// Writes the section `constraints` of a scene and the table of its kinds from one list of rows.
 /// A row is the documentation, the key and the type of a section that is a [`ConstraintKind`].
@@ -118,7 +118,7 @@ pub(crate) struct BodyParts<'a> {
 impl BodyParts<'_> {
     /// Whether stiffness is a compliance in physical units, as in `xpbd` and `vbd`.
     fn compliant(&self) -> bool {
-        self.solver.formulation != FormulationChoice::Pbd
+        self.solver.formulation != Formulation::Pbd
     }
 
     /// Rest position of a vertex, local meters.

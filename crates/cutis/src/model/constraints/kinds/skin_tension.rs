@@ -5,7 +5,7 @@ use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{
     Constraint, SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial,
 };
-use cutis_solver::{Stiffness, SystemBuilder, Values};
+use cutis_solver::{Formulation, Stiffness, SystemBuilder, Values};
 use cutis_volume::TableKind;
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
 use crate::Error;
 use crate::scene::validate::Check;
-use crate::scene::{FormulationChoice, Scene, SolverSection, TableChoice};
+use crate::scene::{Scene, SolverSection, TableChoice};
 
 /// Key of the table that scales the modulus.
 const TABLE_KEY: &str = "constraints.stc.stiffness_table";
@@ -219,7 +219,7 @@ impl ConstraintKind for StcSection {
         check.not_negative("constraints.stc.amplification", self.amplification)?;
         check.positive("constraints.stc.rest_area_scale", self.rest_area_scale)?;
         let paper = self.form == StcForm::Paper;
-        let pbd = scene.solver.formulation == FormulationChoice::Pbd;
+        let pbd = scene.solver.formulation == Formulation::Pbd;
         let why = "works with solver.formulation = \"pbd\" only; use \"energy\" with xpbd and vbd";
         check.require(!paper || pbd, "constraints.stc.form", "paper", why)?;
         let why = "must be above 0 for the paper form, whose clamp is 1/stiffness";
@@ -253,7 +253,7 @@ impl ConstraintKind for StcSection {
         }
         if parts.body.skin.is_empty() {
             warnings.push("no skin was found: skin tension has nothing to act on".to_owned());
-        } else if parts.solver.formulation == FormulationChoice::Xpbd {
+        } else if parts.solver.formulation == Formulation::Xpbd {
             warnings.extend(too_stiff(parts.solver, self.frequency(parts)));
         }
         warnings
