@@ -44,7 +44,7 @@ fn parse(set: &[(&str, &str)]) -> Result<LoadedScene, Error> {
     Scene::parse(EVERYTHING, Path::new("every.toml"), Path::new(""), &overrides(set))
 }
 
-/// For every row of the reference: the key as `--set` takes it, the key as messages name it, and
+/// For every row of the reference: the key as `--set` accepts it, the key as messages name it, and
 /// the type of its value.
 fn keys() -> Vec<(String, String, String)> {
     let mut keys = Vec::new();

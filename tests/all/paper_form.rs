@@ -25,7 +25,7 @@ fn plan(set: &[(&str, &str)]) -> Plan {
 }
 
 #[test]
-fn the_solver_has_another_name_for_it() {
+fn the_paper_form_has_another_name_in_the_solver() {
     assert_ne!(SkinTensionPaper::NAME, "stc");
 }
 
@@ -44,7 +44,7 @@ fn parts_and_colors_of_a_plan_have_the_key_of_the_kind() {
 }
 
 #[test]
-fn reports_have_its_colors_errors_and_cost() {
+fn reports_have_colors_errors_and_cost_of_the_paper_form() {
     let run = Run::of(&paper(&[("run.frames", "2"), ("output", "{ report = true }")]));
     let report = &run.report;
     let kinds: Vec<&str> = report.residuals.iter().map(|residual| residual.kind.as_str()).collect();

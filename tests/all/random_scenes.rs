@@ -108,13 +108,13 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn random_bytes_are_no_panic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
+    fn random_bytes_cause_no_panic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
         ends_well(parse(&String::from_utf8_lossy(&bytes), &[]))?;
     }
 
     /// Text is inserted, deleted or repeated anywhere.
     #[test]
-    fn a_damaged_scene_is_no_panic(
+    fn a_damaged_scene_causes_no_panic(
         damage in proptest::collection::vec((any::<Index>(), any::<Index>(), select(&PIECES[..]), 0..4_u8), 1..6),
     ) {
         let mut text: Vec<char> = DEMO.chars().collect();
@@ -135,7 +135,7 @@ proptest! {
     }
 
     #[test]
-    fn random_overrides_are_no_panic(set in proptest::collection::vec((key(), value()), 1..4)) {
+    fn random_overrides_cause_no_panic(set in proptest::collection::vec((key(), value()), 1..4)) {
         let overrides: Vec<Override> = set.into_iter().map(|(key, value)| Override { key, value }).collect();
         ends_well(parse(DEMO, &overrides))?;
     }

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_rigid_does_not_shear_whatever_the_spacing() {
+    fn rigid_materials_do_not_shear_at_any_spacing() {
         for spacing_mm in [[1e300, 1e-300, 1.0], [f64::MIN_POSITIVE, 1.0, f64::MAX]] {
             let limits =
                 Limits::new(&[Material::RIGID, Material { shear: [1.0; 3], ..Material::RIGID }], spacing_mm);

@@ -155,7 +155,7 @@ pub(crate) enum Command {
         #[arg(long, default_value_t = 800)]
         pixels: usize,
     },
-    /// List the GPUs of this machine, and the one that `--backend auto` takes
+    /// List the GPUs of this machine, and the one that `--backend auto` selects
     Devices {
         /// Print as JSON
         #[arg(long)]

@@ -14,7 +14,7 @@ fn small(backend: BackendChoice) -> LoadedScene {
 }
 
 #[test]
-fn a_gpu_is_refused_and_auto_is_the_cpu() {
+fn a_gpu_is_refused_and_auto_selects_the_cpu() {
     let error = cutis::check(&small(BackendChoice::Gpu), &Silent).unwrap_err();
     assert!(error.is_bad_input() && matches!(error, Error::SceneSection { .. }), "{error:?}");
     let text = error.to_string();
@@ -32,7 +32,7 @@ fn a_gpu_is_refused_and_auto_is_the_cpu() {
 }
 
 #[test]
-fn devices_say_so() {
+fn the_list_of_devices_names_the_missing_feature() {
     let found = cutis::devices();
     assert!(!found.gpu_backend && found.devices.is_empty() && found.auto.is_none());
     assert!(found.note.contains("feature `gpu`"), "{}", found.note);

@@ -77,7 +77,7 @@ struct Run {
 }
 
 impl Document {
-    /// Solves every case. `quick` takes the cases of the tests.
+    /// Solves every case. `quick` uses the cases of the tests.
     ///
     /// # Errors
     /// Newton's method does not converge, or a device fails.

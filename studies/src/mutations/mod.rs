@@ -34,7 +34,7 @@ pub struct Options {
 }
 
 impl Options {
-    fn takes(&self, mutation: &Mutation) -> bool {
+    fn selects(&self, mutation: &Mutation) -> bool {
         self.suite.as_ref().is_none_or(|name| mutation.suite.name() == name)
             && self.text.as_ref().is_none_or(|text| mutation.fault.contains(text.as_str()))
     }
@@ -60,7 +60,7 @@ fn provenance_of(suite: Suite) -> String {
 /// The tests of a suite fail without a fault, a fault cannot be applied, or the tests do not build.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let mut page = options.write.then(|| Page::open("mutations", &tables())).transpose()?;
-    let chosen: Vec<&Mutation> = all().filter(|mutation| options.takes(mutation)).collect();
+    let chosen: Vec<&Mutation> = all().filter(|mutation| options.selects(mutation)).collect();
     ensure!(!chosen.is_empty(), "no fault matches");
     ensure!(!cutis_gpu::adapters().is_empty(), "the tests need a GPU adapter; a software adapter is enough");
     let copy = Copy::new()?;

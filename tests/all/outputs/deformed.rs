@@ -17,7 +17,7 @@ fn marker(volume: &Nifti, right: bool) -> [f64; 3] {
 }
 
 #[test]
-fn grid_and_scaling_are_those_of_the_input() {
+fn grid_and_scaling_match_the_input() {
     let (before, after) = (ct(), deformed());
     assert_eq!((after.shape, after.scaling), (before.shape, [1.0, 0.0]));
     for (found, expected) in after.rows.iter().flatten().zip(before.rows.iter().flatten()) {
@@ -27,7 +27,7 @@ fn grid_and_scaling_are_those_of_the_input() {
 }
 
 #[test]
-fn markers_are_where_the_handle_took_them() {
+fn markers_move_with_the_handle() {
     let after = deformed();
     let right = marker(&after, true);
     for axis in 0..3 {
@@ -44,7 +44,7 @@ fn markers_are_where_the_handle_took_them() {
 
 /// Fixed tissue keeps its voxels except at its edges. All values lie between air and the markers.
 #[test]
-fn what_is_fixed_is_unchanged() {
+fn fixed_tissue_keeps_its_voxels() {
     let (before, after) = (ct(), deformed());
     let fixed = |n: &usize| {
         let [x, y, z] = before.at(*n);
@@ -58,7 +58,7 @@ fn what_is_fixed_is_unchanged() {
 /// Voxels that changed from tissue to air, and voxels of tissue, compared with the counts of the
 /// report.
 #[test]
-fn counts_of_voxels_are_those_of_the_file() {
+fn voxel_counts_match_the_file() {
     let (run, before, after) = (finished(), ct(), deformed());
     let is_tissue = |volume: &Nifti, n: usize| volume.voxels[n] > -449;
     let count =

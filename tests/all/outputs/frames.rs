@@ -30,7 +30,7 @@ fn frames_and_times_count_up() {
 /// The first row is the body at rest, and the last row is the result. The mean and the middle
 /// opening are not swapped.
 #[test]
-fn openings_are_those_of_the_report() {
+fn openings_match_the_report() {
     let run = finished();
     for wound in 0..2 {
         let [mean, mid] = ["mean", "mid"].map(|what| column(run, &format!("gape_{wound}_{what}_mm")));
@@ -55,7 +55,7 @@ fn openings_are_those_of_the_report() {
 /// Frame count, mean and shortest time in the report equal those of the table, and fit into the
 /// time of the stage.
 #[test]
-fn times_per_frame_are_those_of_the_table() {
+fn the_report_has_the_times_of_the_table() {
     let run = finished();
     let ms = &column(run, "ms")[1..];
     assert_eq!(run.number("/frames/count"), FRAMES as f64);

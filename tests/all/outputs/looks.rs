@@ -40,7 +40,7 @@ fn an_inspection_describes_the_file() {
 /// The skin file of the body has the right frame and position, and as many triangles as the report
 /// says.
 #[test]
-fn the_skin_of_a_file_is_where_the_body_is() {
+fn the_skin_of_a_file_lies_on_the_body() {
     let request = SkinRequest { lattice: LatticeSize::Native, split: Split::Kuhn6, mode: SkinMode::Exterior };
     let (report, bytes) = with_file(&ct(), |path| {
         let out = path.with_file_name("skin.vtu");
@@ -65,7 +65,7 @@ fn the_skin_of_a_file_is_where_the_body_is() {
 
 /// The counts of a plan equal those that the run of the same scene reports.
 #[test]
-fn a_plan_counts_what_the_run_reports() {
+fn a_plan_has_the_counts_of_the_run() {
     let run = finished();
     let scene: cutis::Scene = serde_json::from_value(run.report["scene"].clone()).unwrap();
     let plan = with_file(&ct(), |path| {

@@ -48,7 +48,7 @@ fn points_minus_displacements_are_the_body_at_rest() {
 }
 
 #[test]
-fn displacements_are_those_of_the_handle_and_of_what_is_fixed() {
+fn displacements_follow_the_handle_and_fixed_vertices_stay() {
     let (center, radius) = HANDLE_MM;
     for name in ["skin.vtu", "tissue.vtu"] {
         let (mut dragged, mut still) = (0, 0);
@@ -120,7 +120,7 @@ fn cells_are_oriented_and_fill_the_body() {
 }
 
 #[test]
-fn counts_and_the_largest_displacement_are_those_of_the_report() {
+fn counts_and_the_largest_displacement_match_the_report() {
     let run = finished();
     let [skin, tissue] = ["skin.vtu", "tissue.vtu"].map(|name| mesh(run, name));
     assert_eq!(run.number("/sizes/skin_triangles"), skin.cells.len() as f64);
@@ -136,7 +136,7 @@ fn counts_and_the_largest_displacement_are_those_of_the_report() {
 /// Opening of the first wound in its middle, measured on the points of `skin.vtu`: the skin
 /// vertices next to it on either side, on the anterior face.
 #[test]
-fn the_opening_of_the_wound_is_that_of_the_skin() {
+fn the_reported_opening_matches_the_skin() {
     let run = finished();
     let states = states(&mesh(run, "skin.vtu"));
     let front = states.iter().map(|[rest, _]| rest[1]).fold(f64::MIN, f64::max);

@@ -8,7 +8,7 @@ use super::body::{HANDLE_MM, STEP_MM, finished, run};
 use super::vtu::Vtu;
 
 #[test]
-fn element_counts_are_those_of_the_meshes() {
+fn element_counts_match_the_meshes() {
     let run = finished();
     let mesh = Vtu::of_bytes(&run.files["tissue.vtu"]);
     let edges: BTreeSet<[usize; 2]> = mesh
@@ -46,11 +46,11 @@ fn the_skin_of_the_block_is_whole() {
         assert_eq!(run.number(&format!("/skin/{key}")), 0.0, "{key}");
     }
     assert_eq!((run.number("/skin/components"), run.number("/skin/coverage")), (1.0, 1.0));
-    assert!(run.number("/skin/triangles") > run.number("/sizes/skin_triangles"), "the incisions take skin");
+    assert!(run.number("/skin/triangles") > run.number("/sizes/skin_triangles"), "the incisions remove skin");
 }
 
 #[test]
-fn what_went_in_is_named() {
+fn the_report_names_its_inputs() {
     let run = finished();
     let inputs = run.report["inputs"].as_array().unwrap();
     assert_eq!((inputs.len(), &inputs[0]["path"]), (2, &"body.toml".into()));
@@ -119,7 +119,7 @@ fn residuals_are_ratios_of_the_right_kind() {
 
 /// Nothing moves outside a region, and the vertices there are counted separately.
 #[test]
-fn a_region_counts_what_it_leaves_out() {
+fn the_tissue_outside_a_region_is_counted_separately() {
     let run = run(&[
         ("lattice.region", "{ around_mm = 30.0 }"),
         ("incision", "[{ from_mm = [20, 40, -20], to_mm = [20, 40, 60], depth_mm = 15, width_mm = 8 }]"),

@@ -48,7 +48,7 @@ fn check<T: Scalar>(start: &Start<T>, scale: f64, material: Material, share: f64
 }
 
 #[test]
-fn the_solver_hangs_where_newton_says() {
+fn the_beam_sags_to_the_equilibrium_of_newton() {
     for scale in SCALES {
         check(&cpu::<f64>, scale, SOFT, 0.5).unwrap();
         check(&cpu::<f32>, scale, SOFT, 1.0).unwrap();
@@ -56,7 +56,7 @@ fn the_solver_hangs_where_newton_says() {
 }
 
 #[test]
-fn the_gpu_solver_hangs_where_newton_says() {
+fn the_beam_sags_to_the_equilibrium_of_newton_on_the_gpu() {
     for scale in SCALES {
         on_each_adapter(|start| check(start, scale, SOFT, 1.0));
     }

@@ -73,7 +73,7 @@ fn check<T: Scalar>(k: f64, k_area: f64, scale: f64, tolerance: f64) -> Result<(
 }
 
 #[test]
-fn moduli_are_those_of_the_closed_form() {
+fn moduli_match_the_closed_form() {
     for scale in SCALES {
         for k_area in [0.0, 1.0, 5.0] {
             check::<f64>(K, k_area, scale, 3e-3).unwrap();

@@ -71,7 +71,7 @@ pub fn files_of_other_crates(source: &Source, crates: &[Crate]) -> Vec<Finding> 
             let target = resolve(&source.path, path);
             if owner(&target, crates).is_none_or(|other| other.name != own.name) {
                 let message =
-                    format!("`#[path]` takes `{target}` of another crate: use that crate or the test kit");
+                    format!("`#[path]` uses `{target}` of another crate: use that crate or the test kit");
                 findings.push(Finding::failure(&source.path, index + 1, message));
             }
         }

@@ -78,7 +78,7 @@ fn the_table_of_a_plan_has_the_figures_of_its_json() {
 }
 
 #[test]
-fn inspect_prints_what_its_json_holds() {
+fn inspect_prints_the_values_of_its_json() {
     let desk = Desk::new();
     call(&desk, "phantom --size 20,16,12 --seed 3 --out ct.nii.gz");
     let found = json(call(&desk, "inspect ct.nii.gz --json").stdout.as_bytes());

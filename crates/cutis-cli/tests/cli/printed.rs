@@ -31,7 +31,7 @@ fn the_reference_is_printed_to_the_byte() {
 
 /// `| head` closes the pipe early, which is not an error.
 #[test]
-fn a_closed_pipe_is_no_panic() {
+fn a_closed_pipe_causes_no_panic() {
     let done = Desk::new().script("set -o pipefail; \"$cutis\" scene schema | true");
     assert_eq!(done.code, 0, "{}", done.stderr);
 }

@@ -60,7 +60,7 @@ fn a_zone_over_the_whole_extent_gives_the_even_lattice() {
 }
 
 #[test]
-fn points_in_the_fine_zone_are_those_of_the_even_lattice() {
+fn the_fine_zone_has_the_points_of_the_even_lattice() {
     let lattice = graded(MIDDLE, Split::Kuhn6);
     let planes = lattice.planes().unwrap();
     let mut fine = 0;

@@ -53,7 +53,7 @@ fn reached(mesh: &TetMesh, start: u32, within: impl Fn(Point3<f64>) -> bool) -> 
 }
 
 #[test]
-fn removed_vertices_are_those_in_the_slit() {
+fn a_cut_removes_the_vertices_in_the_slit() {
     for split in [Split::Kuhn6, Split::Five] {
         let (mesh, triangles) = block(2.0, split);
         let cut =

@@ -133,7 +133,7 @@ fn frame_maps_to_the_world_and_back() {
 }
 
 #[test]
-fn density_of_a_tet_is_that_of_its_mean_hu() {
+fn a_tet_has_the_density_of_its_mean_hu() {
     let lattice = lattice([2, 2, 2], [10.0; 3], Split::Kuhn6);
     let hu: Vec<f32> = (0..8).map(|n| 100.0 * n as f32).collect();
     let mesh = build(&lattice, &hu, &[false; 8], true).unwrap();

@@ -45,7 +45,7 @@ fn ball(above_mm: f64) -> (TissueMask, Vec<bool>, Vec<[u32; 3]>, Vec<bool>) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
     #[test]
-    fn tets_with_a_corner_in_the_region_are_those_of_the_whole_body(
+    fn a_region_has_the_tets_of_the_whole_body(
         flags in proptest::collection::vec((proptest::bool::weighted(0.15), proptest::bool::weighted(0.3)), 6 * 5 * 7),
         five in proptest::bool::ANY,
         largest in proptest::bool::ANY,

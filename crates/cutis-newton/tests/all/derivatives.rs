@@ -10,7 +10,7 @@ use crate::SCALES;
 use crate::blocks::{shaken, skinned};
 
 #[test]
-fn derivatives_of_all_kinds_are_those_of_the_energy() {
+fn derivatives_of_all_kinds_match_the_energy() {
     for scale in SCALES {
         let problem = Problem::of(&skinned([4, 3, 5], scale), [0.0, 0.1, -0.2]).unwrap();
         let x = shaken(problem.positions(), 0.1 * scale, |_| false);

@@ -45,7 +45,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
-    fn any_range_of_slices_equals_that_of_the_whole_volume(seed in 0_u64..4, cuts in proptest::collection::vec(0_usize..=13, 0..5)) {
+    fn any_range_of_slices_equals_the_slices_of_the_whole_volume(seed in 0_u64..4, cuts in proptest::collection::vec(0_usize..=13, 0..5)) {
         let phantom = Phantom::new([24, 30, 13], seed).expect("a small phantom");
         let whole = phantom.volume().expect("a small phantom");
         let mut ends = cuts;

@@ -1,4 +1,4 @@
-//! A build without the feature `gpu`: a scene that names a GPU is refused, and `auto` takes the CPU
+//! A build without the feature `gpu`: a scene that names a GPU is refused, and `auto` uses the CPU
 //! and says why.
 
 use cutis_render::{Image, RenderError, View};
@@ -44,7 +44,7 @@ pub(super) fn devices() -> Devices {
         gpu_backend: false,
         devices: Vec::new(),
         auto: None,
-        note: "this build has no GPU backend (feature `gpu`): \"auto\" takes the CPU backend".into(),
+        note: "this build has no GPU backend (feature `gpu`): \"auto\" uses the CPU backend".into(),
     }
 }
 

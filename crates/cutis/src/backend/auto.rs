@@ -1,4 +1,4 @@
-//! Decides when `auto` takes a GPU: first by the amount of work, then by the adapters of the
+//! Decides when `auto` selects a GPU: first by the amount of work, then by the adapters of the
 //! machine.
 
 use cutis_gpu::{Adapter, AdapterKind, GpuError, Select};
@@ -7,7 +7,7 @@ use cutis_solver::Vertex;
 use super::Work;
 
 /// Mean number of constraints of a color (of vertices in vertex block descent) above which `auto`
-/// takes a GPU with memory of its own.
+/// selects a GPU with memory of its own.
 ///
 /// A color is one dispatch, and colors run one after the other. The launch of a dispatch and the
 /// barrier before it take about 10 µs on a GPU. The CPU backend projects about 40 constraints per
@@ -18,9 +18,9 @@ use super::Work;
 /// this is an estimate: no hardware GPU was available to measure it.
 const MIN_PER_SWEEP: u64 = 16_384;
 
-/// Number of constraint evaluations of a run above which `auto` takes a GPU: one or two seconds on
-/// the CPU backend with two cores. A GPU takes part of a second to open, to compile kernels and to
-/// upload the body, and a shorter run does not save that much time. This is an estimate too.
+/// Number of constraint evaluations of a run above which `auto` selects a GPU: one or two seconds
+/// on the CPU backend with two cores. A GPU takes part of a second to open, to compile kernels and
+/// to upload the body, and a shorter run does not save that much time. This is an estimate too.
 const MIN_EVALUATIONS: u64 = 100_000_000;
 
 /// Factor on [`MIN_PER_SWEEP`] for a GPU that shares the memory of the CPU. Memory limits
@@ -74,7 +74,7 @@ pub(super) fn weigh(
     Ok(Verdict::Cpu(first_objection.unwrap_or_else(|| "there is no GPU adapter".into())))
 }
 
-/// Why `auto` never takes this adapter; none if it may take it.
+/// Why `auto` never selects this adapter; none if it may.
 pub(super) fn objection(adapter: &Adapter) -> Option<String> {
     if let Some(lacking) = &adapter.lacking {
         return Some(format!("{} cannot be opened: {lacking}", adapter.name));
@@ -90,7 +90,7 @@ pub(super) fn objection(adapter: &Adapter) -> Option<String> {
     }
 }
 
-/// Why `auto` does not take an adapter for this amount of work.
+/// Why `auto` does not select an adapter for this amount of work.
 fn too_small_for(adapter: &Adapter, work: &Work, per_sweep: u64) -> Option<String> {
     let pays_from = MIN_PER_SWEEP * SHARED_MEMORY_FACTOR;
     if adapter.kind == AdapterKind::Integrated && per_sweep < pays_from {
@@ -149,7 +149,7 @@ mod tests {
         }
     }
 
-    /// The index of the adapter that `auto` takes, or the reason for the CPU.
+    /// The index of the adapter that `auto` selects, or the reason for the CPU.
     fn verdict(work: Work, asked: Option<&str>, all: &[Adapter]) -> Result<usize, String> {
         match weigh(&work, asked, || all.to_vec()).unwrap() {
             Verdict::Gpu(adapter, _) => Ok(adapter.index),
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_takes_the_first_hardware_adapter_that_a_large_scene_can_fill() {
+    fn auto_selects_the_first_hardware_adapter_that_a_large_scene_can_fill() {
         use AdapterKind::*;
         let card = adapter(0, "Card", Discrete);
         let chip = adapter(1, "Chip", Integrated);
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_never_takes_a_software_or_an_unknown_adapter() {
+    fn auto_never_selects_a_software_or_an_unknown_adapter() {
         let software = adapter(1, "llvmpipe", AdapterKind::Software);
         let unknown = adapter(0, "mystery", AdapterKind::Unknown);
         for (all, asked, word) in [
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_passes_by_what_cannot_hold_the_vertices() {
+    fn auto_skips_adapters_that_cannot_hold_the_vertices() {
         let card = adapter(0, "Card", AdapterKind::Discrete);
         let most = card.limits.max_binding_bytes / 16;
         assert_eq!(verdict(Work { vertices: most, ..LARGE }, None, std::slice::from_ref(&card)), Ok(0));

@@ -1,5 +1,5 @@
 //! `cutis devices`: the GPUs of this machine, whether they can be used, and the one that `auto`
-//! takes.
+//! selects.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,8 +13,8 @@ pub struct Devices {
     pub gpu_backend: bool,
     /// Best hardware first, software last.
     pub devices: Vec<Device>,
-    /// Index of the GPU that `backend = "auto"` takes for a large scene; none if it takes the CPU
-    /// backend.
+    /// Index of the GPU that `backend = "auto"` selects for a large scene; none if it selects the
+    /// CPU backend.
     pub auto: Option<usize>,
     /// The choice of `auto` with its reason, or the software to install.
     pub note: String,

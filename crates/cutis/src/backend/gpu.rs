@@ -43,7 +43,7 @@ pub(super) fn opened(gpu: &Gpu) -> Chosen {
     chosen(gpu.adapter(), Device::Opened(gpu.clone()), "the caller opened it")
 }
 
-/// The backend that `auto` takes.
+/// The backend that `auto` selects.
 pub(super) fn auto(file: SceneFile<'_>, solver: &SolverSection, work: &Work) -> Result<Chosen, Error> {
     let verdict = auto::weigh(work, solver.adapter.as_deref(), adapters);
     Ok(match verdict.map_err(|e| refused(file, e))? {
@@ -58,30 +58,31 @@ pub(super) fn auto(file: SceneFile<'_>, solver: &SolverSection, work: &Work) -> 
 pub(super) fn devices() -> Devices {
     let all = adapters();
     let devices: Vec<Listed> = all.iter().map(listed).collect();
-    let (auto, note) = taken_by_auto(&all, &devices);
+    let (auto, note) = selected_by_auto(&all, &devices);
     Devices { gpu_backend: true, auto, note, devices }
 }
 
-/// Index of the adapter that `auto` takes for a large scene, if it can be opened, and a note about
-/// it.
-fn taken_by_auto(all: &[Adapter], listed: &[Listed]) -> (Option<usize>, String) {
+/// Index of the adapter that `auto` selects for a large scene, if it can be opened, and a note
+/// about it.
+fn selected_by_auto(all: &[Adapter], listed: &[Listed]) -> (Option<usize>, String) {
     let Some(first) = all.first() else {
-        return (None, format!("\"auto\" takes the CPU backend: {}", GpuError::NoAdapter));
+        return (None, format!("\"auto\" uses the CPU backend: {}", GpuError::NoAdapter));
     };
     let Some((adapter, device)) =
         all.iter().zip(listed).find(|(adapter, _)| auto::objection(adapter).is_none())
     else {
         let why = auto::objection(first).unwrap_or_default();
-        return (None, format!("\"auto\" takes the CPU backend: {why}"));
+        return (None, format!("\"auto\" uses the CPU backend: {why}"));
     };
     match &device.why {
-        None => {
-            (Some(adapter.index), format!("\"auto\" takes {} for a scene that is large enough", adapter.name))
-        }
+        None => (
+            Some(adapter.index),
+            format!("\"auto\" selects {} for a scene that is large enough", adapter.name),
+        ),
         Some(why) => {
             let note = format!(
-                "\"auto\" takes {} for a scene that is large enough, and fails: {why}; name another with --adapter, or \
-                 use \"cpu\"",
+                "\"auto\" selects {} for a scene that is large enough, and fails: {why}; name another \
+                 with --adapter, or use \"cpu\"",
                 adapter.name
             );
             (None, note)

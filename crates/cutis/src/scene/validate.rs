@@ -202,7 +202,7 @@ impl Scene {
         let relaxed = s.relaxation == 1.0 || (s.relaxation > lowest && s.relaxation < highest);
         let why = "must be above 0 and below 2 with solver.formulation = \"vbd\", and 1 otherwise";
         check.require(relaxed, "solver.relaxation", s.relaxation, why)?;
-        let why = "must be at most 1024; 0 takes all cores";
+        let why = "must be at most 1024; 0 uses all cores";
         check.require(s.threads <= 1024, "solver.threads", s.threads, why)?;
         check.point("solver.gravity_m_s2", s.gravity_m_s2)?;
         check.not_negative("solver.damping_per_s", s.damping_per_s)

@@ -189,7 +189,7 @@ frames = 3
     }
 
     #[test]
-    fn a_place_or_a_scene_that_will_not_do_is_refused_before_the_work() {
+    fn unsuitable_places_and_scenes_are_refused_before_the_work() {
         let folder = tempfile::tempdir().unwrap();
         let to = |path: &str, loaded: &LoadedScene| {
             let copy = SceneCopy::to(&folder.path().join(path), path.is_empty(), loaded).map(drop);
@@ -210,7 +210,7 @@ frames = 3
     }
 
     #[test]
-    fn only_what_differs_is_changed() {
+    fn only_differing_keys_are_changed() {
         let mut loaded = loaded(TEXT, &[]);
         loaded.scene.solver.substeps = 7;
         let scene = loaded.scene.clone();
@@ -225,7 +225,7 @@ frames = 3
     }
 
     #[test]
-    fn overrides_and_what_is_left_out_are_part_of_it() {
+    fn a_copy_has_overrides_and_omissions() {
         let set = [
             ("incision.0.depth_mm", "25.0"),
             ("incision.0.to_mm.1", "111.0"),

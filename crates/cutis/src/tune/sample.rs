@@ -178,7 +178,7 @@ mod tests {
 
     /// Outside the surface of a coarse lattice, a point up to half a cell away moves with it.
     #[test]
-    fn what_lies_within_half_of_a_coarse_cell_is_found() {
+    fn points_within_half_a_coarse_cell_are_found() {
         let zone =
             "grading = { min_mm = [20, 80, -20], max_mm = [50, 110, 20], growth = 2.0, coarsest = 8.0 }";
         let body = body(&format!("spacing_mm = 6.0, {zone}"));

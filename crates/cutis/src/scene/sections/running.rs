@@ -30,7 +30,7 @@ pub struct SolverSection {
     /// Over-relaxation of `vbd`, above 0 and below 2; 1 with the other formulations. About 1.3
     /// helps with several iterations.
     pub relaxation: f64,
-    /// Worker threads; 0 takes all cores. The result does not depend on their number.
+    /// Worker threads; 0 uses all cores. The result does not depend on their number.
     pub threads: usize,
 }
 
