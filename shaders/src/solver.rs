@@ -45,6 +45,24 @@ pub enum Multiplier {
     Next,
 }
 
+/// Constant forces on the vertices, at binding 6 of group 0 if they are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loads {
+    /// No forces.
+    None,
+    /// One vector per vertex, in N.
+    Each,
+}
+
+impl Loads {
+    fn source(self) -> &'static str {
+        match self {
+            Self::None => include_str!("../wgsl/solver/load_none.wgsl"),
+            Self::Each => include_str!("../wgsl/solver/load_each.wgsl"),
+        }
+    }
+}
+
 /// Name of the entry point of [`project`].
 pub const PROJECT: &str = "project";
 /// Name of the entry point of [`vertex_force`].
@@ -96,8 +114,8 @@ pub fn vertex_force(arity: usize, constraint: &str) -> String {
 }
 
 /// Returns the source that moves the vertices of a chunk of one color.
-pub fn descend() -> String {
-    link(&[FINITE, include_str!("../wgsl/solver/descend.wgsl")])
+pub fn descend(loads: Loads) -> String {
+    link(&[FINITE, loads.source(), include_str!("../wgsl/solver/descend.wgsl")])
 }
 
 /// Returns the source that computes, per workgroup, the sum of squares and the largest value over
@@ -113,8 +131,8 @@ pub fn evaluate(arity: usize, constraint: &str) -> String {
 
 /// Returns the source of the passes over vertices, with the entry points `predict`, `predict_next`,
 /// `finish_and_predict`, `finish`, `check`, `restore`.
-pub fn vertices() -> String {
-    link(&[SETTINGS, FINITE, include_str!("../wgsl/solver/vertices.wgsl")])
+pub fn vertices(loads: Loads) -> String {
+    link(&[SETTINGS, FINITE, loads.source(), include_str!("../wgsl/solver/vertices.wgsl")])
 }
 
 /// Returns the source that moves kinematic vertices along their paths.

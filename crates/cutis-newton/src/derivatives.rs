@@ -28,7 +28,7 @@ impl Problem {
     /// A wrong length, a position that is not finite, or a lack of memory.
     pub fn check_derivatives(&self, x: &[Point3<f64>], samples: usize) -> Result<Derivatives, NewtonError> {
         self.check("x", x)?;
-        let objective = Objective { problem: self, outer: Outer::Gravity(self.gravity) };
+        let objective = Objective { problem: self, outer: Outer::Weight };
         let state = objective.at(self.local(x));
         let pattern = self.pattern()?;
         let mut factors = pattern.factors()?;

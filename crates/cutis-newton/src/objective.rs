@@ -1,5 +1,5 @@
-//! The objective of a minimization: the elastic energy plus either gravity or the inertia of an
-//! implicit step.
+//! The objective of a minimization: the elastic energy plus either gravity and loads or the inertia
+//! of an implicit step.
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,9 +8,9 @@ use crate::field::Field;
 
 /// The term that is added to the elastic energy.
 pub(crate) enum Outer {
-    /// `−m g·x` with the gravity `g` in m/s²: static equilibrium.
-    Gravity(Vector3<f64>),
-    /// `m/(2h²)|x − x̃|²`: an implicit step.
+    /// `−(m g + load)·x`: static equilibrium under gravity and loads.
+    Weight,
+    /// `m/(2h²)|x − x̃|²`: an implicit step. Gravity and loads are part of `x̃`.
     Inertia {
         /// `x̃` of each vertex, in the problem's local coordinates.
         predicted: Vec<Point3<f64>>,
@@ -49,7 +49,7 @@ impl Objective<'_> {
     /// diagonal of the Hessian.
     pub fn inertia(&self, mass: f64) -> f64 {
         match self.outer {
-            Outer::Gravity(_) => 0.0,
+            Outer::Weight => 0.0,
             Outer::Inertia { inverse_h_squared, .. } => mass * inverse_h_squared,
         }
     }
@@ -59,7 +59,7 @@ impl Objective<'_> {
     fn outer_gradient(&self, v: usize, x: &Point3<f64>) -> (Vector3<f64>, f64) {
         let mass = self.problem.masses()[v];
         match &self.outer {
-            Outer::Gravity(gravity) => (gravity * -mass, 0.0),
+            Outer::Weight => (-self.problem.weight(v), 0.0),
             Outer::Inertia { predicted, inverse_h_squared } => {
                 let stiffness = mass * inverse_h_squared;
                 ((x - predicted[v]) * stiffness, stiffness * x.coords.norm())
@@ -98,7 +98,7 @@ impl Objective<'_> {
             let v = v as usize;
             let (mass, step) = (self.problem.masses()[v], to.x[v] - from.x[v]);
             sum += match &self.outer {
-                Outer::Gravity(gravity) => -mass * gravity.dot(&step),
+                Outer::Weight => -self.problem.weight(v).dot(&step),
                 Outer::Inertia { predicted, inverse_h_squared } => {
                     let middle = (to.x[v] - predicted[v]) + (from.x[v] - predicted[v]);
                     0.5 * mass * inverse_h_squared * step.dot(&middle)

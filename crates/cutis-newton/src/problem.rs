@@ -13,8 +13,8 @@ use crate::objective::{Objective, Outer};
 use crate::pattern::Pattern;
 use crate::{Minimum, NewtonError, Options};
 
-/// The energies of a system in double precision: the constraints as `½C²/α`, the masses and
-/// gravity.
+/// The energies of a system in double precision: the constraints as `½C²/α`, the masses, gravity
+/// and loads.
 ///
 /// All positions in arguments and results are in meters, in the caller's coordinates, one per
 /// vertex of the system. Vertices with inverse mass 0 are fixed. The others are free.
@@ -25,7 +25,9 @@ pub struct Problem {
     origin: Vector3<f64>,
     positions: Vec<Point3<f64>>,
     masses: Vec<f64>,
-    pub(crate) gravity: Vector3<f64>,
+    gravity: Vector3<f64>,
+    /// Constant forces in N, one per vertex; empty if there are none.
+    loads: Vec<Vector3<f64>>,
     pattern: OnceLock<Result<Pattern, NewtonError>>,
 }
 
@@ -58,6 +60,7 @@ impl Problem {
             positions: system.positions(),
             masses,
             gravity: Vector3::from(gravity_m_s2),
+            loads: system.loads().to_vec(),
             pattern: OnceLock::new(),
         })
     }
@@ -86,12 +89,21 @@ impl Problem {
         self.free.len()
     }
 
-    /// Returns `Σ ½C²/α − Σ m g·x` in J. The second sum is over the free vertices.
+    /// Returns the weight `m g` of a free vertex plus its load, in N.
+    pub(crate) fn weight(&self, vertex: usize) -> Vector3<f64> {
+        self.gravity * self.masses[vertex] + self.load(vertex)
+    }
+
+    fn load(&self, vertex: usize) -> Vector3<f64> {
+        self.loads.get(vertex).copied().unwrap_or_else(Vector3::zeros)
+    }
+
+    /// Returns `Σ ½C²/α − Σ (m g + load)·x` in J. The second sum is over the free vertices.
     ///
     /// # Panics
     /// If `x` does not have one position per vertex.
     pub fn energy(&self, x: &[Point3<f64>]) -> f64 {
-        let weight = |&v: &u32| self.masses[v as usize] * self.gravity.dot(&x[v as usize].coords);
+        let weight = |&v: &u32| self.weight(v as usize).dot(&x[v as usize].coords);
         self.elastic.energy(&self.local(x)) - self.free.iter().map(weight).sum::<f64>()
     }
 
@@ -104,7 +116,7 @@ impl Problem {
         self.elastic.at(&self.local(x)).gradient.into_iter().map(|gradient| -gradient).collect()
     }
 
-    /// Returns `x̃ = x + h·v + h²·g` of the free vertices, for a step of `h` seconds from the
+    /// Returns `x̃ = x + h·v + h²·(g + load/m)` of the free vertices, for a step of `h` seconds from the
     /// positions `x` with the velocities `v` (m/s). Fixed vertices stay at `x`.
     ///
     /// # Panics
@@ -114,13 +126,13 @@ impl Problem {
         let mut predicted = x.to_vec();
         for &vertex in &self.free {
             let vertex = vertex as usize;
-            predicted[vertex] += (v[vertex] + self.gravity * h) * h;
+            predicted[vertex] += (v[vertex] + self.gravity * h + self.load(vertex) * (h / self.masses[vertex])) * h;
         }
         predicted
     }
 
     /// Returns an implicit Euler step of `h` seconds: the minimizer of
-    /// `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`, found from `start`. Gravity is part of `x̃`, see
+    /// `Σ m/(2h²)|x − x̃|² + Σ ½C²/α`, found from `start`. Gravity and loads are part of `x̃`, see
     /// [`predicted`](Self::predicted). Fixed vertices stay at `start`.
     ///
     /// # Errors
@@ -144,7 +156,7 @@ impl Problem {
         self.minimum(start, outer, options)
     }
 
-    /// Returns the static equilibrium under gravity: a minimum of [`energy`](Self::energy), found
+    /// Returns the static equilibrium under gravity and loads: a minimum of [`energy`](Self::energy), found
     /// from `start`. Fixed vertices stay at `start`.
     ///
     /// # Errors
@@ -153,7 +165,7 @@ impl Problem {
     pub fn equilibrium(&self, start: &[Point3<f64>], options: &Options) -> Result<Minimum, NewtonError> {
         self.check("start", start)?;
         floating::refuse(self, &self.local(start))?;
-        self.minimum(start, Outer::Gravity(self.gravity), options)
+        self.minimum(start, Outer::Weight, options)
     }
 
     fn minimum(

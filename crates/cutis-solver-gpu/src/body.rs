@@ -2,7 +2,7 @@
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
-use cutis_solver::{Formulation, Simulation, Step};
+use cutis_solver::{Formulation, Simulation, Step, System};
 use nalgebra::Vector3;
 
 /// A binding must start at a multiple of 256 bytes, which is 16 elements of 16 bytes.
@@ -18,6 +18,8 @@ pub(crate) struct DeviceBody {
     /// Positions at the start of the substep.
     pub(crate) previous: Buffer<[f32; 4]>,
     pub(crate) velocities: Buffer<[f32; 4]>,
+    /// Constant forces in N, if the body has any.
+    pub(crate) loads: Option<Buffer<[f32; 4]>>,
     pub(crate) settings: Buffer<[f32; 8]>,
     /// Three numbers: the first vertex that is not finite, the number of finite substeps, and 1
     /// once a substep has started after one that was not finite.
@@ -66,6 +68,10 @@ impl DeviceBody {
         let vertices = gpu.buffer::<[f32; 4]>("vertices", bytemuck::cast_slice(system.vertices()))?;
         let previous = gpu.zeroed::<[f32; 4]>("previous positions", count)?;
         let velocities = gpu.buffer("velocities", &padded(system.velocities()))?;
+        let loads = match system.loads() {
+            [] => None,
+            loads => Some(gpu.buffer("loads", &padded(loads))?),
+        };
         let settings = gpu.uniform("settings of a substep", &settings_of(simulation))?;
         let status = gpu.buffer("status", &[NONE, 0, 0])?;
 
@@ -75,7 +81,7 @@ impl DeviceBody {
             let first = gpu.uniform("first vertex of a part", &u32::try_from(start).unwrap_or(u32::MAX))?;
             parts.push((start..count.min(start + part), first));
         }
-        let source = solver::vertices();
+        let source = solver::vertices(loads_of(system));
         // Each entry point binds only what it uses.
         let pass = |entry: &str, used: &[u32]| -> Result<VertexKernel, GpuError> {
             let kernel = gpu.kernel(&format!("vertices: {entry}"), &source, entry)?;
@@ -89,7 +95,10 @@ impl DeviceBody {
                     4 => (n, first.whole()),
                     _ => (n, status.whole()),
                 };
-                let bindings: Vec<_> = used.iter().map(binding).collect();
+                let mut bindings: Vec<_> = used.iter().map(binding).collect();
+                if let Some(loads) = loads.as_ref().filter(|_| entry.contains("predict")) {
+                    bindings.push((6, loads.range(range.clone())));
+                }
                 groups.push((gpu.bind(&kernel, 0, &bindings)?, range.len()));
             }
             Ok(VertexKernel { kernel, parts: groups })
@@ -105,6 +114,7 @@ impl DeviceBody {
             vertices,
             previous,
             velocities,
+            loads,
             settings,
             status,
         })
@@ -148,7 +158,12 @@ fn settings_of(simulation: &Simulation<f32>) -> [f32; 8] {
         Some(Step::Pbd) | None => 0.0,
     };
     let g = numbers.gravity_h;
-    [g.x, g.y, g.z, numbers.h, numbers.velocity_factor, inverse_h_squared, 0.0, 0.0]
+    [g.x, g.y, g.z, numbers.h, numbers.velocity_factor, inverse_h_squared, numbers.load_h, 0.0]
+}
+
+/// Returns whether the shaders of `system` read loads.
+pub(crate) fn loads_of(system: &System<f32>) -> solver::Loads {
+    if system.loads().is_empty() { solver::Loads::None } else { solver::Loads::Each }
 }
 
 fn padded(vectors: &[Vector3<f32>]) -> Vec<[f32; 4]> {

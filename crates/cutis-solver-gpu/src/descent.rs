@@ -13,7 +13,7 @@ use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;
 use cutis_solver::{ColorPass, ConstraintSet, Descent, DescentStep, Kind, Simulation};
 
-use crate::body::DeviceBody;
+use crate::body::{DeviceBody, loads_of};
 
 /// The struct `VertexForce` of the shaders: force, diagonal and mixed entries, four numbers each.
 pub(crate) type PackedVertexForce = [f32; 12];
@@ -58,20 +58,21 @@ impl DescentKernels {
         descent: &Descent<f32>,
     ) -> Result<Self, GpuError> {
         let kinds = simulation.system().kinds();
-        let source = solver::descend();
+        let source = solver::descend(loads_of(simulation.system()));
         let descend = gpu.kernel("vertices: descend", &source, solver::DESCEND)?;
         let most = gpu.chunk_len(size_of::<PackedVertexForce>());
         let groups = descent.groups();
         let largest = groups.iter().map(<[u32]>::len).max().unwrap_or(0).min(most);
         let scratch = gpu.zeroed::<PackedVertexForce>("vertex forces", largest)?;
         let settings = gpu.uniform("settings of a descent", &settings_of(descent.step()))?;
-        let bindings = [
+        let mut bindings = vec![
             (0, body.vertices.whole()),
             (1, scratch.whole()),
             (2, body.previous.whole()),
             (3, body.velocities.whole()),
             (4, settings.whole()),
         ];
+        bindings.extend(body.loads.as_ref().map(|loads| (6, loads.whole())));
         let state = gpu.bind(&descend, 0, &bindings)?;
         let mut forces = Vec::with_capacity(kinds.len());
         for set in kinds {

@@ -12,6 +12,9 @@ pub fn device_bytes(system: &System<f32>, settings: &Settings) -> Vec<MemoryPart
     let vertices = system.vertices().len();
     // Position, position at the start of the substep, and velocity have four numbers each.
     let mut parts = vec![MemoryPart { name: "vertices", bytes: vertices * 3 * size_of::<[f32; 4]>() }];
+    if !system.loads().is_empty() {
+        parts.push(MemoryPart { name: "loads", bytes: vertices * size_of::<[f32; 4]>() });
+    }
     let descends = settings.formulation == Formulation::Vbd;
     for kind in system.kinds() {
         if descends {

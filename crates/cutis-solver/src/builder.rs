@@ -90,6 +90,7 @@ impl<T: Scalar> SystemBuilder<T> {
             vertices,
             previous,
             velocities,
+            loads: Vec::new(),
             kinds: Vec::new(),
             handles: Vec::new(),
             vertex_groups: None,
@@ -108,6 +109,16 @@ impl<T: Scalar> SystemBuilder<T> {
         }
         check_finite("velocity", velocities.iter())?;
         self.system.velocities.copy_from_slice(velocities);
+        Ok(self)
+    }
+
+    /// Sets constant forces on the vertices in N, as [`System::set_loads`] does. Without this call
+    /// there are none.
+    ///
+    /// # Errors
+    /// Returns an error for a wrong length or a load that is not finite.
+    pub fn loads(mut self, loads: &[Vector3<T>]) -> Result<Self, SolverError> {
+        self.system.set_loads(loads)?;
         Ok(self)
     }
 

@@ -4,6 +4,7 @@
 use cutis_constraints::Scalar;
 
 use crate::batch::{ConstraintChunk, VertexChunk};
+use crate::loads::load_of;
 use crate::{ColorPass, ConstraintSet, Descent, Step, System, Vertex, VertexForce};
 
 /// One color of one kind of constraint, with everything that its projection needs.
@@ -43,7 +44,7 @@ impl<T: Scalar> VertexColor<'_, T> {
     /// Moves the vertices one after the other, in ascending order.
     pub fn descend(self) {
         let Self { system, descent, pass } = self;
-        let System { vertices, previous, velocities, kinds, .. } = system;
+        let System { vertices, previous, velocities, loads, kinds, .. } = system;
         for indices in descent.groups().order[pass.start..pass.end].chunks(1) {
             let mut forces = [VertexForce::none()];
             for (kind, incidence) in kinds.iter().zip(descent.incidences()) {
@@ -55,7 +56,8 @@ impl<T: Scalar> VertexColor<'_, T> {
                 });
             }
             let i = indices[0] as usize;
-            vertices[i] = descent.step().moved(vertices[i], &previous[i], &velocities[i], &forces[0]);
+            let load = load_of(loads, i);
+            vertices[i] = descent.step().moved(vertices[i], &previous[i], &velocities[i], &forces[0], load);
         }
     }
 }

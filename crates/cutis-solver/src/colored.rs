@@ -23,6 +23,7 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::batch::{ConstraintChunk, Load, Store, VertexChunk};
+use crate::loads::load_of;
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
 
 /// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so
@@ -124,6 +125,7 @@ pub struct ColoredVertices<'a, T: Scalar> {
     next: AtomicUsize,
     previous: &'a [Point3<T>],
     velocities: &'a [Vector3<T>],
+    loads: &'a [Vector3<T>],
     vertices: *mut Vertex<T>,
     borrow: PhantomData<&'a mut [T]>,
 }
@@ -135,7 +137,7 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
     /// Prepares a color for several threads.
     pub fn new(color: VertexColor<'a, T>) -> Self {
         let VertexColor { system, descent, pass } = color;
-        let System { vertices, previous, velocities, kinds, .. } = system;
+        let System { vertices, previous, velocities, loads, kinds, .. } = system;
         Self {
             kinds,
             descent,
@@ -143,6 +145,7 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
             next: AtomicUsize::new(0),
             previous,
             velocities,
+            loads,
             vertices: vertices.as_mut_ptr(),
             borrow: PhantomData,
         }
@@ -162,8 +165,8 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
         for (&index, force) in indices.iter().zip(forces) {
             let i = index as usize;
             let (previous, velocity) = (&self.previous[i], &self.velocities[i]);
-            let moved = self.descent.step().moved(vertices.load(index), previous, velocity, force);
-            vertices.store(index, moved);
+            let (vertex, load) = (vertices.load(index), load_of(self.loads, i));
+            vertices.store(index, self.descent.step().moved(vertex, previous, velocity, force, load));
         }
         true
     }

@@ -110,11 +110,12 @@ impl<T: Scalar> DescentStep<T> {
         previous: &Point3<T>,
         velocity: &Vector3<T>,
         force: &VertexForce<T>,
+        load: Vector3<T>,
     ) -> Vertex<T> {
         let x = vertex.position();
         let inertia = self.inverse_h_squared / vertex.inverse_mass();
         let target = previous + velocity * self.h + self.gravity_h_squared;
-        let f = force.force + (target - x) * inertia;
+        let f = (force.force + load) + (target - x) * inertia;
         let d = force.diagonal;
         let noise = T::constant(4.0) * T::simd_default_epsilon();
         let least = ((d.x + d.y + d.z) * noise).simd_max(inertia);
@@ -152,19 +153,25 @@ impl<T: Scalar> Descent<T> {
     /// else with greedy ones.
     ///
     /// # Errors
-    /// Returns [`SolverError::Stiffness`] for a compliance of zero, and [`SolverError::Groups`] if
-    /// two vertices of a group share a constraint.
+    /// Returns [`SolverError::Formulation`] for a PBD stiffness, [`SolverError::Stiffness`] for a
+    /// compliance of zero, and [`SolverError::Groups`] if two vertices of a group share a
+    /// constraint.
     pub fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
+        let incidences = Self::incidences_of(system)?;
+        let groups = groups_of(system, &tuples_of(system.kinds()), &incidences)?;
+        Ok(Self { groups, incidences, step: DescentStep::new(settings) })
+    }
+
+    /// Returns the constraints at each vertex, for each kind, if the forces of all kinds are
+    /// defined.
+    pub(crate) fn incidences_of(system: &System<T>) -> Result<Vec<Incidence>, SolverError> {
         for kind in system.kinds() {
             check_compliances(kind)?;
         }
-        let tuples = tuples_of(system.kinds());
         let count = system.vertices().len();
-        let incidences =
-            tuples.iter().map(|&kind| Incidence::new(kind, count)).collect::<Result<Vec<_>, _>>();
-        let incidences = incidences.map_err(groups_error)?;
-        let groups = groups_of(system, &tuples, &incidences)?;
-        Ok(Self { groups, incidences, step: DescentStep::new(settings) })
+        let tuples = tuples_of(system.kinds());
+        let incidences = tuples.iter().map(|&kind| Incidence::new(kind, count)).collect::<Result<_, _>>();
+        incidences.map_err(groups_error)
     }
 
     /// Returns the moving vertices by color. Two vertices of one color never share a constraint.
@@ -215,6 +222,10 @@ fn tuples_of<T: Scalar>(kinds: &[Kind<T>]) -> Vec<Tuples<'_>> {
 
 fn check_compliances<T: Scalar>(kind: &Kind<T>) -> Result<(), SolverError> {
     use crate::Values;
+    let (found, expected) = (kind.stiffness().formulation(), Formulation::Vbd);
+    if !accepts(found, expected) {
+        return Err(SolverError::Formulation { kind: kind.name(), found, expected });
+    }
     let values = kind.stiffness().values();
     let bad = |value: &T| !(*value > T::zero() && (T::one() / *value).is_finite());
     let found = match values {

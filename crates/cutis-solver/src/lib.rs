@@ -56,6 +56,7 @@ mod descent;
 mod error;
 mod handle;
 mod kernel;
+mod loads;
 mod measures;
 mod passes;
 mod reference;

@@ -36,12 +36,14 @@ pub struct Energy {
     pub elastic_j: Option<f64>,
     /// Potential energy `−Σ m g·x` of gravity, zero at the origin of the caller's coordinates.
     pub gravity_j: f64,
+    /// Potential energy `−Σ load·x` of the loads, zero at the origin of the caller's coordinates.
+    pub load_j: f64,
 }
 
 impl Energy {
     /// Returns the sum of the parts that are defined.
     pub fn total_j(&self) -> f64 {
-        self.kinetic_j + self.elastic_j.unwrap_or(0.0) + self.gravity_j
+        self.kinetic_j + self.elastic_j.unwrap_or(0.0) + self.gravity_j + self.load_j
     }
 }
 
@@ -59,7 +61,7 @@ pub struct Momentum {
 /// Memory of one part of a solver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryPart {
-    /// Name of the part: `vertices`, `handles`, or a kind of constraint.
+    /// Name of the part: `vertices`, `loads`, `handles`, or a kind of constraint.
     pub name: &'static str,
     /// Size in bytes.
     pub bytes: usize,

@@ -3,9 +3,10 @@
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
+use crate::loads::load_of;
 use crate::{Formulation, Settings, Vertex};
 
-/// A range of vertices, as slices of the three vertex arrays.
+/// A range of vertices, as slices of the vertex arrays.
 pub struct VertexBlock<'a, T: Scalar> {
     /// Positions and inverse masses.
     pub vertices: &'a mut [Vertex<T>],
@@ -14,6 +15,8 @@ pub struct VertexBlock<'a, T: Scalar> {
     /// Velocities in m/s. They are up to date between calls of `step`, but not between the substeps
     /// of one call.
     pub velocities: &'a mut [Vector3<T>],
+    /// Constant forces in N; empty if there are none.
+    pub loads: &'a [Vector3<T>],
 }
 
 impl<'a, T: Scalar> VertexBlock<'a, T> {
@@ -35,15 +38,21 @@ impl<'a, T: Scalar> VertexBlock<'a, T> {
         let (vertices, later_vertices) = self.vertices.split_at_mut(middle);
         let (previous, later_previous) = self.previous.split_at_mut(middle);
         let (velocities, later_velocities) = self.velocities.split_at_mut(middle);
-        let later = Self { vertices: later_vertices, previous: later_previous, velocities: later_velocities };
-        (Self { vertices, previous, velocities }, later)
+        let (loads, later_loads) = self.loads.split_at(middle.min(self.loads.len()));
+        let later = Self {
+            vertices: later_vertices,
+            previous: later_previous,
+            velocities: later_velocities,
+            loads: later_loads,
+        };
+        (Self { vertices, previous, velocities, loads }, later)
     }
 }
 
 /// A pass over all vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VertexPass {
-    /// Sets `v += h·g`, `p = x`, `x += h·v`, with the stored velocities.
+    /// Sets `v += h·(g + load/m)`, `p = x`, `x += h·v`, with the stored velocities.
     Predict,
     /// Combines [`Finish`](Self::Finish) and [`Predict`](Self::Predict) without storing `v`.
     FinishAndPredict,
@@ -64,6 +73,8 @@ pub struct Integrator<T> {
     /// energy of the step, see
     /// [`DescentStep::gravity_h_squared`](crate::DescentStep::gravity_h_squared).
     pub gravity_h: Vector3<T>,
+    /// `h`, or zero for vertex block descent, which includes the loads in the forces on a vertex.
+    pub load_h: T,
 }
 
 impl<T: Scalar> Integrator<T> {
@@ -74,6 +85,7 @@ impl<T: Scalar> Integrator<T> {
             h: T::constant(h),
             velocity_factor: T::constant((-settings.damping_per_s * h).exp() / h),
             gravity_h: Vector3::from(settings.gravity_m_s2.map(|g| T::constant(g * predicted))),
+            load_h: T::constant(predicted),
         }
     }
 
@@ -83,29 +95,37 @@ impl<T: Scalar> Integrator<T> {
     }
 
     #[inline]
-    fn predict(&self, vertex: &mut Vertex<T>, previous: &mut Point3<T>, velocity: Vector3<T>) {
+    fn predict(
+        &self,
+        vertex: &mut Vertex<T>,
+        previous: &mut Point3<T>,
+        velocity: Vector3<T>,
+        load: Vector3<T>,
+    ) {
         let x = vertex.position();
         *previous = x;
-        if vertex.inverse_mass() > T::zero() {
-            vertex.set_position(x + (velocity + self.gravity_h) * self.h);
+        let w = vertex.inverse_mass();
+        if w > T::zero() {
+            let pushed = velocity + self.gravity_h + load * (w * self.load_h);
+            vertex.set_position(x + pushed * self.h);
         }
     }
 
     /// Runs one pass over a block. Vertices do not depend on each other, so the result does not
     /// depend on the size of the blocks.
     pub(crate) fn run(&self, pass: VertexPass, block: VertexBlock<'_, T>) {
-        let VertexBlock { vertices, previous, velocities } = block;
+        let VertexBlock { vertices, previous, velocities, loads } = block;
         let positions = vertices.iter_mut().zip(previous);
         match pass {
             VertexPass::Predict => {
-                for ((x, p), v) in positions.zip(velocities) {
-                    self.predict(x, p, *v);
+                for (i, ((x, p), v)) in positions.zip(velocities).enumerate() {
+                    self.predict(x, p, *v, load_of(loads, i));
                 }
             }
             VertexPass::FinishAndPredict => {
-                for (x, p) in positions {
+                for (i, (x, p)) in positions.enumerate() {
                     let v = self.finish(x, p);
-                    self.predict(x, p, v);
+                    self.predict(x, p, v, load_of(loads, i));
                 }
             }
             VertexPass::Finish => {

@@ -20,6 +20,8 @@ pub struct System<T: Scalar> {
     pub(crate) vertices: Vec<Vertex<T>>,
     pub(crate) previous: Vec<Point3<T>>,
     pub(crate) velocities: Vec<Vector3<T>>,
+    /// Constant forces in N, one per vertex; empty if there are none.
+    pub(crate) loads: Vec<Vector3<T>>,
     pub(crate) kinds: Vec<Kind<T>>,
     pub(crate) handles: Vec<KinematicHandle<T>>,
     /// Vertex groups of the caller, used instead of greedy coloring.
@@ -99,6 +101,7 @@ impl<T: Scalar> System<T> {
             vertices: self.vertices.iter().map(|vertex| vertex.to_f64()).collect(),
             previous: self.previous.iter().map(|position| position.map(T::to_f64)).collect(),
             velocities: self.velocities.iter().map(|velocity| velocity.map(T::to_f64)).collect(),
+            loads: self.loads.iter().map(|load| load.map(T::to_f64)).collect(),
             kinds: self.kinds.iter().map(|kind| kind.to_f64()).collect(),
             handles: self.handles.iter().map(KinematicHandle::to_f64).collect(),
             vertex_groups: self.vertex_groups.clone(),
@@ -110,6 +113,7 @@ impl<T: Scalar> System<T> {
             vertices: &mut self.vertices,
             previous: &mut self.previous,
             velocities: &mut self.velocities,
+            loads: &self.loads,
         }
     }
 
@@ -196,7 +200,17 @@ impl<T: Scalar> System<T> {
             gravity_j -= mass * gravity.dot(&x);
         }
         let elastic_j = self.kinds.iter().map(|kind| kind.elastic_energy(&self.vertices)).sum();
-        Energy { kinetic_j, elastic_j, gravity_j }
+        Energy { kinetic_j, elastic_j, gravity_j, load_j: self.load_energy() }
+    }
+
+    /// Returns the potential energy of the loads on the moving vertices, `−Σ load·x` in J.
+    fn load_energy(&self) -> f64 {
+        let origin = self.origin.map(T::to_f64);
+        let work = |(vertex, load): (&Vertex<T>, &Vector3<T>)| {
+            let x = vertex.position().coords.map(T::to_f64) + origin;
+            if vertex.inverse_mass() > T::zero() { load.map(T::to_f64).dot(&x) } else { 0.0 }
+        };
+        -self.vertices.iter().zip(&self.loads).map(work).sum::<f64>()
     }
 
     /// Returns the linear momentum, the angular momentum about the center of mass, and the center
@@ -232,13 +246,16 @@ impl<T: Scalar> System<T> {
         Ok(self.vertices.iter().zip(reference).map(distance).fold(0.0, f64::max))
     }
 
-    /// Returns the memory of the vertices, of each kind, and of the handles if there are any.
+    /// Returns the memory of the vertices, of each kind, and of loads and handles if there are any.
     pub fn bytes(&self) -> Vec<MemoryPart> {
         let vertices = size_of_val(self.vertices.as_slice())
             + size_of_val(self.previous.as_slice())
             + size_of_val(self.velocities.as_slice());
         let mut parts = vec![MemoryPart { name: "vertices", bytes: vertices }];
         parts.extend(self.kinds.iter().map(|kind| MemoryPart { name: kind.name(), bytes: kind.bytes() }));
+        if !self.loads.is_empty() {
+            parts.push(MemoryPart { name: "loads", bytes: size_of_val(self.loads.as_slice()) });
+        }
         if !self.handles.is_empty() {
             let bytes = self.handles.iter().map(KinematicHandle::bytes).sum();
             parts.push(MemoryPart { name: "handles", bytes });

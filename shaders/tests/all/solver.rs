@@ -1,7 +1,7 @@
 //! The passes of the solver, for each constraint.
 
 use cutis_shaders::constraints::{DISTANCE, SKIN_TENSION, SKIN_TENSION_PAPER, VOLUME};
-use cutis_shaders::solver::{self, Multiplier, Rule, Stiffness};
+use cutis_shaders::solver::{self, Loads, Multiplier, Rule, Stiffness};
 
 use crate::{assert_baseline, size_of_struct, validated};
 
@@ -29,9 +29,11 @@ fn every_variant_of_every_kind_is_valid() {
         assert_baseline(name, &solver::residual(arity, source), &[solver::RESIDUAL]);
         assert_baseline(name, &solver::evaluate(arity, source), &[solver::EVALUATE]);
     }
-    assert_baseline("descend", &solver::descend(), &[solver::DESCEND]);
     let passes = ["predict", "predict_next", "finish_and_predict", "finish", "check", "restore"];
-    assert_baseline("vertices", &solver::vertices(), &passes);
+    for loads in [Loads::None, Loads::Each] {
+        assert_baseline("vertices", &solver::vertices(loads), &passes);
+        assert_baseline("descend", &solver::descend(loads), &[solver::DESCEND]);
+    }
     assert_baseline("kinematic", &solver::kinematic(), &[solver::KINEMATIC]);
     assert_baseline("gather", &solver::gather(), &[solver::GATHER]);
 }

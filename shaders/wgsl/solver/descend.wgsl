@@ -38,7 +38,7 @@ fn descend(@builtin(global_invocation_id) id: vec3u) {
     let found = forces[id.x];
     let inertia = descent.inverse_h_squared / vertex.w;
     let goal = (previous[v].xyz + velocities[v].xyz * descent.h) + descent.gravity_h_squared;
-    let f = found.force.xyz + (goal - vertex.xyz) * inertia;
+    let f = (found.force.xyz + load_of(v)) + (goal - vertex.xyz) * inertia;
     let d = found.diagonal.xyz;
     let least = max((d.x + d.y + d.z) * NOISE, inertia);
     let a = d + vec3f(least);

@@ -4,4 +4,5 @@ struct Settings {
     h: f32,
     velocity_factor: f32,
     inverse_h_squared: f32,
+    load_h: f32,
 }

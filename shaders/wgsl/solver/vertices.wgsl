@@ -30,7 +30,8 @@ fn predict_from(i: u32, velocity: vec3f) {
     let vertex = vertices[i];
     previous[i] = vertex;
     if (vertex.w > 0.0) {
-        vertices[i] = vec4f(vertex.xyz + (velocity + settings.gravity_h) * settings.h, vertex.w);
+        let pushed = (velocity + settings.gravity_h) + load_of(i) * (vertex.w * settings.load_h);
+        vertices[i] = vec4f(vertex.xyz + pushed * settings.h, vertex.w);
     }
 }
 

@@ -10,7 +10,7 @@ use cutis_solver::{
 };
 use cutis_solver_cpu::{CpuError, SolverCpu};
 use cutis_test_kit::Kuhn;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 /// A block with several chunks of every color and several blocks of vertices. It has all kinds of
 /// constraints, one fixed face, and a handle that moves an edge.
@@ -56,6 +56,8 @@ fn body<T: Scalar>(formulation: Formulation) -> System<T> {
         )
         .unwrap()
         .handle(Handle { vertices: held, move_m: [0.1, 0.2, 0.0], over_s: 0.03 })
+        .unwrap()
+        .loads(&(0..count).map(|n| Vector3::x() * T::constant((n % 5) as f64)).collect::<Vec<_>>())
         .unwrap()
         .build()
 }

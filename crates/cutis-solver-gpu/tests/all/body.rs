@@ -5,8 +5,8 @@ use cutis_constraints::{
     Distance, Scalar, SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Volume,
 };
 use cutis_solver::{Formulation, Handle, Settings, Stiffness, System, SystemBuilder, Values};
-
 use cutis_test_kit::Kuhn;
+use nalgebra::Vector3;
 
 /// Parts of a test body.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +17,8 @@ pub struct Parts {
     pub skin: bool,
     pub paper: bool,
     pub handle: bool,
+    /// A constant force on each vertex.
+    pub loads: bool,
     /// One stiffness per constraint instead of one for all.
     pub each: bool,
     /// Spacing of the lattice in m.
@@ -26,13 +28,13 @@ pub struct Parts {
 impl Parts {
     pub fn all(formulation: Formulation) -> Self {
         let paper = formulation == Formulation::Pbd;
-        let (distance, volume, skin, handle, each) = (true, true, true, true, true);
-        Self { formulation, distance, volume, skin, paper, handle, each, step: 0.1 }
+        let (distance, volume, skin, handle, loads, each) = (true, true, true, true, true, true);
+        Self { formulation, distance, volume, skin, paper, handle, loads, each, step: 0.1 }
     }
 
     pub fn none(formulation: Formulation) -> Self {
-        let (distance, volume, skin, handle, paper, each) = (false, false, false, false, false, true);
-        Self { formulation, distance, volume, skin, paper, handle, each, step: 0.1 }
+        let (distance, volume, skin, handle, loads, paper) = (false, false, false, false, false, false);
+        Self { formulation, distance, volume, skin, paper, handle, loads, each: true, step: 0.1 }
     }
 }
 
@@ -87,6 +89,12 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
         builder = builder
             .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), stiffness, &groups)
             .unwrap();
+    }
+    if parts.loads {
+        // Up to the weight of the vertices.
+        let load = |n: usize| Vector3::new(1.0, 0.5, -1.0) * (scale * (n % 5) as f64);
+        let loads: Vec<Vector3<T>> = (0..count).map(|n| load(n).map(T::constant)).collect();
+        builder = builder.loads(&loads).unwrap();
     }
     if parts.handle {
         let move_m = [0.1 * scale, 0.2 * scale, 0.0];

@@ -73,6 +73,7 @@ fn every_kind_alone_agrees() {
                 Parts { skin: true, ..none },
                 Parts { paper, ..none },
                 Parts { handle: true, distance: true, ..none },
+                Parts { loads: true, distance: true, ..none },
             ] {
                 assert_parity(gpu, parts, 1);
             }

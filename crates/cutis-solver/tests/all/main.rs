@@ -1,4 +1,5 @@
 //! Integration tests of the solver.
 
 mod descent;
+mod loads;
 mod validation;

@@ -136,7 +136,7 @@ impl Body {
             _ => set.wgsl().to_owned(),
         };
         let [mut vertex_force, mut descend] =
-            [solver::vertex_force(set.arity(), &constraint), solver::descend()];
+            [solver::vertex_force(set.arity(), &constraint), solver::descend(solver::Loads::None)];
         match wrong {
             Wrong::VertexForce([from, to]) => vertex_force = replaced(&vertex_force, from, to)?,
             Wrong::Descend([from, to]) => descend = replaced(&descend, from, to)?,

@@ -66,7 +66,7 @@ fn integrate(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
             let speeds = speeds.iter().flat_map(|v| [v.x, v.y, v.z]);
             Ok(difference.add(triples(&fast), speeds, scale).judged(policy))
         };
-        bench.compare(Ring::Kernel, &name, |gpu, policy| measure(gpu, policy, &solver::vertices()))?;
+        bench.compare(Ring::Kernel, &name, |gpu, policy| measure(gpu, policy, &solver::vertices(solver::Loads::None)))?;
         for (what, from, to) in [
             ("gravity × 1.001", "+ settings.gravity_h)", "+ settings.gravity_h * 1.001)"),
             ("velocity × 1.001", "(velocity +", "(velocity * 1.001 +"),
@@ -74,7 +74,7 @@ fn integrate(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
             ("another damping", "* settings.velocity_factor", "* (settings.velocity_factor * 1.001)"),
         ] {
             bench.control(Ring::Kernel, &name, what, |gpu, policy| {
-                measure(gpu, policy, &replaced(&solver::vertices(), from, to)?)
+                measure(gpu, policy, &replaced(&solver::vertices(solver::Loads::None), from, to)?)
             })?;
         }
     }
@@ -125,7 +125,7 @@ fn check(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
         }
         Ok(Measured::at_most(cases.len() as u64, worst, 0.0, "a vertex"))
     };
-    bench.compare(Ring::Kernel, name, |gpu, _| measure(gpu, &solver::vertices()))?;
+    bench.compare(Ring::Kernel, name, |gpu, _| measure(gpu, &solver::vertices(solver::Loads::None)))?;
     for (what, from, to) in [
         ("a coordinate is not checked", "is_finite(x.y)", "is_finite(x.x)"),
         (
@@ -135,7 +135,7 @@ fn check(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
         ),
     ] {
         bench.control(Ring::Kernel, name, what, |gpu, _| {
-            measure(gpu, &replaced(&solver::vertices(), from, to)?)
+            measure(gpu, &replaced(&solver::vertices(solver::Loads::None), from, to)?)
         })?;
     }
     Ok(())
