@@ -116,8 +116,8 @@ impl Problem {
         self.elastic.at(&self.local(x)).gradient.into_iter().map(|gradient| -gradient).collect()
     }
 
-    /// Returns `x̃ = x + h·v + h²·(g + load/m)` of the free vertices, for a step of `h` seconds from the
-    /// positions `x` with the velocities `v` (m/s). Fixed vertices stay at `x`.
+    /// Returns `x̃ = x + h·v + h²·(g + load/m)` of the free vertices, for a step of `h` seconds
+    /// from the positions `x` with the velocities `v` (m/s). Fixed vertices stay at `x`.
     ///
     /// # Panics
     /// If `x` or `v` does not have one entry per vertex.
@@ -126,7 +126,8 @@ impl Problem {
         let mut predicted = x.to_vec();
         for &vertex in &self.free {
             let vertex = vertex as usize;
-            predicted[vertex] += (v[vertex] + self.gravity * h + self.load(vertex) * (h / self.masses[vertex])) * h;
+            predicted[vertex] +=
+                (v[vertex] + self.gravity * h + self.load(vertex) * (h / self.masses[vertex])) * h;
         }
         predicted
     }

@@ -6,8 +6,8 @@
 //!
 //! A CT shows a patient at rest, although the skin is under tension. Let `f⁰` be the force of the
 //! constraints on each vertex at the shape in the scan ([`System::constraint_forces`]). With the
-//! load `−f⁰` that shape is an equilibrium, and a cut moves only what it sets free. Source: sag-free
-//! initialization, Hsu et al., *A General Two-Stage Initialization for Sag-Free Deformable
+//! load `−f⁰` that shape is an equilibrium, and a cut moves only what it sets free. Source:
+//! sag-free initialization, Hsu et al., *A General Two-Stage Initialization for Sag-Free Deformable
 //! Simulations*, ACM Trans. Graph. 41 (2022).
 
 use cutis_constraints::Scalar;

@@ -69,9 +69,8 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
         (0..self.indices.len()).find_map(|k| {
             let eval = C::eval(&self.positions(k, vertices), &self.params[k]);
             let ratio = eval.c.to_f64() / C::rest_size(&self.params[k]).to_f64();
-            let free = |&i: &usize| vertices[self.indices[k][i] as usize].inverse_mass() > T::zero();
-            let mut movable = (0..N).filter(free).peekable();
-            let cannot_act = movable.peek().is_some() && movable.all(|i| eval.grad[i] == Vector3::zeros());
+            let free = |&i: &u32| vertices[i as usize].inverse_mass() > T::zero();
+            let cannot_act = self.indices[k].iter().any(free) && eval.grad == [Vector3::zeros(); N];
             (ratio.is_finite() && ratio.abs() > tolerance && cannot_act).then_some((k, ratio))
         })
     }

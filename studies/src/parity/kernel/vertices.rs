@@ -66,7 +66,9 @@ fn integrate(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
             let speeds = speeds.iter().flat_map(|v| [v.x, v.y, v.z]);
             Ok(difference.add(triples(&fast), speeds, scale).judged(policy))
         };
-        bench.compare(Ring::Kernel, &name, |gpu, policy| measure(gpu, policy, &solver::vertices(solver::Loads::None)))?;
+        bench.compare(Ring::Kernel, &name, |gpu, policy| {
+            measure(gpu, policy, &solver::vertices(solver::Loads::None))
+        })?;
         for (what, from, to) in [
             ("gravity × 1.001", "+ settings.gravity_h)", "+ settings.gravity_h * 1.001)"),
             ("velocity × 1.001", "(velocity +", "(velocity * 1.001 +"),
@@ -159,12 +161,12 @@ impl Buffers {
     ) -> Result<Self, Failure> {
         let velocities: Vec<[f32; 4]> = velocities.iter().map(|v| [v.x, v.y, v.z, 0.0]).collect();
         let simulation = Simulation::new(system()?, settings)?;
-        let &Integrator { h, velocity_factor, gravity_h: g } = simulation.integrator();
+        let &Integrator { h, velocity_factor, gravity_h: g, load_h } = simulation.integrator();
         Ok(Self {
             vertices: gpu.buffer("vertices", bytemuck::cast_slice(vertices))?,
             previous: gpu.zeroed("previous", vertices.len())?,
             velocities: gpu.buffer("velocities", &velocities)?,
-            settings: gpu.uniform("settings", &[g.x, g.y, g.z, h, velocity_factor, 0.0, 0.0, 0.0])?,
+            settings: gpu.uniform("settings", &[g.x, g.y, g.z, h, velocity_factor, 0.0, load_h, 0.0])?,
             status: gpu.buffer("status", &[NONE, 0, 0])?,
         })
     }
