@@ -16,3 +16,21 @@ pub const SKIN_TENSION_PAPER: &str = concat!(
     "\n",
     include_str!("../wgsl/constraints/skin_tension_paper.wgsl")
 );
+/// Source of `SkinStrip`, with three vertices.
+pub const SKIN_STRIP: &str = concat!(
+    include_str!("../wgsl/constraints/strip.wgsl"),
+    "\n",
+    include_str!("../wgsl/constraints/skin_strip.wgsl")
+);
+/// Source of `SkinStripAtRest`, with three vertices.
+pub const SKIN_STRIP_AT_REST: &str = concat!(
+    include_str!("../wgsl/constraints/strip.wgsl"),
+    "\n",
+    include_str!("../wgsl/constraints/skin_strip_at_rest.wgsl")
+);
+/// Source of `SkinStripTurn`, with three vertices.
+pub const SKIN_STRIP_TURN: &str = concat!(
+    include_str!("../wgsl/constraints/strip.wgsl"),
+    "\n",
+    include_str!("../wgsl/constraints/skin_strip_turn.wgsl")
+);

@@ -11,6 +11,7 @@ pub mod kit;
 pub mod main_job;
 pub mod mutations;
 pub mod parity;
+pub mod patch;
 pub mod region;
 pub mod sheet;
 pub mod stability;
@@ -29,6 +30,7 @@ mod tests {
             ("chainmail", &crate::chainmail::TABLES),
             ("main-job", &crate::main_job::TABLES),
             ("parity", &crate::parity::TABLES),
+            (crate::patch::PAGE, &crate::patch::TABLES),
             ("region", &crate::region::TABLES),
             ("stability", &crate::stability::TABLES),
             ("tuning", &crate::tuning::TABLES),

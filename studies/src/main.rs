@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
-    accuracy, cantilever, chainmail, main_job, mutations, parity, region, stability, tuning,
+    accuracy, cantilever, chainmail, main_job, mutations, parity, patch, region, stability, tuning,
 };
 
 /// A study and its options.
@@ -19,6 +19,7 @@ enum Study {
     MainJob(main_job::Options),
     Mutations(mutations::Options),
     Parity(parity::Options),
+    Patch(patch::Options),
     Region(region::Options),
     Stability(stability::Options),
     Tuning(tuning::Options),
@@ -33,6 +34,7 @@ impl Study {
             Self::MainJob(options) => main_job::run(options, out),
             Self::Mutations(options) => mutations::run(options, out),
             Self::Parity(options) => parity::run(options, out),
+            Self::Patch(options) => patch::run(options, out),
             Self::Region(options) => region::run(options, out),
             Self::Stability(options) => stability::run(options, out),
             Self::Tuning(options) => tuning::run(options, out),

@@ -12,7 +12,7 @@
 //! | check | requirement | negative control |
 //! |---|---|---|
 //! | [`gradient`](checks::gradient) | `∇C` is the gradient of `C` | a gradient off by 1e-3; two swapped |
-//! | [`momentum`](checks::momentum) | gradients sum to zero and have no torque | one off by 1e-3; a couple |
+//! | [`momentum`](checks::momentum) | gradients sum to zero and have no torque | one off by 1e-3; a couple; the torque of an oriented constraint |
 //! | [`scale`](checks::scale) | the formula contains no length and no epsilon | a length of 1e-20 m |
 //! | [`parameters`](checks::parameters) | each parameter has an effect on the samples | (the check itself: a parameter without effect fails) |
 //! | [`precision`](checks::precision) | `f32` is near `f64` | value or gradient off by 1e-3 |

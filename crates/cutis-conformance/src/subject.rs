@@ -31,6 +31,7 @@ const SAMPLES: usize = 100;
 pub struct Subject<C: Constraint<N>, const N: usize> {
     materials: Vec<C::Material>,
     pub(crate) anchored: bool,
+    pub(crate) oriented: bool,
     pub(crate) has_length: bool,
     pub(crate) direction_only: bool,
     constraint: PhantomData<fn() -> C>,
@@ -42,8 +43,8 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
     pub fn new(materials: impl IntoIterator<Item = C::Material>) -> Self {
         Self {
             materials: materials.into_iter().collect(),
-
             anchored: false,
+            oriented: false,
             has_length: false,
             direction_only: false,
             constraint: PhantomData,
@@ -54,6 +55,13 @@ impl<C: Constraint<N>, const N: usize> Subject<C, N> {
     /// and turn a body. Skips the momentum check.
     pub fn anchored(self) -> Self {
         Self { anchored: true, ..self }
+    }
+
+    /// Declares that the constraint depends on the orientation of the points in space, but not on
+    /// their place, like a load of fixed direction. It may turn a body, but not push it. The
+    /// momentum check then requires a torque.
+    pub fn oriented(self) -> Self {
+        Self { oriented: true, ..self }
     }
 
     /// Declares that the constraint or its materials contain a length, so results may depend on the

@@ -9,6 +9,9 @@
 //! | [`Volume`] | 4 | signed volume − rest volume, m³ | [`volume_compliance`], m³/Pa |
 //! | [`SkinTension`] | 3 | (area − rest area) · `q`, m² | [`skin_compliance`], m³/N |
 //! | [`SkinTensionPaper`] | 3 | (area − rest area) · `F`, m²; PBD only | none, but a stiffness from 0 to 1 |
+//! | [`SkinStrip`] | 3 | (length of the image of a direction − rest length) · `q`, m | [`skin_strip_compliance`], m/N |
+//! | [`SkinStripAtRest`] | 3 | the same for a body at rest in the scan, m | as above |
+//! | [`SkinStripTurn`] | 3 | turn of the image against a constant load, m | as above |
 //!
 //! Each formula is written once and runs as `f32`, as `f64` and in SIMD lanes of both ([`Real`]).
 //! Every lane has the bits of a scalar evaluation. No formula contains an absolute length or an
@@ -33,17 +36,28 @@ mod constraint;
 mod distance;
 mod material;
 mod real;
+mod skin_strip;
+mod skin_strip_at_rest;
+mod skin_strip_turn;
 mod skin_tension;
 mod skin_tension_paper;
+mod strip;
+mod strip_material;
 mod triangle;
 mod volume;
 
 pub use constraint::{Constraint, Eval, Params};
 pub use distance::{Distance, DistanceMaterial};
-pub use material::{MaterialError, distance_compliance, skin_compliance, volume_compliance};
+pub use material::{
+    MaterialError, distance_compliance, skin_compliance, skin_strip_compliance, volume_compliance,
+};
 pub use real::{Real, Scalar};
+pub use skin_strip::SkinStrip;
+pub use skin_strip_at_rest::SkinStripAtRest;
+pub use skin_strip_turn::SkinStripTurn;
 pub use skin_tension::{SkinTension, SkinTensionMaterial};
 pub use skin_tension_paper::{SkinTensionPaper, SkinTensionPaperMaterial};
+pub use strip_material::{SkinStripLaw, SkinStripMaterial, SkinStripShape};
 pub use volume::{Volume, VolumeMaterial};
 
 #[cfg(doctest)]

@@ -36,6 +36,52 @@ pub enum MaterialError {
         /// The value.
         value: f64,
     },
+    /// A vector that must give a direction is zero or not finite.
+    #[error("the {quantity} is {value:?}; it must be a finite vector that is not zero")]
+    NotADirection {
+        /// Name of the vector.
+        quantity: &'static str,
+        /// The vector.
+        value: [f64; 3],
+    },
+    /// The direction of a skin strip is along the normal of the skin.
+    #[error(
+        "the direction {direction:?} is along the normal {normal:?} of the skin; it must lie in the skin"
+    )]
+    AlongNormal {
+        /// The direction.
+        direction: [f64; 3],
+        /// The normal.
+        normal: [f64; 3],
+    },
+    /// The compression of a skin strip is not from 0 to 1.
+    #[error("compression of a skin strip is {value}; it must be from 0 to 1")]
+    CompressionOutOfRange {
+        /// The value.
+        value: f64,
+    },
+    /// The tension of a skin strip is not below its modulus, so the strip would have no length
+    /// without tension.
+    #[error(
+        "tension of a skin strip is {tension_n_per_m} N/m with a modulus of {modulus_n_per_m} N/m; \
+         the tension must be below the modulus"
+    )]
+    TensionTooLarge {
+        /// The tension in N/m.
+        tension_n_per_m: f64,
+        /// The modulus in N/m.
+        modulus_n_per_m: f64,
+    },
+    /// A triangle does not face the direction of the skin's normal.
+    #[error(
+        "seen along the normal of the skin, a triangle has {share} of its area; it must have {least} or more"
+    )]
+    NotFacing {
+        /// Area seen along the normal over area; negative if the triangle faces inwards.
+        share: f64,
+        /// The least share.
+        least: f64,
+    },
     /// The arguments are valid, but so small or large that the compliance is not a finite number.
     #[error(
         "the compliance of a {constraint} constraint with rest size {rest_size} is {value}; \
@@ -103,6 +149,26 @@ pub fn skin_compliance(rest_area: f64, area_modulus_n_per_m: f64) -> Result<f64,
     check_positive("rest area", "m²", rest_area)?;
     check_modulus("area modulus", "N/m", area_modulus_n_per_m)?;
     finite("skin tension", rest_area, rest_area / area_modulus_n_per_m)
+}
+
+/// Returns the compliance of a [`SkinStrip`](crate::SkinStrip) in m/N: `α = ℓ²/(k·A_p)`.
+///
+/// `ℓ` is `length` in m and `A_p` is `projected_area` in m², both from
+/// [`SkinStripMaterial::shape`](crate::SkinStripMaterial::shape). `k` is `stiffness_n_per_m` in
+/// N/m, from [`SkinStripLaw::stiffness_n_per_m`](crate::SkinStripLaw::stiffness_n_per_m). The
+/// energy `C²/(2α)` of a flat triangle is then `½ k ε² A_p` for the strain `ε` along the strip.
+///
+/// # Errors
+/// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
+pub fn skin_strip_compliance(
+    length: f64,
+    projected_area: f64,
+    stiffness_n_per_m: f64,
+) -> Result<f64, MaterialError> {
+    check_positive("length of a skin strip", "m", length)?;
+    check_positive("projected area", "m²", projected_area)?;
+    check_modulus("stiffness of a skin strip", "N/m", stiffness_n_per_m)?;
+    finite("skin strip", length, length / stiffness_n_per_m * (length / projected_area))
 }
 
 /// Fails unless `value` is finite and above 0.

@@ -8,7 +8,8 @@
 
 use cutis_conformance::{ConformanceError, Finding, Limit, Report, Subject, device};
 use cutis_constraints::{
-    Constraint, Distance, DistanceMaterial, SkinTension, SkinTensionMaterial, SkinTensionPaper,
+    Constraint, Distance, DistanceMaterial, MaterialError, SkinStrip, SkinStripAtRest, SkinStripLaw,
+    SkinStripMaterial, SkinStripTurn, SkinTension, SkinTensionMaterial, SkinTensionPaper,
     SkinTensionPaperMaterial, Volume, VolumeMaterial,
 };
 use cutis_gpu::Gpu;
@@ -30,7 +31,22 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     examine(bench, &Subject::<Distance, 2>::new(shares().map(|rest_scale| DistanceMaterial { rest_scale })))?;
     examine(bench, &Subject::<Volume, 4>::new(shares().map(|rest_scale| VolumeMaterial { rest_scale })))?;
     examine(bench, &Subject::<SkinTension, 3>::new(shares().map(tension)))?;
-    examine(bench, &Subject::<SkinTensionPaper, 3>::new(shares().map(paper)).direction_only())
+    examine(bench, &Subject::<SkinTensionPaper, 3>::new(shares().map(paper)).direction_only())?;
+    let strips = || shares().map(strip).collect::<Result<Vec<_>, _>>();
+    examine(bench, &Subject::<SkinStrip, 3>::new(strips()?))?;
+    examine(bench, &Subject::<SkinStripAtRest, 3>::new(strips()?))?;
+    examine(bench, &Subject::<SkinStripTurn, 3>::new(strips()?).oriented())
+}
+
+/// A strip with a part of the largest tension, which also sets the other values and the direction.
+fn strip(share: f64) -> Result<SkinStripMaterial, MaterialError> {
+    let law = SkinStripLaw {
+        tension_n_per_m: 48.0 * (share - 0.5) + 1.0,
+        modulus_n_per_m: 50.0,
+        stiffening: 8.0 * share,
+        compression: 1.5 - share,
+    };
+    SkinStripMaterial::new([0.3, -0.2, 1.0], [share, 1.0 - share, 0.1], law)
 }
 
 fn examine<C: Constraint<N>, const N: usize>(

@@ -16,6 +16,7 @@ fn every_study_explains_its_options() {
         "main-job",
         "mutations",
         "parity",
+        "patch",
         "region",
         "stability",
         "tuning",

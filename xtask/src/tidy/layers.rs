@@ -51,6 +51,7 @@ const LAYERS: &[Layer] = &[
         may_use: These(&["cutis-volume", "cutis-gpu", "cutis-shaders"]),
     },
     Layer { name: "cutis-newton", level: 3, may_use: These(&["cutis-solver", "cutis-constraints"]) },
+    Layer { name: "cutis-skin", level: 3, may_use: These(&["cutis-volume", "cutis-mesh"]) },
     Layer {
         name: "cutis-resample",
         level: 3,

@@ -15,7 +15,8 @@ const BOUND: f64 = 1e-11;
 ///
 /// Skipped for [`anchored`](Subject::anchored) constraints. Controls: each gradient off by 1e-3
 /// must be noticed in the sum. A couple, which is invisible in the sum, must be noticed in the
-/// torque.
+/// torque. The torque of an [`oriented`](Subject::oriented) constraint is not limited; as a control,
+/// it must be noticed.
 pub fn momentum<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let check = "momentum";
     if subject.anchored {
@@ -31,7 +32,11 @@ pub fn momentum<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
         cases.iter().map(of_case).fold(0.0, largest)
     };
     report.at_most("sum of the gradients", worst(&|_, grad| force(&grad)), BOUND);
-    report.at_most("torque of the gradients", worst(&torque), BOUND);
+    if subject.oriented {
+        report.control("torque of an oriented constraint", worst(&torque), 1e5 * BOUND);
+    } else {
+        report.at_most("torque of the gradients", worst(&torque), BOUND);
+    }
     for i in 0..N {
         let altered = |mut grad: [Vector3<f64>; N]| {
             grad[i] *= FACTOR;
@@ -40,7 +45,7 @@ pub fn momentum<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
         let value = worst(&|_, grad| force(&altered(grad)));
         report.control(format!("sum, {}", Alteration::Gradient(i)), value, 1e5 * BOUND);
     }
-    if N > 1 {
+    if N > 1 && !subject.oriented {
         let value = worst(&|case, grad| torque(case, with_couple(case, grad)));
         report.control("torque, a couple of 1e-3", value, 1e5 * BOUND);
     }

@@ -34,8 +34,9 @@ pub fn scale<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Repor
             let expected = without_unit::<C, N>(of_meter, absolute);
             for (expected, found) in expected.iter().zip(without_unit::<C, N>(case, absolute)) {
                 let size = expected.iter().map(|value| value.abs()).fold(0.0, largest);
-                let difference = expected.iter().zip(found).map(|(a, b)| (a - b).abs());
-                worst = largest(difference.fold(0.0, largest) / size, worst);
+                let difference = expected.iter().zip(found).map(|(a, b)| (a - b).abs()).fold(0.0, largest);
+                // Zero at every scale is no difference.
+                worst = largest(if difference == 0.0 { 0.0 } else { difference / size }, worst);
             }
         }
         worst
@@ -52,7 +53,9 @@ fn without_unit<C: Constraint<N>, const N: usize>(case: &Case<N>, absolute: f64)
     moved.x[0].x += absolute;
     let mut eval = moved.eval::<C, f64>();
     let params = case.params::<C, f64>();
+    // The size of a constraint without a rest size is that of its gradient.
     let rest_size = C::rest_size(&params);
+    let rest_size = if rest_size == 0.0 { moved.size::<C>() } else { rest_size };
     eval.c /= rest_size;
     eval.grad = eval.grad.map(|g| g * (case.scale / rest_size));
     let reach = C::inverse_reach_squared(&moved.x, &params);

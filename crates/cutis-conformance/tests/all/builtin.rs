@@ -2,8 +2,8 @@
 
 use cutis_conformance::{Subject, conformance};
 use cutis_constraints::{
-    Distance, DistanceMaterial, SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial,
-    Volume, VolumeMaterial,
+    Distance, DistanceMaterial, SkinStrip, SkinStripAtRest, SkinStripLaw, SkinStripMaterial, SkinStripTurn,
+    SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Volume, VolumeMaterial,
 };
 
 conformance!(mod distance: Distance, 2, Subject::new([
@@ -25,3 +25,22 @@ conformance!(mod skin_tension: SkinTension, 3, Subject::new([
 conformance!(mod skin_tension_paper: SkinTensionPaper, 3, Subject::new([
     SkinTensionPaperMaterial { rest_area_scale: 0.9, amplification: 2.0, max_amplification: 3.0 },
 ]).direction_only());
+
+/// Strips with low to high tension, with and without stiffening and resistance to compression.
+fn strips() -> Vec<SkinStripMaterial> {
+    let strip = |tension_n_per_m, stiffening, compression, direction| {
+        let law = SkinStripLaw { tension_n_per_m, modulus_n_per_m: 50.0, stiffening, compression };
+        SkinStripMaterial::new([0.3, -0.2, 1.0], direction, law).unwrap()
+    };
+    vec![
+        strip(5.0, 0.0, 1.0, [1.0, 0.0, 0.0]),
+        strip(20.0, 3.0, 0.25, [0.2, 1.0, 0.1]),
+        strip(45.0, 10.0, 0.0, [1.0, -1.0, 0.4]),
+    ]
+}
+
+conformance!(mod skin_strip: SkinStrip, 3, Subject::new(strips()));
+
+conformance!(mod skin_strip_at_rest: SkinStripAtRest, 3, Subject::new(strips()));
+
+conformance!(mod skin_strip_turn: SkinStripTurn, 3, Subject::new(strips()).oriented());

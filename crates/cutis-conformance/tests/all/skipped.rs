@@ -4,7 +4,7 @@ use cutis_conformance::{Subject, Verdict, checks};
 use cutis_constraints::{Constraint, Eval, Real};
 use nalgebra::{Point3, Vector3};
 
-use crate::wrong::AbsoluteEpsilon;
+use crate::wrong::{AbsoluteEpsilon, OneSided, Stretch};
 
 /// Keeps a point on the plane `z = height`.
 struct OnPlane;
@@ -38,6 +38,45 @@ fn an_anchored_constraint_is_not_checked_for_momentum() {
     assert_eq!(checks::momentum(&free).verdict(), Verdict::Failed);
     let anchored = Subject::<OnPlane, 1>::new([()]).anchored();
     assert!(matches!(checks::momentum(&anchored).verdict(), Verdict::Skipped(_)));
+}
+
+/// Keeps an edge parallel to the z axis. It has a torque.
+struct Upright;
+
+impl Constraint<2> for Upright {
+    const NAME: &'static str = "upright";
+    const WGSL: &'static str = "
+        struct Params { lean: f32 }
+        fn eval(x: array<vec3f, N>, p: Params) -> Eval {
+            let along = vec3f(1.0, 0.0, 0.0);
+            return Eval(x[0].x - x[1].x - p.lean, array<vec3f, N>(along, -along));
+        }";
+    type Params<T: Real> = [T; 1];
+    type Material = ();
+
+    fn from_rest<T: Real>([x1, x2]: &[Point3<T>; 2], _: &()) -> [T; 1] {
+        [x1.x - x2.x]
+    }
+
+    fn eval<T: Real>([x1, x2]: &[Point3<T>; 2], &[lean]: &[T; 1]) -> Eval<T, 2> {
+        Eval { c: x1.x - x2.x - lean, grad: [Vector3::x(), -Vector3::x()] }
+    }
+
+    fn rest_size<T: Real>(&[lean]: &[T; 1]) -> T {
+        lean.simd_abs()
+    }
+}
+
+/// An oriented constraint may have a torque, but no force. One that has no torque is refused.
+#[test]
+fn only_an_oriented_constraint_may_have_a_torque() {
+    let verdict = |subject: &Subject<Upright, 2>| checks::momentum(subject).verdict();
+    assert_eq!(verdict(&Subject::new([()])), Verdict::Failed);
+    assert_eq!(verdict(&Subject::new([()]).oriented()), Verdict::Passed);
+    let pushes = Subject::<OneSided, 2>::new([()]).oriented();
+    assert_eq!(checks::momentum(&pushes).verdict(), Verdict::Failed);
+    let without_torque = Subject::<Stretch, 2>::new([()]).oriented();
+    assert_eq!(checks::momentum(&without_torque).verdict(), Verdict::Failed);
 }
 
 #[test]

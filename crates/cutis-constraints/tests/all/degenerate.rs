@@ -1,7 +1,10 @@
 //! Coincident points, flat shapes and zero rest sizes: results are finite, and an undefined
 //! gradient is zero.
 
-use cutis_constraints::{Constraint, Distance, Eval, Params, Scalar, SkinTension, SkinTensionPaper, Volume};
+use cutis_constraints::{
+    Constraint, Distance, Eval, Params, Scalar, SkinStrip, SkinStripAtRest, SkinStripTurn, SkinTension,
+    SkinTensionPaper, Volume,
+};
 use nalgebra::{Point3, Vector3};
 
 /// Both ends of the documented range of lengths, and lengths between them, in m.
@@ -79,6 +82,42 @@ fn tetrahedra<T: Scalar>() {
             assert_eq!(flat.c.to_f64(), -T::constant(rest).to_f64());
         }
     }
+}
+
+/// Strips with the image of the triangle `A, B, C` in the scan.
+fn strips<T: Scalar>() {
+    let [b1, b2] = [1.0, -0.375];
+    let image: [f64; 3] = std::array::from_fn(|axis| b1 * (A[axis] - C[axis]) + b2 * (B[axis] - C[axis]));
+    let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let mirrored = [A, B, C].map(|p| p.map(|v| -v));
+    for scale in SCALES {
+        for (rest, stiffening, compression) in [(0.7, 0.0, 1.0), (1.0, 1e6, 0.0), (0.01, 5.0, 0.5)] {
+            let params = [b1, b2, rest * length * scale, length * scale, stiffening, compression];
+            let [fx, fy, fz] = image.map(|v| v * scale);
+            let turn = [b1, b2, fx, fy, fz, (1.0 - rest) * length * scale];
+            // Without extent there is no image.
+            assert!(is_zero(&eval::<3, SkinStrip, T>([A, A, A], scale, &params)));
+            assert!(is_zero(&eval::<3, SkinStripAtRest, T>([A, A, A], scale, &params)));
+            assert!(is_zero(&eval::<3, SkinStripTurn, T>([A, A, A], scale, &turn)));
+            // A mirrored triangle has the same length. Its image points backwards.
+            let found = eval::<3, SkinStripTurn, T>(mirrored, scale, &turn).c.to_f64();
+            let wanted = 2.0 * ((1.0 - rest).max(0.0) * length * length).sqrt() * scale;
+            assert!((found - wanted).abs() < 1e-6 * length * scale, "{found} {wanted}");
+            let flat = eval::<3, SkinStrip, T>([A, A, B], scale, &params);
+            assert!(!is_zero(&flat) || compression == 0.0, "a flat triangle has an image");
+        }
+        for x in [[A, B, C], [A, A, A]] {
+            eval::<3, SkinStrip, T>(x, scale, &[0.0; 6]);
+            eval::<3, SkinStripAtRest, T>(x, scale, &[0.0; 6]);
+            eval::<3, SkinStripTurn, T>(x, scale, &[0.0; 6]);
+        }
+    }
+}
+
+#[test]
+fn degenerate_strips_are_finite() {
+    strips::<f32>();
+    strips::<f64>();
 }
 
 #[test]

@@ -1,12 +1,16 @@
 //! Gradients agree with finite differences and conserve momentum. The energy form is the gradient
 //! of its energy.
 
-use cutis_constraints::{Constraint, Distance, Eval, SkinTension, SkinTensionPaper, Volume};
+use cutis_constraints::{
+    Constraint, Distance, Eval, SkinStrip, SkinStripAtRest, SkinStripTurn, SkinTension, SkinTensionPaper,
+    Volume,
+};
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
 use crate::checks::{gradient_error, gradient_size, momentum_error, torque_error, with};
 use crate::shapes::{Shape, shape};
+use crate::strips::{StripCase, strip_case};
 
 /// Bound on the error against finite differences. The negative controls are off by 1e-3 or more.
 const EXACT: f64 = 1e-6;
@@ -52,6 +56,16 @@ fn check<const N: usize>(eval: &impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shap
     assert!(torque_error(&couple, shape) > 1e-6);
 }
 
+/// True where a strip has a kink or a wide enough image for finite differences.
+fn is_smooth(case: &StripCase) -> bool {
+    let [_, _, rest, scan, _, compression] = case.params();
+    let length = case.image(&case.x.x).norm();
+    let far = |from: f64| (length - from).abs() > 0.01 * case.x.scale;
+    // Below the rest length and without compression there is no gradient to compare.
+    let pulls = length > rest || compression > 0.01;
+    far(0.0) && far(0.1 * scan) && far(rest) && far(scan) && pulls
+}
+
 /// Rest size over current size, not so near 1 that a finite difference straddles the kink of
 /// `max(0, C)`.
 fn rest_ratio() -> impl Strategy<Value = f64> {
@@ -72,6 +86,34 @@ proptest! {
     #[test]
     fn skin_tension_gradient(shape in shape::<3>(), ratio in rest_ratio(), beta in 0.0..100.0f64) {
         check(&with::<3, SkinTension>([ratio * area(&shape.x), beta]), &shape);
+    }
+
+    #[test]
+    fn skin_strip_gradient(case in strip_case(100.0)) {
+        prop_assume!(is_smooth(&case));
+        check(&with::<3, SkinStrip>(case.params()), &case.x);
+        check(&with::<3, SkinStripAtRest>(case.params()), &case.x);
+    }
+
+    /// The load has a direction in space, so its torque is not zero.
+    #[test]
+    fn skin_strip_turn_gradient(case in strip_case(100.0)) {
+        let turn = with::<3, SkinStripTurn>(case.turn_params());
+        let grad = turn(&case.x.x).grad;
+        prop_assume!(is_smooth(&case) && gradient_size(&grad) > 0.05);
+        let error = gradient_error(&turn, &case.x);
+        prop_assert!(error < EXACT, "gradient is off by {error}");
+        prop_assert!(momentum_error(&grad) < ROUNDING);
+        let longer = |x: &[Point3<f64>; 3]| Eval { c: turn(x).c, grad: grad.map(|g| g * 1.001) };
+        prop_assert!(gradient_error(longer, &case.x) > 0.9e-3);
+    }
+
+    #[test]
+    fn only_the_turn_has_a_torque(case in strip_case(100.0)) {
+        let turn = SkinStripTurn::eval(&case.x.x, &case.turn_params());
+        let [scan, image] = [&case.scan.x, &case.x.x].map(|x| case.image(x));
+        prop_assume!(scan.cross(&image).norm() > 0.1 * scan.norm() * image.norm() && turn.c > 0.0);
+        prop_assert!(torque_error(&turn.grad, &case.x) > 1e-4);
     }
 
     /// Where nothing is amplified, the paper form is the plain area constraint.

@@ -1,6 +1,9 @@
 //! Each SIMD lane has the bits of a scalar evaluation, independent of the other lanes.
 
-use cutis_constraints::{Constraint, Distance, Params, Real, Scalar, SkinTension, SkinTensionPaper, Volume};
+use cutis_constraints::{
+    Constraint, Distance, Params, Real, Scalar, SkinStrip, SkinStripAtRest, SkinStripTurn, SkinTension,
+    SkinTensionPaper, Volume,
+};
 use nalgebra::{Point3, SimdValue};
 use simba::simd::{AutoF32x8, WideF32x4, WideF32x8, WideF64x4};
 
@@ -31,7 +34,8 @@ fn bits<S: Scalar>(c: S, grad: impl IntoIterator<Item = S>) -> Vec<u64> {
     numbers.into_iter().map(f64::to_bits).collect()
 }
 
-fn check<const N: usize, C, L, S>(params: &[f64])
+/// `params` gives the parameters for a rest size.
+fn check<const N: usize, C, L, S>(dimension: i32, params: &impl Fn(f64) -> Vec<f64>)
 where
     C: Constraint<N>,
     S: Scalar,
@@ -49,9 +53,8 @@ where
         let scalar_params: Vec<C::Params<S>> = (0..L::LANES)
             .map(|lane| {
                 let scale = SCALES[(round * L::LANES + lane) % 3];
-                let dimension = [0, 0, 1, 2, 3][N];
-                let rest = factors[lane] * f64::powi(scale, dimension);
-                Params::from_fn(|k| S::constant(if k == 0 { rest } else { params[k] }))
+                let params = params(factors[lane] * f64::powi(scale, dimension));
+                Params::from_fn(|k| S::constant(params[k]))
             })
             .collect();
 
@@ -90,17 +93,21 @@ where
     assert!(equal_to_next < ROUNDS * L::LANES / 10, "{equal_to_next}");
 }
 
-fn check_types<const N: usize, C: Constraint<N>>(params: &[f64]) {
-    check::<N, C, WideF32x8, f32>(params);
-    check::<N, C, WideF32x4, f32>(params);
-    check::<N, C, AutoF32x8, f32>(params);
-    check::<N, C, WideF64x4, f64>(params);
+fn check_types<const N: usize, C: Constraint<N>>(dimension: i32, params: impl Fn(f64) -> Vec<f64>) {
+    check::<N, C, WideF32x8, f32>(dimension, &params);
+    check::<N, C, WideF32x4, f32>(dimension, &params);
+    check::<N, C, AutoF32x8, f32>(dimension, &params);
+    check::<N, C, WideF64x4, f64>(dimension, &params);
 }
 
 #[test]
 fn lanes_equal_scalars_bit_for_bit() {
-    check_types::<2, Distance>(&[0.0]);
-    check_types::<4, Volume>(&[0.0]);
-    check_types::<3, SkinTension>(&[0.0, 5.0]);
-    check_types::<3, SkinTensionPaper>(&[0.0, 5.0, 3.0]);
+    check_types::<2, Distance>(1, |rest| vec![rest]);
+    check_types::<4, Volume>(3, |rest| vec![rest]);
+    check_types::<3, SkinTension>(2, |rest| vec![rest, 5.0]);
+    check_types::<3, SkinTensionPaper>(2, |rest| vec![rest, 5.0, 3.0]);
+    let strip = |rest: f64| vec![1.0, -0.4, 0.7 * rest, rest, 3.0, 0.25];
+    check_types::<3, SkinStrip>(1, strip);
+    check_types::<3, SkinStripAtRest>(1, strip);
+    check_types::<3, SkinStripTurn>(1, |rest| vec![1.0, -0.4, rest, 0.2 * rest, -0.3 * rest, 0.3 * rest]);
 }

@@ -1,8 +1,10 @@
 //! Compliances: their formulas, their independence of the mesh, and the refused values.
 
 use cutis_constraints::{
-    MaterialError, SkinTensionPaperMaterial, distance_compliance, skin_compliance, volume_compliance,
+    MaterialError, SkinStripLaw, SkinStripMaterial, SkinTensionPaperMaterial, distance_compliance,
+    skin_compliance, skin_strip_compliance, volume_compliance,
 };
+use nalgebra::Point3;
 
 fn near(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-14 * b.abs()
@@ -84,4 +86,84 @@ fn the_paper_form_refuses_invalid_values() {
         let error = SkinTensionPaperMaterial::for_stiffness(bad, 0.9, 1.0).unwrap_err();
         assert!(matches!(error, MaterialError::StiffnessOutOfRange { .. }));
     }
+}
+
+const LAW: SkinStripLaw =
+    SkinStripLaw { tension_n_per_m: 8.0, modulus_n_per_m: 50.0, stiffening: 2.0, compression: 0.5 };
+const UP: [f64; 3] = [0.0, 0.0, 1.0];
+
+#[test]
+fn a_strip_refuses_invalid_laws() {
+    let refused = |law: SkinStripLaw| SkinStripMaterial::new(UP, [1.0, 0.0, 0.0], law).unwrap_err();
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(
+            refused(SkinStripLaw { tension_n_per_m: bad, ..LAW }),
+            MaterialError::Negative { .. }
+        ));
+        assert!(matches!(refused(SkinStripLaw { stiffening: bad, ..LAW }), MaterialError::Negative { .. }));
+    }
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = refused(SkinStripLaw { modulus_n_per_m: bad, ..LAW });
+        assert!(matches!(error, MaterialError::NotPositive { .. }), "{error}");
+    }
+    for bad in [-0.1, 1.1, f64::NAN] {
+        let error = refused(SkinStripLaw { compression: bad, ..LAW });
+        assert!(matches!(error, MaterialError::CompressionOutOfRange { .. }), "{error}");
+    }
+    let error = refused(SkinStripLaw { tension_n_per_m: 50.0, ..LAW });
+    assert!(
+        error.to_string().contains("50 N/m") && error.to_string().ends_with("below the modulus"),
+        "{error}"
+    );
+    for tension_n_per_m in [0.0, 49.999] {
+        SkinStripLaw { tension_n_per_m, ..LAW }.check().unwrap();
+    }
+}
+
+#[test]
+fn a_strip_refuses_invalid_directions() {
+    for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
+        for error in [SkinStripMaterial::new(bad, UP, LAW), SkinStripMaterial::new(UP, bad, LAW)] {
+            assert!(matches!(error, Err(MaterialError::NotADirection { .. })), "{error:?}");
+        }
+    }
+    let error = SkinStripMaterial::new(UP, [1e-9, 0.0, -2.0], LAW).unwrap_err();
+    assert!(matches!(error, MaterialError::AlongNormal { .. }), "{error}");
+    for length in [1e-200, 1e200] {
+        let strip = SkinStripMaterial::new(UP.map(|v| v * length), [length, 0.0, length], LAW).unwrap();
+        assert_eq!(
+            (strip.normal().as_slice(), strip.direction().as_slice()),
+            (&UP[..], &[1.0, 0.0, 0.0][..])
+        );
+    }
+}
+
+/// Triangles that face inwards or are seen from the edge are errors, with a share that says so.
+#[test]
+fn a_strip_refuses_triangles_that_do_not_face_the_normal() {
+    let strip = SkinStripMaterial::new(UP, [1.0, 0.0, 0.0], LAW).unwrap();
+    let facing = |cosine: f64| {
+        let sine = (1.0 - cosine * cosine).sqrt();
+        strip.compliance(&[[0.0, 0.0, 0.0], [cosine, 0.0, sine], [0.0, 1.0, 0.0]].map(Point3::from))
+    };
+    for cosine in [1.0, 0.5, 0.06] {
+        facing(cosine).unwrap();
+    }
+    for cosine in [0.04, 0.0, -0.5] {
+        let Err(MaterialError::NotFacing { share, least }) = facing(cosine) else { panic!("{cosine}") };
+        assert!((share - cosine).abs() < 1e-12 && least == SkinStripMaterial::LEAST_FACING);
+    }
+    let flat = strip.shape(&[Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(2.0, 0.0, 0.0)]);
+    assert!(matches!(flat, Err(MaterialError::NotPositive { .. })), "{flat:?}");
+}
+
+/// Strips that cover the same skin are as stiff together as one.
+#[test]
+fn strips_side_by_side_are_as_stiff_as_one() {
+    let whole = skin_strip_compliance(0.02, 3e-4, 50.0).unwrap();
+    assert!(near(whole, 0.02 * 0.02 / (50.0 * 3e-4)));
+    let narrow = skin_strip_compliance(0.02, 1e-4, 50.0).unwrap();
+    assert!(near(narrow / 3.0, whole));
+    assert!(skin_strip_compliance(1e200, 1e-200, 1.0).is_err());
+    assert!(skin_strip_compliance(0.0, 1.0, 1.0).is_err());
 }

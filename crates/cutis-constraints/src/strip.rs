@@ -1,0 +1,98 @@
+//! The image of a direction of the skin in a triangle, shared by the three kinds of strips.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::{Real, SkinStripMaterial};
+
+/// Weights of a strip on a triangle at rest, and their scale.
+pub(crate) struct Weights<T> {
+    /// Weights of the first two vertices, without unit. The third weight is `−B1 − B2`. The largest
+    /// of the three has the magnitude 1, or all are 0 if the triangle has no extent across the
+    /// strip.
+    pub b: [T; 2],
+    /// The extent of the triangle across the strip, in m: the largest `|m·(x_i − x_j)|`.
+    pub width: T,
+    /// Twice the area of the triangle seen along the normal, in m². Negative if it faces inwards.
+    pub twice_area: T,
+}
+
+impl<T: Real> Weights<T> {
+    /// Returns the weights for the direction and the normal of `material`.
+    pub fn of([x1, x2, x3]: &[Point3<T>; 3], material: &SkinStripMaterial) -> Self {
+        let normal = material.normal().map(T::constant);
+        let across = material.direction().cross(material.normal()).map(T::constant);
+        let [w1, w2, w3] = [x3 - x2, x1 - x3, x2 - x1].map(|edge| across.dot(&edge));
+        let width = w1.simd_abs().simd_max(w2.simd_abs()).simd_max(w3.simd_abs());
+        let inverse = (T::one() / width).select(width.simd_gt(T::zero()), T::zero());
+        let twice_area = normal.dot(&(x2 - x1).cross(&(x3 - x1)));
+        Self { b: [w1 * inverse, w2 * inverse], width, twice_area }
+    }
+}
+
+/// The parameters that the kinds of strips have in common.
+pub(crate) struct Rest<T> {
+    /// Weights of the first two vertices.
+    pub b: [T; 2],
+    /// `F0`, the image of the direction in the scan, in m.
+    pub image: Vector3<T>,
+    /// `L0 = |F0|` in m.
+    pub length: T,
+    /// `t0 = L0 τ/k`: how far the strip is stretched in the scan, in m.
+    pub stretch: T,
+    /// `β G`, the stiffening per relative stretch of the image.
+    pub stiffening: T,
+}
+
+impl<T: Real> Rest<T> {
+    /// Returns the parameters of a strip with the shape `x` in the scan.
+    pub fn of(x: &[Point3<T>; 3], material: &SkinStripMaterial) -> Self {
+        let Weights { b, width, twice_area } = Weights::of(x, material);
+        let image = image(x, b);
+        let length = length(&image);
+        let law = material.law();
+        // g0 = L0/ℓ with ℓ = 2A_p/width. A triangle seen from its edge has an infinite g0.
+        let steepness = length * width / twice_area.simd_abs();
+        let steepest = T::constant(SkinStripMaterial::STEEPEST);
+        let limited = steepness.select(steepness.simd_lt(steepest), steepest);
+        let gain = limited * limited;
+        let tension = T::constant(law.tension_n_per_m);
+        let stiffness = T::constant(law.modulus_n_per_m - law.tension_n_per_m) * gain + tension;
+        let stretch = length * (tension / stiffness);
+        Self { b, image, length, stretch, stiffening: T::constant(law.stiffening) * gain }
+    }
+}
+
+/// Returns the image `F = Σ B_i x_i` in m.
+#[inline(always)]
+pub(crate) fn image<T: Real>([x1, x2, x3]: &[Point3<T>; 3], [b1, b2]: [T; 2]) -> Vector3<T> {
+    (x1 - x3) * b1 + (x2 - x3) * b2
+}
+
+/// Returns the length of a vector.
+#[inline(always)]
+pub(crate) fn length<T: Real>(vector: &Vector3<T>) -> T {
+    vector.dot(vector).simd_sqrt()
+}
+
+/// Returns `1/x`, or 0 unless `x` is above 0.
+#[inline(always)]
+pub(crate) fn inverse_or_zero<T: Real>(x: T) -> T {
+    (T::one() / x).select(x.simd_gt(T::zero()), T::zero())
+}
+
+/// Returns `1/r²` for a reach `r` of four times the larger of the present and the scan's length.
+///
+/// A vertex of a triangle may have a tiny weight. If the others are fixed, a projection without a
+/// limit would throw it far away. The limit never shortens the projection of a triangle whose
+/// vertices are all free.
+#[inline(always)]
+pub(crate) fn inverse_reach_squared<T: Real>(length: T, scan_length: T) -> T {
+    let size = length.simd_max(scan_length);
+    inverse_or_zero(size * size) * T::constant(1.0 / 16.0)
+}
+
+/// Returns the gradients at the vertices, `B_i` times the gradient with respect to `F`.
+#[inline(always)]
+pub(crate) fn gradients<T: Real>(of_image: Vector3<T>, [b1, b2]: [T; 2]) -> [Vector3<T>; 3] {
+    [of_image * b1, of_image * b2, of_image * -(b1 + b2)]
+}
