@@ -1,0 +1,9 @@
+//! Tests of the fields on skins, against closed forms and brute force.
+
+mod depth;
+mod directions;
+mod normals;
+mod real_data;
+mod shapes;
+mod strokes;
+mod threads;
