@@ -22,6 +22,13 @@ bulk_modulus_pa = 1e5
 [constraints.stc]
 area_modulus_n_per_m = 50
 near_incision = { radius_mm = 10 }
+[constraints.membrane]
+preset = "arm"
+tension_along_n_per_m = 0
+tension_across_n_per_m = 0
+modulus_along_n_per_m = 50
+modulus_across_n_per_m = 30
+directions = { along = [0, 0, 1] }
 [chainmail]
 materials = [{ from_hu = -1024, shortest = 0.5, longest = 1.5, shear = 0.5 }]
 [fixed]
@@ -134,6 +141,8 @@ fn numbers_out_of_range_are_refused() {
         "constraints.volume.bulk_modulus_pa",
         "constraints.stc.area_modulus_n_per_m",
         "constraints.stc.rest_area_scale",
+        "constraints.membrane.modulus_along_n_per_m",
+        "constraints.membrane.modulus_across_n_per_m",
         "constraints.stc.near_incision.radius_mm",
         "constraints.stc.near_incision.rest_area_factor",
         "constraints.stc.near_incision.stiffness_factor",
@@ -143,10 +152,21 @@ fn numbers_out_of_range_are_refused() {
         "handle.0.over_s",
         "solver.dt_s",
     ];
-    let shares =
-        ["constraints.distance.stiffness", "constraints.volume.stiffness", "constraints.stc.stiffness"];
+    let shares = [
+        "constraints.distance.stiffness",
+        "constraints.volume.stiffness",
+        "constraints.stc.stiffness",
+        "constraints.membrane.stiffness",
+        "constraints.membrane.compression",
+    ];
     let others = [
         ("constraints.stc.amplification", "-0.5"),
+        ("constraints.membrane.preset", "nose"),
+        ("constraints.membrane.stiffening", "-1"),
+        ("constraints.membrane.tension_along_n_per_m", "-1"),
+        ("constraints.membrane.tension_along_n_per_m", "50"),
+        ("constraints.membrane.tension_across_n_per_m", "30.5"),
+        ("constraints.membrane.directions.along", "[0, 0, 0]"),
         ("solver.damping_per_s", "-1"),
         ("solver.substeps", "0"),
         ("solver.iterations", "0"),
@@ -191,12 +211,18 @@ fn numbers_out_of_range_are_refused() {
 
 #[test]
 fn contradicting_values_are_refused() {
-    let cases: [(&[(&str, &str)], &str); 6] = [
+    let cases: [(&[(&str, &str)], &str); 9] = [
         (&[("volume.path", "ct.nii")], "volume"),
         (&[("volume", "{}")], "volume"),
         (&[("volume", "{ path = \"\" }")], "volume.path"),
         (&[("lattice", "{ spacing_mm = 2.0, vertices = [8, 8, 8] }")], "lattice"),
         (&[("constraints.stc.form", "paper")], "constraints.stc.form"),
+        (&[("constraints.membrane", "{ tension_along_n_per_m = 8 }")], "constraints.membrane"),
+        (
+            &[("constraints.membrane.directions", "{ along = [0, 0, 1], around = [0, 0, 1] }")],
+            "constraints.membrane.directions",
+        ),
+        (&[("constraints.membrane.directions", "{}")], "constraints.membrane.directions"),
         (
             &[
                 ("solver.formulation", "pbd"),

@@ -2,6 +2,7 @@
 //! answers.
 
 mod accuracy;
+mod at_rest;
 mod bad_scenes;
 mod bad_values;
 mod chainmail;
@@ -11,6 +12,7 @@ mod identity;
 mod left_out;
 mod outputs;
 mod paper_form;
+mod patch;
 mod problems;
 mod random_scenes;
 mod region;

@@ -51,8 +51,8 @@ pub struct Removed {
     pub tets: Vec<[u32; 4]>,
     /// Removed edges, in mesh vertices.
     pub edges: Vec<[u32; 2]>,
-    /// Number of removed skin triangles.
-    pub triangles: usize,
+    /// Removed skin triangles, in mesh vertices, in the order of the uncut skin.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 const EDGES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
@@ -98,7 +98,6 @@ impl Cut {
                 }
             }
         }
-        let faces = triangles.len();
         let mut edges = Vec::new();
         mesh.edges.retain(|edge| {
             let stays = !edge.iter().all(|&v| self.near[v as usize]) || held.contains(edge);
@@ -110,8 +109,10 @@ impl Cut {
         let removed = mesh.tets.iter().zip(&kept).filter(|(_, kept)| !**kept).map(|(tet, _)| *tet).collect();
         let mut stays = kept.iter();
         mesh.tets.retain(|_| stays.next() != Some(&false));
-        triangles.retain(|triangle| !self.cuts(&mesh.positions, triangle));
-        Removed { tets: removed, edges, triangles: faces - triangles.len() }
+        let skin = std::mem::take(triangles);
+        let (cut, kept) = skin.into_iter().partition(|triangle| self.cuts(&mesh.positions, triangle));
+        *triangles = kept;
+        Removed { tets: removed, edges, triangles: cut }
     }
 
     /// Distance in mm from a rest position (local meters) to the nearest slit. Infinite without

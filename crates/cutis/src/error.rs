@@ -10,6 +10,7 @@ use cutis_gpu::GpuError;
 use cutis_mesh::MeshError;
 use cutis_render::RenderError;
 use cutis_resample::ResampleError;
+use cutis_skin::SkinError;
 use cutis_solver::SolverError;
 use cutis_solver_cpu::CpuError;
 use cutis_volume::VolumeError;
@@ -81,6 +82,9 @@ pub enum Error {
     /// An error of a material parameter.
     #[error(transparent)]
     Material(#[from] MaterialError),
+    /// An error of the skin's normals and directions, or of a file of strokes.
+    #[error(transparent)]
+    Skin(#[from] SkinError),
     /// An error of the grouping of constraints.
     #[error(transparent)]
     Coloring(#[from] ColoringError),
@@ -162,6 +166,7 @@ impl Error {
             | Self::Backend { .. }
             | Self::Checkpoint { .. }
             | Self::Material(_)
+            | Self::Skin(_)
             | Self::Chain(_)
             | Self::Coloring(_) => true,
             Self::SceneSection { source, .. } => source.is_bad_input(),

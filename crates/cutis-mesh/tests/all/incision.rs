@@ -67,7 +67,7 @@ fn a_cut_removes_the_vertices_in_the_slit() {
         let removed = cut.apply(&mut opened, &mut skin);
         assert_eq!(opened.tets.len() + removed.tets.len(), mesh.tets.len());
         assert_eq!(opened.edges.len() + removed.edges.len(), mesh.edges.len());
-        assert_eq!(skin.len() + removed.triangles, triangles.len());
+        assert_eq!(skin.len() + removed.triangles.len(), triangles.len());
         let is_removed = |v: &u32| cut.removed[*v as usize];
         assert!(
             !opened.tets.iter().flatten().any(is_removed) && !opened.edges.iter().flatten().any(is_removed)

@@ -4,7 +4,7 @@ use cutis_mesh::{Cut, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask
 use cutis_volume::{TableKind, Volume};
 
 use super::lattice::lattice;
-use super::{Body, BodySections, air, handles, region};
+use super::{Body, BodySections, Membrane, air, handles, region};
 use crate::Error;
 use crate::scene::Keep;
 
@@ -26,6 +26,10 @@ impl Body {
         let skin: Vec<[u32; 3]> = skin.unwrap_or_default();
         let incisions: Vec<Incision> = incisions.iter().map(Incision::from).collect();
         let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(file.blame("incision"))?;
+        let membrane = sections
+            .membrane
+            .map(|section| Membrane::find(file, &whole, &hu, &skin, &section.directions(file)?));
+        let membrane = membrane.transpose()?;
         let mut mesh = region::mesh(sections, &whole, &hu, &slits)?;
         let (mut skin, inactive_skin) = mesh.divide_skin(&skin);
         let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
@@ -46,6 +50,7 @@ impl Body {
             skin_report,
             cut,
             removed,
+            membrane,
             grabbed,
             masses,
             air,

@@ -5,6 +5,7 @@ mod find_skin;
 mod fixed;
 mod handles;
 mod lattice;
+mod membrane;
 mod region;
 mod sections;
 
@@ -17,6 +18,7 @@ pub use find_skin::{SkinRequest, find_skin};
 pub(crate) use lattice::even_shape;
 #[cfg(test)]
 pub(crate) use lattice::lattice;
+pub(crate) use membrane::{Membrane, Tangent};
 pub(crate) use sections::{BodySections, needs_skin};
 
 /// HU below which a lattice point is air, unless a scene says otherwise: the HU at which opacity
@@ -43,6 +45,8 @@ pub(crate) struct Body {
     pub(crate) cut: Cut,
     /// The elements that the incisions removed.
     pub(crate) removed: Removed,
+    /// Normals and directions of the skin; none if the scene has no constraint that needs them.
+    pub(crate) membrane: Option<Membrane>,
     /// Vertices that each handle of the scene grabs, in ascending order.
     pub(crate) grabbed: Vec<Vec<u32>>,
     /// Lumped masses before the cut, kg.

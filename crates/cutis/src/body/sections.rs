@@ -3,7 +3,8 @@
 use cutis_mesh::{Incision, SkinMode};
 
 use crate::scene::{
-    HandleSection, IncisionSection, LatticeSection, LoadedScene, Scene, SceneFile, TissueSection,
+    HandleSection, IncisionSection, LatticeSection, LoadedScene, MembraneSection, Scene, SceneFile,
+    TissueSection,
 };
 
 /// The sections of a scene that a body is built from.
@@ -14,6 +15,8 @@ pub(crate) struct BodySections<'a> {
     pub(crate) tissue: &'a TissueSection,
     /// Rule by which the skin is found; none if the scene does not need the skin.
     pub(crate) skin: Option<SkinMode>,
+    /// The membrane that needs normals and directions of the skin; none if the scene has none.
+    pub(crate) membrane: Option<&'a MembraneSection>,
     pub(crate) incisions: &'a [IncisionSection],
     pub(crate) handles: &'a [HandleSection],
 }
@@ -26,6 +29,7 @@ impl<'a> BodySections<'a> {
             lattice: &scene.lattice,
             tissue: &scene.tissue,
             skin: needs_skin(scene).then_some(scene.skin.mode),
+            membrane: scene.constraints.membrane.as_ref(),
             incisions: &scene.incision,
             handles: &scene.handle,
         }

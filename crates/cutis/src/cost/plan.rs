@@ -9,7 +9,8 @@ use super::{CostReport, left_out};
 use crate::backend::{Chosen, Request};
 use crate::body::Body;
 use crate::ct::source::Source;
-use crate::model::{ModelCosts, ModelInput};
+use crate::model::constraints::kinds::{ConstraintKind, KindRow, ScanTension};
+use crate::model::{ModelChoice, ModelCosts, ModelInput};
 use crate::output::report::{Backend, MemoryPart, Sizes, Stage};
 use crate::run::clock::Clock;
 use crate::run::prepare::{Prepared, prepare};
@@ -26,6 +27,9 @@ pub struct Plan {
     pub backend: Backend,
     /// Element counts.
     pub sizes: Sizes,
+    /// Tension of the skin in the scan, by constraint kind.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub tension: BTreeMap<String, ScanTension>,
     /// Colors per constraint kind; in vertex block descent only the colors of the vertices, as
     /// `descent`.
     pub colors: BTreeMap<String, usize>,
@@ -82,6 +86,7 @@ impl Plan {
         let plan = Self {
             backend: backend.report.clone(),
             sizes,
+            tension: tensions(scene),
             colors,
             costs: CostReport::of_memory(&memory, &device_memory, NO_DEVICE),
             memory,
@@ -94,6 +99,14 @@ impl Plan {
         };
         (plan, backend)
     }
+}
+
+/// The tension of the skin that the scene stands for, by constraint kind.
+fn tensions(scene: &Scene) -> BTreeMap<String, ScanTension> {
+    let of_kind =
+        |(row, kind): (&KindRow, &dyn ConstraintKind)| Some((row.key.to_owned(), kind.tension(scene)?));
+    let pbd = scene.model == ModelChoice::Pbd;
+    scene.constraints.named().filter(|_| pbd).filter_map(of_kind).collect()
 }
 
 /// Warning about an adapter that the scene names although it does not run on a GPU.

@@ -23,6 +23,7 @@ use crate::{CostReport, Error};
 
 pub use choice::ModelChoice;
 pub(crate) use choice::{build, fill_defaults, validate};
+pub use constraints::kinds::ScanTension;
 pub(crate) use costs::ModelCosts;
 pub(crate) use scene_system::needs_system;
 pub use scene_system::{SceneSystem, build_system};

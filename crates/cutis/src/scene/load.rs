@@ -140,12 +140,17 @@ impl Scene {
         })?;
         crate::model::fill_defaults(&mut scene);
         scene.validate(SceneFile(file))?;
-        let overridden = overrides.iter().any(|o| o.key == "volume.path");
-        if let Some(path) = scene.volume.path.as_mut()
-            && path.is_relative()
-            && !overridden
-        {
-            *path = directory.join(&*path);
+        // Paths in a scene start from its folder, and paths in an override from the present one.
+        let strokes =
+            scene.constraints.membrane.as_mut().and_then(|skin| skin.directions.as_mut()?.strokes.as_mut());
+        for (key, path) in [
+            ("volume.path", scene.volume.path.as_mut()),
+            ("constraints.membrane.directions.strokes", strokes),
+        ] {
+            let overridden = overrides.iter().any(|o| o.key == key);
+            if let Some(path) = path.filter(|path| path.is_relative() && !overridden) {
+                *path = directory.join(&*path);
+            }
         }
         Ok(LoadedScene { scene, file: file.into(), text: text.into() })
     }

@@ -24,8 +24,8 @@ pub use sections::*;
 pub use crate::model::ModelChoice;
 pub use crate::model::chainmail::section::*;
 pub use crate::model::constraints::kinds::{
-    ConstraintsSection, DistanceSection, NearIncisionSection, StcForm, StcSection, VolumeConstraintSection,
-    constraint_kinds,
+    ConstraintsSection, DistanceSection, MembraneDirections, MembraneSection, NearIncisionSection, StcForm,
+    StcSection, VolumeConstraintSection, constraint_kinds,
 };
 
 use schemars::JsonSchema;
@@ -38,6 +38,11 @@ pub struct Scene {
     /// Deformation model: position-based dynamics, or ChainMail.
     #[serde(default)]
     pub model: ModelChoice,
+    /// Whether the scan shows the body in equilibrium (`pbd`). If so, a constant load balances the
+    /// skin's tension and the weight of the uncut body, so that only a cut or a handle moves it. If
+    /// not, the body shrinks and sags from the first frame, as in the paper.
+    #[serde(default)]
+    pub scan_is_at_rest: bool,
     /// Where the CT comes from.
     pub volume: VolumeSection,
     /// The tetrahedral lattice laid over the volume. Left out: one vertex on every voxel center.

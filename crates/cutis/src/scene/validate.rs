@@ -34,7 +34,7 @@ impl Check<'_> {
         self.require(value.is_finite(), key, value, "must be a finite HU value")
     }
 
-    fn point(&self, key: &str, value: [f64; 3]) -> Result<(), Error> {
+    pub(crate) fn point(&self, key: &str, value: [f64; 3]) -> Result<(), Error> {
         let finite = value.iter().all(|v| v.is_finite());
         self.require(finite, key, format!("{value:?}"), "must be three finite numbers")
     }

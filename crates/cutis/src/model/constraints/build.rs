@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use cutis_coloring::Groups;
-use cutis_solver::{Formulation, Handle, Settings, SystemBuilder};
+use cutis_solver::{Formulation, Handle, Settings, System, SystemBuilder};
 use nalgebra::Vector3;
 
 use super::ConstraintModel;
 use super::kinds::BodyParts;
 use crate::Error;
 use crate::model::ModelInput;
-use crate::scene::SolverSection;
+use crate::scene::{Scene, SolverSection};
 
 impl SolverSection {
     /// The solver settings that the section describes.
@@ -27,6 +27,21 @@ impl SolverSection {
     }
 }
 
+/// The solver settings of a scene. In a scan at rest a constant load balances the weight, so that
+/// gravity moves nothing.
+pub(crate) fn settings(scene: &Scene) -> Settings {
+    let settings = scene.solver.settings();
+    if scene.scan_is_at_rest { Settings { gravity_m_s2: [0.0; 3], ..settings } } else { settings }
+}
+
+/// Adds the load that balances the forces of all constraints in the scan, for vertex block descent.
+/// The constraints of the other formulations hold the scan by themselves.
+fn hold(system: &System<f32>, loads: &mut [Vector3<f32>]) -> Result<(), Error> {
+    let forces = system.constraint_forces()?;
+    loads.iter_mut().zip(forces).for_each(|(load, force)| *load -= force);
+    Ok(())
+}
+
 impl ConstraintModel {
     /// Builds the parts that the scene names and no others.
     ///
@@ -41,16 +56,21 @@ impl ConstraintModel {
         let parts = BodyParts {
             file,
             solver: &scene.solver,
+            at_rest: scene.scan_is_at_rest,
             body,
             inverse_masses: &inverse_masses,
             nothing_fixed: scene.fixed == Default::default(),
         };
         let (mut colors, mut warnings) = (BTreeMap::new(), Vec::new());
+        let mut loads = vec![Vector3::zeros(); body.mesh.positions.len()];
         for (row, kind) in scene.constraints.named() {
             let section = format!("constraints.{}", row.key);
             let number;
             (builder, number) = kind.add(builder, &parts).map_err(file.blame(&section))?;
             colors.insert(row.key.to_owned(), number);
+            if scene.scan_is_at_rest {
+                kind.add_loads(&parts, &mut loads).map_err(file.blame(&section))?;
+            }
             warnings.extend(kind.warnings(&parts));
         }
         if scene.solver.formulation == Formulation::Vbd {
@@ -61,6 +81,13 @@ impl ConstraintModel {
             let handle = Handle { vertices: grabbed.clone(), move_m, over_s: handle.over_s };
             builder = builder.handle(handle).map_err(file.blame(&format!("handle[{n}]")))?;
         }
-        Ok(Self { system: builder.build(), settings: scene.solver.settings(), colors, warnings })
+        let mut loads: Vec<Vector3<f32>> =
+            loads.iter().map(|load| load.map(|newton| newton as f32)).collect();
+        let mut system = builder.build();
+        if scene.scan_is_at_rest && scene.solver.formulation == Formulation::Vbd {
+            hold(&system, &mut loads)?;
+        }
+        system.set_loads(&loads)?;
+        Ok(Self { system, settings: settings(scene), colors, warnings })
     }
 }

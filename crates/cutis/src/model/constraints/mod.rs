@@ -115,6 +115,13 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
             scene.constraints == Default::default(),
             "no constraint kind is named: nothing holds the tissue together",
         ),
-        (nothing_fixed && gravity, "gravity acts and nothing is fixed: the body will fall"),
+        (
+            nothing_fixed && gravity && !scene.scan_is_at_rest,
+            "gravity acts and nothing is fixed: the body will fall",
+        ),
+        (
+            gravity && scene.scan_is_at_rest,
+            "solver.gravity_m_s2 moves nothing: the scan is at rest under its weight (scan_is_at_rest)",
+        ),
     ])
 }

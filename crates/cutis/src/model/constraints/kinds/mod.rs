@@ -5,15 +5,19 @@
 //! scene format, the plan, the reports, `--without` and `cutis tune` follow from the row.
 
 mod distance;
+mod freed;
+mod membrane;
+mod membrane_presets;
 mod skin_tension;
 mod tet_volume;
 
 use cutis_solver::{Formulation, Stiffness, SystemBuilder, Values};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use distance::DistanceSection;
+pub use membrane::{MembraneDirections, MembraneSection};
 pub use skin_tension::{NearIncisionSection, StcForm, StcSection};
 pub use tet_volume::VolumeConstraintSection;
 
@@ -54,8 +58,10 @@ constraint_kinds! {
     distance: DistanceSection,
     /// Volumes of the tetrahedra.
     volume: VolumeConstraintSection,
-    /// Skin tension over the skin triangles.
+    /// Skin tension over the skin triangles, by their area (the paper's form).
     stc: StcSection,
+    /// The skin as a membrane with tension and modulus along and across its lines.
+    membrane: MembraneSection,
 }
 
 /// One row of the table of constraint kinds.
@@ -98,16 +104,46 @@ pub(crate) trait ConstraintKind {
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error>;
 
+    /// Adds to `loads` (N, one per vertex) the load that a scan at rest needs beyond what the
+    /// constraints of [`add`](Self::add) hold by themselves: the negative of the force that the
+    /// elements removed by incisions had in the scan.
+    ///
+    /// # Errors
+    /// The errors of [`add`](Self::add).
+    fn add_loads(&self, _parts: &BodyParts<'_>, _loads: &mut [Vector3<f64>]) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// The tension of the skin in the scan that the section stands for; none if it has none, or if
+    /// the formulation of the scene knows no forces.
+    fn tension(&self, _scene: &Scene) -> Option<ScanTension> {
+        None
+    }
+
     /// Warnings about this kind in this body.
     fn warnings(&self, _parts: &BodyParts<'_>) -> Vec<String> {
         Vec::new()
     }
 }
 
+/// Tension of the skin in the scan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ScanTension {
+    /// Tension along the lines of the skin, N/m.
+    pub along_n_per_m: f64,
+    /// Tension across the lines of the skin, N/m.
+    pub across_n_per_m: f64,
+    /// Range and source of a preset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+}
+
 /// The inputs from which a constraint kind is built.
 pub(crate) struct BodyParts<'a> {
     pub(crate) file: SceneFile<'a>,
     pub(crate) solver: &'a SolverSection,
+    /// Whether the scan shows the body in equilibrium.
+    pub(crate) at_rest: bool,
     pub(crate) body: &'a Body,
     /// Inverse mass of each vertex, 1/kg; 0 for a vertex that does not move.
     pub(crate) inverse_masses: &'a [f32],

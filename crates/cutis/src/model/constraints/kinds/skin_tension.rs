@@ -11,7 +11,8 @@ use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
+use super::freed::Strength;
+use super::{BodyParts, ConstraintKind, KindFacts, ScanTension, compliances, one};
 use crate::Error;
 use crate::scene::validate::Check;
 use crate::scene::{Scene, SolverSection, TableChoice};
@@ -99,11 +100,11 @@ impl StcSection {
         counts: |body| [body.skin.len(), body.inactive_skin.triangles.len()],
     };
 
-    /// Material of each skin triangle.
-    fn materials(&self, parts: &BodyParts<'_>) -> Result<Vec<TriangleMaterial>, Error> {
+    /// Material of each of some skin triangles, with the tension of the scene.
+    fn materials(&self, parts: &BodyParts<'_>, skin: &[[u32; 3]]) -> Result<Vec<TriangleMaterial>, Error> {
         let mesh = &parts.body.mesh;
         let table = self.stiffness_table.table(TableKind::Stiffness, parts.file, TABLE_KEY)?;
-        let materials = parts.body.skin.iter().map(|triangle| {
+        let materials = skin.iter().map(|triangle| {
             let mean_hu = triangle.iter().map(|&v| mesh.hu[v as usize]).sum::<f32>() / 3.0;
             let [rest_area_factor, stiffness_factor] = self.near_incision_factors(parts, triangle);
             TriangleMaterial {
@@ -118,6 +119,17 @@ impl StcSection {
                 bad.factor
             );
             return Err(parts.file.bad_key(TABLE_KEY, "", &why));
+        }
+        Ok(materials)
+    }
+
+    /// Material of each triangle of the cut skin. In a scan at rest these triangles have the area
+    /// of the scan as their rest area: their tension is balanced, and what a cut sets free is a
+    /// load.
+    fn kept_materials(&self, parts: &BodyParts<'_>) -> Result<Vec<TriangleMaterial>, Error> {
+        let mut materials = self.materials(parts, &parts.body.skin)?;
+        if parts.at_rest {
+            materials.iter_mut().for_each(|material| material.rest_area_scale = 1.0);
         }
         Ok(materials)
     }
@@ -143,7 +155,7 @@ impl StcSection {
         parts: &BodyParts<'_>,
         groups: &Groups,
     ) -> Result<SystemBuilder<f32>, Error> {
-        let (skin, materials) = (&parts.body.skin, self.materials(parts)?);
+        let (skin, materials) = (&parts.body.skin, self.kept_materials(parts)?);
         let params: Vec<_> = skin
             .iter()
             .zip(&materials)
@@ -172,7 +184,7 @@ impl StcSection {
         parts: &BodyParts<'_>,
         groups: &Groups,
     ) -> Result<SystemBuilder<f32>, Error> {
-        let (skin, materials) = (&parts.body.skin, self.materials(parts)?);
+        let (skin, materials) = (&parts.body.skin, self.kept_materials(parts)?);
         let params: Result<Vec<_>, Error> = skin
             .iter()
             .zip(&materials)
@@ -186,6 +198,34 @@ impl StcSection {
             })
             .collect();
         Ok(builder.add::<SkinTensionPaper, 3>(skin, &params?, self.shares(&materials), groups)?)
+    }
+
+    /// Load at each corner of a triangle that an incision removed, N.
+    fn freed_load(
+        &self,
+        parts: &BodyParts<'_>,
+        triangle: &[u32; 3],
+        material: &TriangleMaterial,
+    ) -> Result<[Vector3<f64>; 3], Error> {
+        let x = triangle.map(|v| parts.position(v));
+        let TriangleMaterial { rest_area_scale, factor } = *material;
+        let rest = SkinTensionMaterial { rest_area_scale, amplification: self.amplification };
+        let params = SkinTension::from_rest(&x, &rest);
+        if parts.compliant() {
+            let modulus = self.area_modulus_n_per_m * factor;
+            let compliance =
+                cutis_constraints::skin_compliance(params[0], modulus).map_err(Error::Material)?;
+            let strength = Strength::Compliance(compliance);
+            return Ok(parts.freed_load::<SkinTension, 3>(triangle, &params, &strength));
+        }
+        let share = f64::from(self.share(material));
+        let strength = Strength::Pbd(share);
+        if self.form == StcForm::Energy {
+            return Ok(parts.freed_load::<SkinTension, 3>(triangle, &params, &strength));
+        }
+        let rest = SkinTensionPaperMaterial::for_stiffness(share, rest_area_scale, self.amplification)?;
+        let params = SkinTensionPaper::from_rest(&x, &rest);
+        Ok(parts.freed_load::<SkinTensionPaper, 3>(triangle, &params, &strength))
     }
 
     fn shares(&self, materials: &[TriangleMaterial]) -> Stiffness<f32> {
@@ -245,9 +285,28 @@ impl ConstraintKind for StcSection {
         Ok((builder, groups.len()))
     }
 
+    fn add_loads(&self, parts: &BodyParts<'_>, loads: &mut [Vector3<f64>]) -> Result<(), Error> {
+        let cut = &parts.body.removed.triangles;
+        for (triangle, material) in cut.iter().zip(self.materials(parts, cut)?) {
+            for (&v, load) in triangle.iter().zip(self.freed_load(parts, triangle, &material)?) {
+                loads[v as usize] += load;
+            }
+        }
+        Ok(())
+    }
+
+    /// `T s (1 + β s)` with `s = 1/scale − 1`: the derivative of the energy of a triangle by its
+    /// area.
+    fn tension(&self, scene: &Scene) -> Option<ScanTension> {
+        let stretch = 1.0 / self.rest_area_scale - 1.0;
+        let tension = self.area_modulus_n_per_m * stretch * (1.0 + self.amplification * stretch.max(0.0));
+        let forces = scene.solver.formulation != Formulation::Pbd;
+        forces.then_some(ScanTension { along_n_per_m: tension, across_n_per_m: tension, source: None })
+    }
+
     fn warnings(&self, parts: &BodyParts<'_>) -> Vec<String> {
         let mut warnings = Vec::new();
-        if parts.nothing_fixed {
+        if parts.nothing_fixed && !parts.at_rest {
             let warning = "skin tension acts and nothing is fixed: the whole body may shrink and drift";
             warnings.push(warning.to_owned());
         }

@@ -1,0 +1,145 @@
+//! The scan is at rest: an uncut body under full tension does not move, for any formulation and
+//! setting, and a cut moves what it sets free.
+
+use cutis::LoadedScene;
+use cutis_test_kit::gpu::{is_exact, on_each_adapter};
+
+use crate::gpu::run_on;
+use crate::identity::original;
+use crate::scenes::{Run, SMALL, scene};
+
+/// Constraints with the skin as a membrane in place of the area form.
+const MEMBRANE: (&str, &str) = (
+    "constraints",
+    "{ distance = { youngs_modulus_pa = 5e3 }, volume = { bulk_modulus_pa = 5e4 }, membrane = { preset = 'trunk' } }",
+);
+const UNCUT: (&str, &str) = ("incision", "[]");
+const REST: (&str, &str) = ("scan_is_at_rest", "true");
+const MOVES: (&str, &str) = ("scan_is_at_rest", "false");
+
+/// The uncut phantom on a coarse lattice.
+fn uncut(set: &[(&str, &str)]) -> LoadedScene {
+    let coarse =
+        [REST, ("lattice.spacing_mm", "20"), UNCUT, ("run.frames", "200"), ("output", "{ volume = true }")];
+    scene(SMALL, &[&coarse, set].concat())
+}
+
+/// Asserts that the run moved no vertex and changed no voxel.
+fn assert_still(set: &[(&str, &str)]) {
+    let run = Run::of(&uncut(set));
+    assert_eq!(run.report.max_displacement_mm, 0.0, "{set:?}");
+    assert!(run.deformed().voxels() == original().voxels(), "{set:?}: voxels differ");
+}
+
+/// The settings of the three formulations, from the fewest projections to many.
+fn settings() -> Vec<[(&'static str, &'static str); 3]> {
+    let setting = |formulation, [substeps, iterations]: [&'static str; 2]| {
+        [
+            ("solver.formulation", formulation),
+            ("solver.substeps", substeps),
+            ("solver.iterations", iterations),
+        ]
+    };
+    let sizes = [["1", "1"], ["3", "2"], ["20", "4"]];
+    let each = |formulation| sizes.map(|size| setting(formulation, size));
+    [each("pbd"), each("xpbd"), each("vbd")].concat()
+}
+
+#[test]
+fn an_uncut_membrane_does_not_move() {
+    settings().iter().for_each(|set| assert_still(&[&[MEMBRANE], &set[..]].concat()));
+}
+
+#[test]
+fn an_uncut_skin_of_the_area_form_does_not_move() {
+    settings().iter().for_each(|set| assert_still(set));
+    assert_still(&[("solver.formulation", "pbd"), ("constraints.stc.form", "paper")]);
+}
+
+/// Control: without the load the same bodies move by tenths of a millimeter or more.
+#[test]
+fn without_the_load_tension_moves_the_body() {
+    for set in settings().iter().filter(|set| set[1].1 == "3") {
+        for constraints in [&[][..], &[MEMBRANE]] {
+            // PBD knows no modulus: a full projection of every strip would crush the body.
+            let soft = ("constraints.membrane.stiffness", "0.1");
+            let soft: &[_] = if constraints.is_empty() { &[] } else { &[soft] };
+            let all = [constraints, soft, &set[..], &[MOVES, ("run.frames", "10")]].concat();
+            let moved = Run::of(&uncut(&all)).report.max_displacement_mm;
+            assert!(moved > 0.1, "{all:?}: {moved} mm");
+        }
+    }
+}
+
+#[test]
+fn an_uncut_body_does_not_move_in_a_region_or_on_a_graded_lattice() {
+    let zone = "{ min_mm = [-40, 40, -60], max_mm = [90, 200, 60] }";
+    for key in ["lattice.region", "lattice.grading"] {
+        for formulation in ["xpbd", "vbd"] {
+            assert_still(&[MEMBRANE, (key, zone), ("solver.formulation", formulation)]);
+        }
+    }
+}
+
+#[test]
+fn an_uncut_body_does_not_move_on_a_gpu() {
+    on_each_adapter(|gpu| {
+        for set in settings().iter().filter(|set| set[1].1 == "3") {
+            for constraints in [&[][..], &[MEMBRANE]] {
+                let all = [constraints, &set[..], &[("run.frames", "20")]].concat();
+                let folder = tempfile::tempdir().unwrap();
+                let moved = run_on(gpu, folder.path(), &uncut(&all), false).unwrap().max_displacement_mm;
+                let most = if is_exact(gpu) { 0.0 } else { 1e-3 };
+                assert!(moved <= most, "{all:?}: {moved} mm");
+            }
+        }
+    });
+}
+
+/// The load also balances the weight. Without it the body sags.
+#[test]
+fn weight_moves_nothing_in_a_scan_at_rest() {
+    let weight = ("solver.gravity_m_s2", "[0, -9.81, 0]");
+    assert_still(&[weight]);
+    let sagged = Run::of(&uncut(&[weight, MOVES, ("run.frames", "10")])).report.max_displacement_mm;
+    assert!(sagged > 0.1, "{sagged} mm");
+}
+
+/// In a scan at rest a cut opens, and the tissue far from it stays. Without the load the whole body
+/// shrinks.
+#[test]
+fn a_cut_moves_only_what_it_sets_free() {
+    let run = |set: &[(&str, &str)]| {
+        let own = [REST, MEMBRANE, ("output", "{ report = true }"), ("run.checkpoint_every", "40")];
+        Run::of(&scene(SMALL, &[&own, set].concat()))
+    };
+    // Largest displacement of a vertex more than 120 mm from the middle of the cut, in mm.
+    let far = |run: &Run, rest: &Run| {
+        let center = nalgebra::Point3::new(0.03, 0.11, 0.0);
+        let pairs = rest.positions().into_iter().zip(run.positions());
+        let far = pairs.filter(|(rest, _)| (rest - center).norm() > 0.12);
+        far.map(|(rest, now)| (now - rest).norm() * 1e3).fold(0.0_f32, f32::max)
+    };
+    let start = run(&[("constraints", "{}"), ("run.checkpoint_every", "1"), ("run.frames", "1")]);
+    let firm = [
+        ("solver.formulation", "vbd"),
+        ("constraints.distance.youngs_modulus_pa", "5e4"),
+        ("constraints.volume.bulk_modulus_pa", "5e5"),
+    ];
+    let at_rest = run(&firm);
+    let free = run(&[&firm[..], &[MOVES]].concat());
+    let opening = |run: &Run| {
+        let wound = run.report.wound.as_ref().unwrap();
+        wound.final_mm - wound.initial_mm
+    };
+    assert!(opening(&at_rest) > 3.0, "{} mm", opening(&at_rest));
+    let [still, moved] = [&at_rest, &free].map(|run| far(run, &start));
+    assert!(still < 0.3 * moved && moved > 0.5, "{still} mm with the load, {moved} mm without");
+}
+
+/// Old scenes have no key for the load and run as before.
+#[test]
+fn a_scan_is_at_rest_only_if_the_scene_says_so() {
+    assert!(!scene(SMALL, &[]).scene.scan_is_at_rest);
+    assert!(scene(SMALL, &[REST]).scene.scan_is_at_rest);
+}
