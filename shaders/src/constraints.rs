@@ -20,11 +20,15 @@ pub const SKIN_TENSION_PAPER: &str = concat!(
 pub const SKIN_STRIP: &str = concat!(
     include_str!("../wgsl/constraints/strip.wgsl"),
     "\n",
+    include_str!("../wgsl/constraints/strip_params.wgsl"),
+    "\n",
     include_str!("../wgsl/constraints/skin_strip.wgsl")
 );
 /// Source of `SkinStripAtRest`, with three vertices.
 pub const SKIN_STRIP_AT_REST: &str = concat!(
     include_str!("../wgsl/constraints/strip.wgsl"),
+    "\n",
+    include_str!("../wgsl/constraints/strip_params.wgsl"),
     "\n",
     include_str!("../wgsl/constraints/skin_strip_at_rest.wgsl")
 );

@@ -1,13 +1,4 @@
 // Skin strip: tension along a direction of the skin. The same operations as `SkinStrip::eval`.
-struct Params {
-    b1: f32,
-    b2: f32,
-    rest_length: f32,
-    scan_length: f32,
-    stiffening: f32,
-    compression: f32,
-}
-
 fn eval(x: array<vec3f, N>, p: Params) -> Eval {
     let image = strip_image(x, p.b1, p.b2);
     let length = sqrt(dot(image, image));
