@@ -124,8 +124,8 @@ fn the_memory_can_be_computed_without_a_device() {
         let parts = device_bytes(&system, &settings(&parts, iterations));
         parts.iter().map(|part| part.name).collect::<Vec<_>>()
     };
-    assert_eq!(names(1), ["vertices", "distance", "stc", "volume", "handles"]);
-    assert_eq!(names(2), ["vertices", "distance", "stc", "volume", "multipliers", "handles"]);
+    assert_eq!(names(1), ["vertices", "loads", "distance", "stc", "volume", "handles"]);
+    assert_eq!(names(2), ["vertices", "loads", "distance", "stc", "volume", "multipliers", "handles"]);
     let solver = SolverReference::new(system, settings(&parts, 1)).unwrap();
     assert_eq!(solver.bytes()[0].bytes, 12 * 9 * 7 * 40, "the host has another layout");
 }
