@@ -18,16 +18,24 @@ pub struct Contour<'a> {
     pub color: Rgb,
 }
 
+/// Returns an error if a triangle of a surface names a vertex that does not exist.
+pub(crate) fn check_corners(
+    contour: usize,
+    triangles: &[[u32; 3]],
+    vertices: usize,
+) -> Result<(), RenderError> {
+    let outside = |corners: &&[u32; 3]| corners.iter().any(|&v| v as usize >= vertices);
+    match triangles.iter().enumerate().find(|(_, corners)| outside(corners)) {
+        Some((triangle, &corners)) => {
+            Err(RenderError::VertexOutOfRange { contour, triangle, corners, vertices })
+        }
+        None => Ok(()),
+    }
+}
+
 impl Contour<'_> {
     pub(crate) fn validate(&self, contour: usize) -> Result<(), RenderError> {
-        let vertices = self.positions.len();
-        let outside = |corners: &&[u32; 3]| corners.iter().any(|&v| v as usize >= vertices);
-        match self.triangles.iter().enumerate().find(|(_, corners)| outside(corners)) {
-            Some((triangle, &corners)) => {
-                Err(RenderError::VertexOutOfRange { contour, triangle, corners, vertices })
-            }
-            None => Ok(()),
-        }
+        check_corners(contour, self.triangles, self.positions.len())
     }
 
     /// Segments in world mm where the surface meets the plane through `point` with the unit normal

@@ -45,6 +45,16 @@ pub enum RenderError {
         /// Number of vertices.
         vertices: usize,
     },
+    /// A field of directions does not have one value per triangle.
+    #[error("{array} has {found} values; expected {expected}, one per triangle")]
+    FieldLength {
+        /// Name of the array.
+        array: &'static str,
+        /// Number of triangles.
+        expected: usize,
+        /// Number of values.
+        found: usize,
+    },
     /// A picture could not be encoded or written.
     #[error("{path}: cannot write the picture: {source}")]
     Write {

@@ -1,4 +1,5 @@
-//! Headless pictures of CT volumes: the skin from any side, slices with contours, charts.
+//! Headless pictures of CT volumes: the skin from any side, lines of a field on it, slices with
+//! contours, charts.
 //!
 //! Everything runs on the CPU without a display and gives the same bits for any number of threads.
 //! With the feature `gpu`, `raymarch_gpu` draws the same surface pictures on a GPU, except for
@@ -35,6 +36,7 @@ mod font;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod image;
+mod lines;
 pub mod plot;
 mod raymarch;
 mod rays;
@@ -50,6 +52,7 @@ pub use error::RenderError;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuRaymarcher, raymarch_gpu};
 pub use image::{Image, Rgb};
+pub use lines::{LineField, draw_lines};
 pub use raymarch::raymarch;
 pub use side::{Axes, Side};
 pub use slice::{Plane, SliceView, slice};

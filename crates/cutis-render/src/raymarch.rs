@@ -33,8 +33,7 @@ pub fn raymarch(volume: &Volume, view: &View<'_>) -> Result<Image, RenderError> 
     let axes = Axes::new(view.side)?;
     let field = Field::new(volume);
     let rays = Rays::new(&field, view, &axes);
-    let blocks = Blocks::new(&field, view.threshold_hu);
-    let marcher = Marcher { field: &field, rays: &rays, blocks, threshold_hu: view.threshold_hu };
+    let marcher = Marcher::new(&field, &rays, view.threshold_hu);
     let shader = Shader::new(&field, view, &axes);
     let light = |&place: &[f64; 2]| {
         let hit = rays.through(place).and_then(|ray| marcher.cast(&ray));
@@ -48,16 +47,20 @@ pub fn raymarch(volume: &Volume, view: &View<'_>) -> Result<Image, RenderError> 
 }
 
 /// Finds the surface along rays.
-struct Marcher<'a> {
+pub struct Marcher<'a> {
     field: &'a Field<'a>,
     rays: &'a Rays<'a>,
     blocks: Blocks,
     threshold_hu: f32,
 }
 
-impl Marcher<'_> {
+impl<'a> Marcher<'a> {
+    pub fn new(field: &'a Field<'a>, rays: &'a Rays<'a>, threshold_hu: f32) -> Self {
+        Self { field, rays, blocks: Blocks::new(field, threshold_hu), threshold_hu }
+    }
+
     /// The first point of a ray at or above the threshold.
-    fn cast(&self, ray: &Ray) -> Option<Hit> {
+    pub fn cast(&self, ray: &Ray) -> Option<Hit> {
         let at = |n: f64| self.rays.at(ray, n);
         let mut n = 0.0;
         while n <= ray.length {

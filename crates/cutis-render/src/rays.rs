@@ -79,6 +79,12 @@ impl<'a> Rays<'a> {
         Some(Ray { origin, start, length: (end - start).min(self.most) })
     }
 
+    /// Position of a point in the picture, in pixels from its top left corner.
+    pub fn pixel_of(&self, mm: Point3<f64>) -> [f64; 2] {
+        let from_center = (mm - self.center_mm) / self.pixel_mm;
+        [self.half[0] + from_center.dot(&self.axes.right), self.half[1] - from_center.dot(&self.axes.up)]
+    }
+
     /// Continuous index `n` steps from a ray's start.
     #[inline]
     pub fn at(&self, ray: &Ray, n: f64) -> Point3<f64> {

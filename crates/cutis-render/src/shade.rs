@@ -89,18 +89,23 @@ impl<'a> Shader<'a> {
     }
 
     /// Outward unit normal in world space.
-    fn normal(&self, index: Point3<f64>) -> Vector3<f64> {
+    pub fn normal(&self, index: Point3<f64>) -> Vector3<f64> {
         let gradient = -(self.index_per_mm.transpose() * self.field.index_gradient(index));
         gradient.try_normalize(0.0).unwrap_or(self.toward)
+    }
+
+    /// How much of the tissue below the skin shows: 0 is skin, 1 a surface that was deep at rest.
+    pub fn exposure(&self, index: Point3<f64>, normal: &Vector3<f64>) -> f32 {
+        let Some((depth, spacing)) = &self.depth else { return 0.0 };
+        let surface = self.field.to_mm(index);
+        let below = f64::from(depth.at_mm(surface - normal * *spacing)) - spacing;
+        smooth_step((below / self.skin_mm - 1.0) as f32)
     }
 
     /// Color of the skin, or of the tissue where the surface was deep at rest.
     fn albedo(&self, index: Point3<f64>, normal: &Vector3<f64>) -> Light {
         let skin = decode(SKIN);
-        let Some((depth, spacing)) = &self.depth else { return skin };
-        let surface = self.field.to_mm(index);
-        let below = f64::from(depth.at_mm(surface - normal * *spacing)) - spacing;
-        let exposed = smooth_step((below / self.skin_mm - 1.0) as f32);
+        let exposed = self.exposure(index, normal);
         if exposed == 0.0 {
             return skin;
         }

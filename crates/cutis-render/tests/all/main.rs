@@ -2,4 +2,5 @@
 
 #[cfg(feature = "gpu")]
 mod gpu;
+mod lines;
 mod pictures;
