@@ -37,6 +37,51 @@ fn an_override_of_one_output_keeps_the_others() {
     );
 }
 
+/// A scene with a membrane whose lines are those of a file.
+fn plan_with_strokes(file: &str, text: &str) -> Result<cutis::Plan, Error> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(file);
+    std::fs::write(&path, text).unwrap();
+    let membrane = format!("{{ preset = 'trunk', directions = {{ strokes = '{}' }} }}", path.display());
+    cutis::check(&scene(SMALL, &[("constraints", &format!("{{ membrane = {membrane} }}"))]), &Silent)
+}
+
+/// Strokes that are nowhere near the skin are refused with their file, line and distance. The belly
+/// of the phantom is at y = 109.
+#[test]
+fn strokes_far_from_the_skin_are_refused() {
+    let on_skin = "0 109 -20\n20 109 -20\n\n0 109 20\n20 109 20\n";
+    let plan = plan_with_strokes("lines.txt", on_skin).unwrap();
+    assert!(plan.membrane.unwrap().coverage.unwrap() > 0.1);
+    let far = plan_with_strokes("lines.txt", &on_skin.replace("109", "309")).unwrap_err().to_string();
+    for words in ["constraints.membrane.directions.strokes", "lines.txt, line 1", "mm from the skin"] {
+        assert!(far.contains(words), "no {words:?} in {far}");
+    }
+    let distance = far.split("the stroke is ").nth(1).unwrap().split(' ').next().unwrap();
+    let distance: f64 = distance.parse().unwrap();
+    assert!((190.0..220.0).contains(&distance), "{far}");
+}
+
+#[test]
+fn skipped_parts_of_a_file_of_strokes_cause_a_warning() {
+    let markups = |kind: &str| {
+        let point = |x: i32| format!(r#"{{ "position": [{x}, 109, 0] }}"#);
+        let curve = |kind: &str| {
+            format!(
+                r#"{{ "type": "{kind}", "coordinateSystem": "RAS", "controlPoints": [{}, {}] }}"#,
+                point(0),
+                point(20)
+            )
+        };
+        format!(r#"{{ "markups": [{}, {}] }}"#, curve("Curve"), curve(kind))
+    };
+    let warnings = |kind: &str| plan_with_strokes("lines.mrk.json", &markups(kind)).unwrap().warnings;
+    let skipped = |line: &&String| line.contains("lines.mrk.json: 1 markups are not strokes");
+    let with = warnings("ROI");
+    assert_eq!(with.iter().filter(skipped).count(), 1, "{with:?}");
+    assert_eq!(warnings("Curve").iter().filter(skipped).count(), 0);
+}
+
 #[test]
 fn a_sheared_ct_is_refused_before_the_simulation() {
     let Some(path) = real("awkward/sheared_sform_only.nii.gz") else { return };

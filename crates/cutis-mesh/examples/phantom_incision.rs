@@ -3,7 +3,7 @@
 //! Run it with `cargo run -p cutis-mesh --example phantom_incision`.
 #![expect(clippy::print_stdout, reason = "an example that prints its results")]
 
-use cutis_mesh::vtk::{self, Cells, Piece, PointData, PointValues, Space};
+use cutis_mesh::vtk::{self, Cells, DataArray, Piece, Space, Values};
 use cutis_mesh::{Cut, Incision, Lattice, SkinMode, Slit, Split, Tissue, TissueMask};
 use cutis_volume::phantom::Phantom;
 use cutis_volume::{Table, TableKind, sample};
@@ -43,8 +43,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     for (name, cells) in [("tissue.vtu", Cells::Tets(&mesh.tets)), ("skin.vtu", Cells::Triangles(&triangles))]
     {
-        let data = [PointData { name: "hu", values: PointValues::Scalars(&mesh.hu) }];
-        let piece = Piece { frame: &mesh.frame, positions: &mesh.positions, cells, data: &data };
+        let data = [DataArray { name: "hu", values: Values::Scalars(&mesh.hu) }];
+        let piece =
+            Piece { frame: &mesh.frame, positions: &mesh.positions, cells, data: &data, cell_data: &[] };
         let path = folder.path().join(name);
         vtk::write_vtu(&path, Space::Lps, &piece)?;
         println!("wrote  {name}, {} KB", std::fs::metadata(&path)?.len() / 1000);

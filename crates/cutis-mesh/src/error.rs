@@ -209,14 +209,16 @@ pub enum MeshError {
         /// Path of the file.
         path: PathBuf,
     },
-    /// A point array for a mesh file does not have one value per point.
-    #[error("{path}: the array `{array}` has {found} values; the mesh has {expected} points")]
-    PointData {
+    /// An array for a mesh file does not have one value per point or per cell.
+    #[error("{path}: the array `{array}` has {found} values; the mesh has {expected} {elements}")]
+    ArrayLength {
         /// Path of the file.
         path: PathBuf,
         /// Name of the array.
         array: String,
-        /// Number of points of the mesh.
+        /// `points` or `cells`.
+        elements: &'static str,
+        /// Number of points or cells of the mesh.
         expected: usize,
         /// Number of values given.
         found: usize,

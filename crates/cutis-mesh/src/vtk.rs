@@ -26,23 +26,40 @@ pub enum Space {
     Ras,
 }
 
-/// A named array with one value per position. The name should include the unit: `hu`,
+/// A named array with one value per position or per cell. The name should include the unit: `hu`,
 /// `displacement_mm`.
 #[derive(Clone, Copy, Debug)]
-pub struct PointData<'a> {
+pub struct DataArray<'a> {
     /// Name of the array: letters, digits, `_`, `-` and `.`.
     pub name: &'a str,
     /// The values.
-    pub values: PointValues<'a>,
+    pub values: Values<'a>,
 }
 
-/// One number or vector per position.
+/// One number or vector per position or per cell.
 #[derive(Clone, Copy, Debug)]
-pub enum PointValues<'a> {
+pub enum Values<'a> {
     /// Numbers.
     Scalars(&'a [f32]),
     /// Vectors in RAS+ axes. They are converted to the space of the file.
     Vectors(&'a [[f32; 3]]),
+}
+
+impl DataArray<'_> {
+    fn len(&self) -> usize {
+        match self.values {
+            Values::Scalars(values) => values.len(),
+            Values::Vectors(vectors) => vectors.len(),
+        }
+    }
+
+    /// Numbers per value.
+    fn components(&self) -> usize {
+        match self.values {
+            Values::Scalars(_) => 1,
+            Values::Vectors(_) => 3,
+        }
+    }
 }
 
 /// The cells of a mesh file, as indices of positions.
@@ -64,7 +81,9 @@ pub struct Piece<'a> {
     /// The cells.
     pub cells: Cells<'a>,
     /// Values at the positions.
-    pub data: &'a [PointData<'a>],
+    pub data: &'a [DataArray<'a>],
+    /// Values of the cells.
+    pub cell_data: &'a [DataArray<'a>],
 }
 
 /// Writes an unstructured grid (`.vtu`) of tets or triangles.
@@ -79,14 +98,15 @@ pub struct Piece<'a> {
 ///     frame: &Frame { origin_mm: Point3::origin() },
 ///     positions: &[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]].map(Point3::from),
 ///     cells: vtk::Cells::Triangles(&[[0, 1, 2]]),
-///     data: &[vtk::PointData { name: "hu", values: vtk::PointValues::Scalars(&[40.0, 50.0, 60.0]) }],
+///     data: &[vtk::DataArray { name: "hu", values: vtk::Values::Scalars(&[40.0, 50.0, 60.0]) }],
+///     cell_data: &[vtk::DataArray { name: "normal", values: vtk::Values::Vectors(&[[0.0, 0.0, 1.0]]) }],
 /// };
 /// vtk::write_vtu(&folder.path().join("skin.vtu"), vtk::Space::Lps, &piece)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
-/// [`MeshError::VertexIndex`], [`MeshError::PointData`] or [`MeshError::ArrayName`] if the piece is
+/// [`MeshError::VertexIndex`], [`MeshError::ArrayLength`] or [`MeshError::ArrayName`] if the piece is
 /// not consistent. [`MeshError::TooManyCells`] if the offsets exceed 32 bits. [`MeshError::Volume`]
 /// or [`MeshError::Write`] if the file cannot be written.
 pub fn write_vtu(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), MeshError> {
@@ -102,6 +122,28 @@ pub fn write_vtp(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), Mes
         return Err(MeshError::NotASurface { path: path.to_path_buf() });
     }
     MeshFile::new(path, space, piece, Format::PolyData)?.write()
+}
+
+/// Returns an error for an array with a name that is not valid, or without one value per point or
+/// cell.
+fn check_arrays(
+    path: &Path,
+    arrays: &[DataArray<'_>],
+    elements: &'static str,
+    expected: usize,
+) -> Result<(), MeshError> {
+    for data in arrays {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+        if data.name.is_empty() || !data.name.chars().all(plain) {
+            return Err(MeshError::ArrayName { path: path.to_path_buf(), name: data.name.to_owned() });
+        }
+        let found = data.len();
+        if found != expected {
+            let (path, array) = (path.to_path_buf(), data.name.to_owned());
+            return Err(MeshError::ArrayLength { path, array, elements, expected, found });
+        }
+    }
+    Ok(())
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -129,25 +171,8 @@ impl<'a> MeshFile<'a> {
             Cells::Triangles(triangles) => (bytemuck::cast_slice(triangles), 3),
         };
         let points = piece.positions.len();
-        for data in piece.data {
-            let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-            if data.name.is_empty() || !data.name.chars().all(plain) {
-                return Err(MeshError::ArrayName { path: path.to_path_buf(), name: data.name.to_owned() });
-            }
-            let found = match data.values {
-                PointValues::Scalars(values) => values.len(),
-                PointValues::Vectors(vectors) => vectors.len(),
-            };
-            if found != points {
-                let array = data.name.to_owned();
-                return Err(MeshError::PointData {
-                    path: path.to_path_buf(),
-                    array,
-                    expected: points,
-                    found,
-                });
-            }
-        }
+        check_arrays(path, piece.data, "points", points)?;
+        check_arrays(path, piece.cell_data, "cells", connectivity.len() / corners)?;
         if connectivity.len() > u32::MAX as usize {
             let cells = connectivity.len() / corners;
             return Err(MeshError::TooManyCells { path: path.to_path_buf(), cells });
@@ -225,10 +250,17 @@ impl<'a> MeshFile<'a> {
         }
         writeln!(out, "<PointData>")?;
         for data in self.piece.data {
-            let components = if matches!(data.values, PointValues::Scalars(_)) { 1 } else { 3 };
-            writeln!(out, "{}", array("Float32", data.name, components, points, 4))?;
+            writeln!(out, "{}", array("Float32", data.name, data.components(), points, 4))?;
         }
-        writeln!(out, "</PointData>\n<Points>\n{}\n</Points>", array("Float32", "Points", 3, points, 4))?;
+        writeln!(out, "</PointData>")?;
+        if !self.piece.cell_data.is_empty() {
+            writeln!(out, "<CellData>")?;
+            for data in self.piece.cell_data {
+                writeln!(out, "{}", array("Float32", data.name, data.components(), cells, 4))?;
+            }
+            writeln!(out, "</CellData>")?;
+        }
+        writeln!(out, "<Points>\n{}\n</Points>", array("Float32", "Points", 3, points, 4))?;
         writeln!(out, "<{name}>\n{}", array("UInt32", "connectivity", 1, self.connectivity.len(), 4))?;
         writeln!(out, "{}", array("UInt32", "offsets", 1, cells, 4))?;
         if self.format == Format::UnstructuredGrid {
@@ -248,14 +280,23 @@ impl<'a> MeshFile<'a> {
         let used = || self.used.iter().map(|&point| point as usize);
         for data in self.piece.data {
             match data.values {
-                PointValues::Scalars(values) => {
+                Values::Scalars(values) => {
                     length(out, 4 * points)?;
                     used().try_for_each(|point| out.write_all(&values[point].to_le_bytes()))?;
                 }
-                PointValues::Vectors(vectors) => {
+                Values::Vectors(vectors) => {
                     length(out, 12 * points)?;
                     used().try_for_each(|point| vector(out, vectors[point]))?;
                 }
+            }
+        }
+        for data in self.piece.cell_data {
+            length(out, 4 * data.components() * cells)?;
+            match data.values {
+                Values::Scalars(values) => {
+                    values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
+                }
+                Values::Vectors(vectors) => vectors.iter().try_for_each(|&v| vector(out, v))?,
             }
         }
         length(out, 12 * points)?;

@@ -13,4 +13,5 @@ mod nifti;
 mod page;
 mod pictures;
 mod report;
+mod tension;
 mod vtu;

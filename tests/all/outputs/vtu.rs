@@ -1,4 +1,4 @@
-//! VTU files: points, cells and point data, read from the bytes.
+//! VTU files: points, cells, and data of points and cells, read from the bytes.
 
 use std::collections::BTreeMap;
 
@@ -34,6 +34,7 @@ impl Vtu {
         let corners = if kinds[0] == 10.0 { 4 } else { 3 };
         assert!(kinds.iter().all(|kind| *kind == [5.0, 10.0][corners - 3]), "one type of cell");
         let connectivity = arrays.remove("connectivity").unwrap();
+        arrays.remove("offsets").unwrap();
         let cell = |cell: &[f64]| cell.iter().map(|n| *n as usize).collect();
         Self {
             space: letters.map(char::from).collect(),
@@ -42,6 +43,25 @@ impl Vtu {
             cells: connectivity.chunks_exact(corners).map(cell).collect(),
             arrays,
         }
+    }
+
+    /// Names of the arrays of points and cells, ascending.
+    pub fn names(&self) -> Vec<&str> {
+        self.arrays.keys().map(String::as_str).collect()
+    }
+
+    /// Numbers of the cells.
+    pub fn cell_scalars(&self, name: &str) -> &[f64] {
+        let values = &self.arrays[name];
+        assert_eq!(values.len(), self.cells.len(), "{name}");
+        values
+    }
+
+    /// Vectors of the cells.
+    pub fn cell_vectors(&self, name: &str) -> Vec<[f64; 3]> {
+        let values: Vec<[f64; 3]> = self.arrays[name].chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect();
+        assert_eq!(values.len(), self.cells.len(), "{name}");
+        values
     }
 
     pub fn scalars(&self, name: &str) -> &[f64] {

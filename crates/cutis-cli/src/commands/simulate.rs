@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cutis::report::{Backend, Report};
 use cutis::volume::sample::LatticeSize;
-use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOptions, ScanTension, Scene};
+use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOptions, Scene};
 
 use super::pretty;
 use crate::args::Change;
@@ -52,6 +52,7 @@ fn summary(report: &Report, out: &Path) -> String {
             report.frames.ms_mean
         ),
     ];
+    lines.extend(report.tension_summary());
     lines.extend(report.model_summary());
     lines.extend(report.wounds.iter().map(|w| {
         format!("wound: {:.2} mm -> {:.2} mm ({:.2} mm in the middle)", w.initial_mm, w.final_mm, w.mid_mm)
@@ -92,17 +93,6 @@ pub(crate) fn check(
     Ok(())
 }
 
-/// The tension of the skin that a constraint kind stands for.
-fn tension_line(kind: &str, tension: &ScanTension) -> String {
-    let ScanTension { along_n_per_m: along, across_n_per_m: across, source } = tension;
-    let directions = match along == across {
-        true => format!("{along:.1} N/m in all directions"),
-        false => format!("{along:.1} N/m along the lines, {across:.1} N/m across them"),
-    };
-    let source = source.as_ref().map(|source| format!(" ({source})")).unwrap_or_default();
-    format!("tension          {kind}: {directions}{source}")
-}
-
 fn table(plan: &Plan) -> String {
     let sizes = &plan.sizes;
     let [nx, ny, nz] = sizes.lattice;
@@ -119,7 +109,8 @@ fn table(plan: &Plan) -> String {
         format!("projections      {}", plan.projections),
         format!("memory, CT       {:.1} MB", plan.volume_bytes as f64 / 1e6),
     ];
-    lines.extend(plan.tension.iter().map(|(kind, tension)| tension_line(kind, tension)));
+    lines.extend(plan.tension.iter().map(|(kind, tension)| format!("tension          {kind}: {tension}")));
+    lines.extend(plan.membrane.iter().map(|membrane| format!("lines of tension {}", membrane.summary())));
     lines.extend(cost_lines(plan));
     if !plan.device_memory.is_empty() {
         let parts: Vec<&str> = plan.device_memory.iter().map(|part| part.part.as_str()).collect();

@@ -41,6 +41,29 @@ fn the_summary_of_a_run_has_the_figures_of_its_report() {
     assert!((ms - report["frames"]["ms_mean"].as_f64().unwrap()).abs() < 0.051, "{printed}");
 }
 
+/// `run` and `check` print the tension of the skin and where it has a direction. Skin without a
+/// membrane has no such line.
+#[test]
+fn the_summary_and_the_table_describe_the_lines_of_tension() {
+    let desk = Desk::new();
+    let membrane = "--without stc --set constraints.membrane={preset='trunk'} --set run.frames=1";
+    let printed = call(&desk, &format!("run scene.toml --out run {membrane}")).stdout;
+    let report = json(&std::fs::read(desk.path("run/report.json")).unwrap());
+    let table = call(&desk, &format!("check scene.toml {membrane}")).stdout;
+    let [coverage, facing_away, triangles] =
+        ["coverage", "facing_away", "triangles"].map(|key| report["membrane"][key].as_f64().unwrap());
+    let expected = format!(
+        "a direction on {:.1} % of the skin; {facing_away} of {triangles} triangles face away",
+        100.0 * coverage
+    );
+    for (text, line) in [(&printed, "lines of tension: "), (&table, "lines of tension ")] {
+        assert!(text.contains(&format!("{line}{expected}")), "no {expected:?} in {text}");
+        assert!(text.contains("membrane: 15.0 N/m along the lines, 5.0 N/m across them"), "{text}");
+    }
+    let plain = call(&desk, "check scene.toml").stdout;
+    assert!(!plain.contains("lines of tension") && plain.contains("tension          stc: "), "{plain}");
+}
+
 #[test]
 fn the_table_of_a_plan_has_the_figures_of_its_json() {
     let desk = Desk::new();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use cutis_mesh::vtk::{Cells, Piece, PointData, PointValues, Space, write_vtp, write_vtu};
+use cutis_mesh::vtk::{Cells, DataArray, Piece, Space, Values, write_vtp, write_vtu};
 use cutis_mesh::{Frame, MeshError};
 use nalgebra::Point3;
 
@@ -43,11 +43,16 @@ fn tets_are_written_in_both_world_frames() {
     let (positions, hu) = (positions(), [1.0, 2.0, 3.0, 4.0, 5.0]);
     let moved = [[0.5, 0.25, 0.125]; 5];
     let data = [
-        PointData { name: "hu", values: PointValues::Scalars(&hu) },
-        PointData { name: "displacement_mm", values: PointValues::Vectors(&moved) },
+        DataArray { name: "hu", values: Values::Scalars(&hu) },
+        DataArray { name: "displacement_mm", values: Values::Vectors(&moved) },
     ];
-    let piece =
-        Piece { frame: &FRAME, positions: &positions, cells: Cells::Tets(&[[0, 2, 3, 4]]), data: &data };
+    let piece = Piece {
+        frame: &FRAME,
+        positions: &positions,
+        cells: Cells::Tets(&[[0, 2, 3, 4]]),
+        data: &data,
+        cell_data: &[],
+    };
     for (space, name, sign, codes) in
         [(Space::Lps, "LPS", -1.0, "76 80 83 0"), (Space::Ras, "RAS", 1.0, "82 65 83 0")]
     {
@@ -73,8 +78,13 @@ fn triangles_are_written_in_both_formats() {
     let folder = tempfile::tempdir().unwrap();
     let positions = positions();
     let triangles = [[4, 2, 3], [0, 3, 2]];
-    let piece =
-        Piece { frame: &FRAME, positions: &positions, cells: Cells::Triangles(&triangles), data: &[] };
+    let piece = Piece {
+        frame: &FRAME,
+        positions: &positions,
+        cells: Cells::Triangles(&triangles),
+        data: &[],
+        cell_data: &[],
+    };
     let (vtp, vtu) = (folder.path().join("skin.vtp"), folder.path().join("skin.vtu"));
     write_vtp(&vtp, Space::Lps, &piece).unwrap();
     write_vtu(&vtu, Space::Lps, &piece).unwrap();
@@ -86,25 +96,65 @@ fn triangles_are_written_in_both_formats() {
     assert_eq!(array(&vtu, "types").1, [5, 5]);
 }
 
+/// Values of cells stand between those of points and the points. Without them the file has no
+/// section for them.
+#[test]
+fn values_of_cells_are_written_in_both_world_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("skin.vtu");
+    let positions = positions();
+    let cells = Cells::Triangles(&[[4, 2, 3], [0, 3, 2]]);
+    let hu = [DataArray { name: "hu", values: Values::Scalars(&[1.0, 2.0, 3.0, 4.0, 5.0]) }];
+    let cell_data = [
+        DataArray { name: "normal", values: Values::Vectors(&[[0.5, 0.25, 1.0], [0.0, 1.0, 0.0]]) },
+        DataArray { name: "weight", values: Values::Scalars(&[0.75, 0.125]) },
+    ];
+    let with = Piece { frame: &FRAME, positions: &positions, cells, data: &hu, cell_data: &cell_data };
+    for (space, sign) in [(Space::Lps, -1.0), (Space::Ras, 1.0)] {
+        write_vtu(&path, space, &with).unwrap();
+        let (header, normals) = array(&path, "normal");
+        let place = |text: &str| header.find(text).unwrap();
+        assert!(place("Name=\"hu\"") < place("<CellData>") && place("</CellData>") < place("<Points>"));
+        assert!((place("<CellData>")..place("</CellData>")).contains(&place("Name=\"weight\"")));
+        assert_eq!(floats(&normals), [sign * 0.5, sign * 0.25, 1.0, 0.0, sign, 0.0]);
+        assert_eq!(floats(&array(&path, "weight").1), [0.75, 0.125]);
+        assert_eq!(floats(&array(&path, "hu").1), [1.0, 3.0, 4.0, 5.0]);
+        assert_eq!(numbers(&array(&path, "connectivity").1), [3, 1, 2, 0, 2, 1]);
+    }
+    write_vtu(&path, Space::Lps, &Piece { cell_data: &[], ..with }).unwrap();
+    assert!(!array(&path, "hu").0.contains("CellData"));
+}
+
 #[test]
 fn inconsistent_input_is_refused_and_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.vtp");
     let positions = positions();
     let cells = Cells::Triangles(&[[0, 2, 3]]);
-    let write = |cells, data: &[PointData<'_>]| {
-        write_vtp(&path, Space::Ras, &Piece { frame: &FRAME, positions: &positions, cells, data })
-            .unwrap_err()
+    let write = |cells, data: &[DataArray<'_>]| {
+        write_vtp(
+            &path,
+            Space::Ras,
+            &Piece { frame: &FRAME, positions: &positions, cells, data, cell_data: &[] },
+        )
+        .unwrap_err()
     };
-    let scalars = |name| [PointData { name, values: PointValues::Scalars(&[0.0; 4]) }];
-    assert!(matches!(write(cells, &scalars("hu")), MeshError::PointData { expected: 5, found: 4, .. }));
+    let scalars = |name| [DataArray { name, values: Values::Scalars(&[0.0; 4]) }];
+    assert!(matches!(
+        write(cells, &scalars("hu")),
+        MeshError::ArrayLength { elements: "points", expected: 5, found: 4, .. }
+    ));
     assert!(matches!(write(cells, &scalars("a\"b")), MeshError::ArrayName { .. }));
     assert!(matches!(write(Cells::Tets(&[[0, 1, 2, 3]]), &[]), MeshError::NotASurface { .. }));
+    let short = [DataArray { name: "weight", values: Values::Scalars(&[0.0; 5]) }];
+    let piece = Piece { frame: &FRAME, positions: &positions, cells, data: &[], cell_data: &short };
+    let refused = write_vtp(&path, Space::Ras, &piece).unwrap_err();
+    assert!(matches!(refused, MeshError::ArrayLength { elements: "cells", expected: 1, found: 5, .. }));
     let outside = write(Cells::Triangles(&[[0, 1, 2], [0, 5, 1]]), &[]);
     assert!(matches!(outside, MeshError::VertexIndex { position: 1, vertex: 5, vertices: 5, .. }));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     let nowhere = folder.path().join("missing/a.vtp");
-    let piece = Piece { frame: &FRAME, positions: &positions, cells, data: &[] };
+    let piece = Piece { frame: &FRAME, positions: &positions, cells, data: &[], cell_data: &[] };
     assert!(write_vtp(&nowhere, Space::Ras, &piece).unwrap_err().to_string().contains("missing"));
     // A folder that cannot hold files.
     if Path::new("/dev/full").exists() {

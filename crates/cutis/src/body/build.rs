@@ -26,10 +26,9 @@ impl Body {
         let skin: Vec<[u32; 3]> = skin.unwrap_or_default();
         let incisions: Vec<Incision> = incisions.iter().map(Incision::from).collect();
         let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(file.blame("incision"))?;
-        let membrane = sections
-            .membrane
-            .map(|section| Membrane::find(file, &whole, &hu, &skin, &section.directions(file)?));
-        let membrane = membrane.transpose()?;
+        let membrane =
+            sections.membrane.map(|section| Membrane::find(file, section, &whole, &hu, &skin)).transpose()?;
+        warnings.extend(membrane.iter().flat_map(|membrane| membrane.warnings.iter().cloned()));
         let mut mesh = region::mesh(sections, &whole, &hu, &slits)?;
         let (mut skin, inactive_skin) = mesh.divide_skin(&skin);
         let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();

@@ -71,8 +71,8 @@ fn write(path: &Path, lattice: &Lattice, skin: &Skin) -> Result<(), Error> {
         used.iter().map(|&point| frame.to_local(grid.mm(grid.point(point as usize)))).collect();
     let number = |point: u32| used.partition_point(|&other| other < point) as u32;
     let triangles: Vec<[u32; 3]> = skin.triangles.iter().map(|triangle| triangle.map(number)).collect();
-    let piece =
-        Piece { frame: &frame, positions: &positions, cells: Cells::Triangles(&triangles), data: &[] };
+    let cells = Cells::Triangles(&triangles);
+    let piece = Piece { frame: &frame, positions: &positions, cells, data: &[], cell_data: &[] };
     if path.extension().is_some_and(|e| e == "vtp") {
         vtk::write_vtp(path, Space::default(), &piece)?;
     } else {

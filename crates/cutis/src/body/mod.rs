@@ -45,7 +45,8 @@ pub(crate) struct Body {
     pub(crate) cut: Cut,
     /// The elements that the incisions removed.
     pub(crate) removed: Removed,
-    /// Normals and directions of the skin; none if the scene has no constraint that needs them.
+    /// Normals and directions of the whole skin before the incisions; none if the scene has no
+    /// constraint that needs them.
     pub(crate) membrane: Option<Membrane>,
     /// Vertices that each handle of the scene grabs, in ascending order.
     pub(crate) grabbed: Vec<Vec<u32>>,

@@ -2,6 +2,7 @@
 
 use cutis_mesh::{Incision, SkinMode};
 
+use crate::model::ModelChoice;
 use crate::scene::{
     HandleSection, IncisionSection, LatticeSection, LoadedScene, MembraneSection, Scene, SceneFile,
     TissueSection,
@@ -15,7 +16,8 @@ pub(crate) struct BodySections<'a> {
     pub(crate) tissue: &'a TissueSection,
     /// Rule by which the skin is found; none if the scene does not need the skin.
     pub(crate) skin: Option<SkinMode>,
-    /// The membrane that needs normals and directions of the skin; none if the scene has none.
+    /// The membrane that needs normals and directions of the skin; none if the scene has none, or a
+    /// model without constraints.
     pub(crate) membrane: Option<&'a MembraneSection>,
     pub(crate) incisions: &'a [IncisionSection],
     pub(crate) handles: &'a [HandleSection],
@@ -29,7 +31,7 @@ impl<'a> BodySections<'a> {
             lattice: &scene.lattice,
             tissue: &scene.tissue,
             skin: needs_skin(scene).then_some(scene.skin.mode),
-            membrane: scene.constraints.membrane.as_ref(),
+            membrane: scene.constraints.membrane.as_ref().filter(|_| scene.model == ModelChoice::Pbd),
             incisions: &scene.incision,
             handles: &scene.handle,
         }

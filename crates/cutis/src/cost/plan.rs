@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{CostReport, left_out};
 use crate::backend::{Chosen, Request};
-use crate::body::Body;
+use crate::body::{Body, Membrane};
 use crate::ct::source::Source;
 use crate::model::constraints::kinds::{ConstraintKind, KindRow, ScanTension};
 use crate::model::{ModelChoice, ModelCosts, ModelInput};
-use crate::output::report::{Backend, MemoryPart, Sizes, Stage};
+use crate::output::report::{Backend, MembraneReport, MemoryPart, Sizes, Stage};
 use crate::run::clock::Clock;
 use crate::run::prepare::{Prepared, prepare};
 use crate::scene::{IncisionSection, LoadedScene, Scene};
@@ -30,6 +30,9 @@ pub struct Plan {
     /// Tension of the skin in the scan, by constraint kind.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub tension: BTreeMap<String, ScanTension>,
+    /// Normals and lines of tension of `constraints.membrane`, if the scene has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub membrane: Option<MembraneReport>,
     /// Colors per constraint kind; in vertex block descent only the colors of the vertices, as
     /// `descent`.
     pub colors: BTreeMap<String, usize>,
@@ -87,6 +90,7 @@ impl Plan {
             backend: backend.report.clone(),
             sizes,
             tension: tensions(scene),
+            membrane: body.membrane.as_ref().map(Membrane::report),
             colors,
             costs: CostReport::of_memory(&memory, &device_memory, NO_DEVICE),
             memory,

@@ -1,6 +1,7 @@
 //! `report.html`: the report for people, one file with pictures and plots inside.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 use base64::Engine;
 
@@ -19,6 +20,8 @@ img{max-width:100%;height:auto}figcaption{color:#555}.warn{background:#fff4d6;pa
 
 /// A picture of the page.
 pub(crate) struct Figure {
+    /// Its file in the run folder.
+    pub(crate) path: fn(&RunFolder) -> PathBuf,
     pub(crate) caption: &'static str,
     /// Whether it takes the whole width of the page instead of half.
     pub(crate) wide: bool,
@@ -112,6 +115,9 @@ fn summary(report: &Report) -> String {
         escape(&machine),
         report.frames.ms_mean
     );
+    for line in report.tension_summary() {
+        let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&line)));
+    }
     for Wound { initial_mm, final_mm, mid_mm, .. } in &report.wounds {
         let _ = write!(
             text,
@@ -192,6 +198,12 @@ fn cost_table(costs: &CostReport) -> String {
     }
     let _ = write!(out, "</table><p>Time: {}.</p>", escape(&costs.time));
     out
+}
+
+/// The text with a capital first letter.
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn items(lines: &[String]) -> String {

@@ -5,11 +5,12 @@ pub(crate) mod html;
 mod pictures;
 pub mod report;
 mod resample_run;
+mod skin_lines;
 mod warp;
 
 use std::path::Path;
 
-use cutis_mesh::vtk::{self, Cells, Piece, PointData, PointValues, Space};
+use cutis_mesh::vtk::{self, Cells, DataArray, Piece, Space, Values};
 use cutis_volume::{Volume, nifti};
 use nalgebra::Point3;
 
@@ -18,10 +19,11 @@ use crate::backend::{DevicePositions, Stages};
 use crate::body::Body;
 use crate::run::clock::Clock;
 use crate::run::files::{self, RunFolder};
-use crate::scene::OutputSection;
+use crate::scene::{OutputSection, Scene};
 
 use html::Figure;
 use report::Resample;
+use skin_lines::SkinLines;
 use warp::BodyWarp;
 
 pub use resample_run::{ResampleRequest, resample_run};
@@ -34,8 +36,7 @@ pub(crate) struct DeformedBody<'a> {
     /// The same positions on the GPU, if the simulation left them there.
     pub(crate) on_device: Option<&'a DevicePositions>,
     pub(crate) ct: &'a Volume,
-    /// HU below which a voxel is air.
-    pub(crate) air_below_hu: f32,
+    pub(crate) scene: &'a Scene,
 }
 
 /// Results of the outputs for the report.
@@ -82,31 +83,33 @@ pub(crate) fn write(
         clock.stage("write deformed.nii.gz", 0, |_| Ok(nifti::write(folder.volume(), &volume)?))?;
     }
     if output.pictures {
-        let figures = clock.stage_placed("pictures", 0, |progress| {
+        results.figures = clock.stage_placed("pictures", 0, |progress| {
             Ok((pictures::draw(deformed, &warp, &volume, stages, progress)?, stages.place()))
         })?;
-        for (path, png) in [folder.before(), folder.after(), folder.slice()].iter().zip(&figures) {
-            files::write(path, &png.png)?;
+        for figure in &results.figures {
+            files::write(&(figure.path)(folder), &figure.png)?;
         }
-        results.figures = figures;
     }
     results.warnings.append(&mut stages.notes);
     Ok(results)
 }
 
-/// Writes the skin of the whole body, including the inactive skin outside a region of interest.
+/// Writes the skin of the whole body, including the inactive skin outside a region of interest. The
+/// skin of a membrane also has its lines of tension in the scan.
 fn write_skin(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
     let body = deformed.body;
     let (now, triangles) = body.whole_skin(deformed.positions);
     let (rest, _) = body.whole_skin(&body.mesh.positions);
     let hu = [body.mesh.hu.as_slice(), &body.inactive_hu].concat();
-    write_mesh(path, body, &rest, &now, &hu, Cells::Triangles(&triangles))
+    let lines = SkinLines::of(body, deformed.scene, &triangles);
+    let cell_data = lines.as_ref().map(SkinLines::arrays).unwrap_or_default();
+    write_mesh(path, body, [&rest, &now], &hu, Cells::Triangles(&triangles), &cell_data)
 }
 
 /// Writes the tetrahedra of the body.
 fn write_tissue(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
     let (body, mesh) = (deformed.body, &deformed.body.mesh);
-    write_mesh(path, body, &mesh.positions, deformed.positions, &mesh.hu, Cells::Tets(&mesh.tets))
+    write_mesh(path, body, [&mesh.positions, deformed.positions], &mesh.hu, Cells::Tets(&mesh.tets), &[])
 }
 
 /// Writes cells at their present positions, with the displacement from `rest` and the HU of each
@@ -114,17 +117,17 @@ fn write_tissue(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
 fn write_mesh(
     path: &Path,
     body: &Body,
-    rest: &[Point3<f32>],
-    now: &[Point3<f32>],
+    [rest, now]: [&[Point3<f32>]; 2],
     hu: &[f32],
     cells: Cells<'_>,
+    cell_data: &[DataArray<'_>],
 ) -> Result<(), Error> {
     let moved = |(rest, now): (&Point3<f32>, &Point3<f32>)| ((now - rest) * 1000.0).into();
     let displacement: Vec<[f32; 3]> = rest.iter().zip(now).map(moved).collect();
     let data = [
-        PointData { name: "displacement_mm", values: PointValues::Vectors(&displacement) },
-        PointData { name: "hu", values: PointValues::Scalars(hu) },
+        DataArray { name: "displacement_mm", values: Values::Vectors(&displacement) },
+        DataArray { name: "hu", values: Values::Scalars(hu) },
     ];
-    let piece = Piece { frame: &body.mesh.frame, positions: now, cells, data: &data };
+    let piece = Piece { frame: &body.mesh.frame, positions: now, cells, data: &data, cell_data };
     Ok(vtk::write_vtu(path, Space::default(), &piece)?)
 }

@@ -1,14 +1,22 @@
-//! The pictures of a run: the skin before and after, and a slice across the wound.
+//! The pictures of a run: the skin before and after, a slice across the wound, and the lines of
+//! tension on the skin.
 
 use cutis_mesh::Slit;
-use cutis_render::{Contour, Focus, Plane, Side, SliceView, View, side_by_side, skin_depth, slice};
+use cutis_render::{
+    Contour, Focus, Image, LineField, Plane, Rgb, Side, SliceView, View, draw_lines, side_by_side,
+    skin_depth, slice,
+};
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
 
 use super::DeformedBody;
 use super::html::Figure;
+use super::skin_lines::SkinLines;
 use super::warp::BodyWarp;
 use crate::backend::Stages;
+use crate::body::{Body, Membrane};
+use crate::run::files::RunFolder;
+use crate::scene::Scene;
 use crate::{Error, Progress};
 
 /// Pixels along each side of the skin pictures.
@@ -19,10 +27,12 @@ const CLOSE_UP: f64 = 1.5;
 const DEEPEST_MM: f64 = 20.0;
 
 /// Colors of the contours at rest and deformed.
-const COLORS: [[u8; 3]; 2] = [[90, 160, 255], [255, 170, 60]];
+const COLORS: [Rgb; 2] = [[90, 160, 255], [255, 170, 60]];
+/// Color of the lines of tension.
+const LINES: Rgb = [20, 50, 120];
 
-/// Draws a run: the skin before and after, and a slice before and after. Before, the CT is cut but
-/// has not moved. `after` is the deformed CT.
+/// Draws a run: the skin before and after, a slice before and after, and the lines of tension of a
+/// membrane. Before, the CT is cut but has not moved. `after` is the deformed CT.
 ///
 /// # Errors
 /// The errors of the resampler and the renderer.
@@ -33,7 +43,8 @@ pub(super) fn draw(
     stages: &mut Stages,
     progress: &dyn Progress,
 ) -> Result<Vec<Figure>, Error> {
-    let DeformedBody { body, ct, air_below_hu, .. } = *deformed;
+    let DeformedBody { body, ct, scene, .. } = *deformed;
+    let air_below_hu = scene.tissue.air_below_hu;
     let before = warp.cut_at_rest(ct, stages, progress)?;
     let depth = depth(ct, air_below_hu)?;
     let depth_after = warp.apply(&depth, stages, progress)?.0;
@@ -66,26 +77,68 @@ pub(super) fn draw(
     let after_slice = cross(after, &[rest, moved])?;
     let slices = side_by_side(&[(&before_slice, "before"), (&after_slice, "after")])?;
 
-    let mut skin = |volume: &Volume, depth: &Volume| {
-        let view = View {
-            width: PIXELS,
-            height: PIXELS,
-            focus,
-            depth: Some(depth),
-            threshold_hu: air_below_hu,
-            ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))
-        };
-        stages.raymarch(volume, &view)
+    let view = View {
+        width: PIXELS,
+        height: PIXELS,
+        focus,
+        depth: Some(&depth),
+        threshold_hu: air_below_hu,
+        ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))
     };
-    Ok(vec![
-        Figure { caption: "Before: cut, not yet moved", wide: false, png: skin(&before, &depth)?.to_png()? },
-        Figure { caption: "After", wide: false, png: skin(after, &depth_after)?.to_png()? },
+    let mut figures = vec![
         Figure {
+            path: RunFolder::before,
+            caption: "Before: cut, not yet moved",
+            wide: false,
+            png: stages.raymarch(&before, &view)?.to_png()?,
+        },
+        Figure {
+            path: RunFolder::after,
+            caption: "After",
+            wide: false,
+            png: stages.raymarch(after, &View { depth: Some(&depth_after), ..view })?.to_png()?,
+        },
+        Figure {
+            path: RunFolder::slice,
             caption: "Slice across the middle, with the skin of the model at rest (blue) and deformed (orange)",
             wide: true,
             png: slices.to_png()?,
         },
-    ])
+    ];
+    if body.membrane.as_ref().is_some_and(Membrane::has_lines) {
+        let mut picture = stages.raymarch(&before, &View { annotate: false, ..view })?;
+        add_lines(&mut picture, body, scene, &before, &view)?;
+        figures.push(Figure {
+            path: RunFolder::tension,
+            caption: "Lines of tension in the scan: the skin is tightest along them. They are faint where the \
+                      direction counts little",
+            wide: false,
+            png: picture.to_png()?,
+        });
+    }
+    Ok(figures)
+}
+
+/// Draws the lines of tension of a membrane on a picture of the body at rest.
+fn add_lines(
+    picture: &mut Image,
+    body: &Body,
+    scene: &Scene,
+    volume: &Volume,
+    view: &View<'_>,
+) -> Result<(), Error> {
+    let (positions, triangles) = body.whole_skin(&body.mesh.positions);
+    let Some(lines) = SkinLines::of(body, scene, &triangles) else { return Ok(()) };
+    let field = LineField {
+        origin_mm: body.mesh.frame.origin_mm,
+        positions: &positions,
+        triangles: &triangles,
+        directions: &lines.directions,
+        weights: &lines.weights,
+        color: LINES,
+        label: "lines of tension",
+    };
+    Ok(draw_lines(picture, volume, view, &field)?)
 }
 
 /// Depth below the skin at rest, mm, which colors the wound.

@@ -1,10 +1,12 @@
 //! `report.json`: inputs, machine, times and results of a run. It has a version and a schema.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::model::ScanTension;
 use crate::model::constraints::kinds::report_name;
 use crate::run::files;
 use crate::{CostReport, Error, Scene};
@@ -32,9 +34,15 @@ pub struct Report {
     /// Quality of the detected skin, if the scene needs the skin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinQuality>,
+    /// Tension of the skin in the scan, by constraint kind. A kind without tension is absent.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub tension: BTreeMap<String, ScanTension>,
+    /// Normals and lines of tension of `constraints.membrane`, if the scene has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub membrane: Option<MembraneReport>,
     /// Colors (groups without shared vertices) per constraint kind; a kind that the scene does not
     /// name is absent. In vertex block descent only the colors of the vertices, as `descent`.
-    pub colors: std::collections::BTreeMap<String, usize>,
+    pub colors: BTreeMap<String, usize>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
     /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend.
@@ -164,6 +172,38 @@ impl From<&cutis_mesh::SkinReport> for SkinQuality {
             enclosed_share: report.enclosed_share,
             coverage: report.coverage,
         }
+    }
+}
+
+/// Normals and lines of tension of the whole skin, before the incisions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MembraneReport {
+    /// Triangles of the skin.
+    pub triangles: usize,
+    /// Share of the skin's area, 0 to 1, where the lines have a direction: their weight is above ½.
+    /// The area of a triangle is that of its projection on the tangent plane of the smooth skin.
+    /// None if the scene gives no directions, so that the skin is isotropic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<f64>,
+    /// Triangles that face away from the smooth skin and hold no tension.
+    pub facing_away: usize,
+    /// Triangles whose normal is only the mean of the facets around them, because the tissue is
+    /// thinner than the blur from which normals follow.
+    pub normals_from_facets: usize,
+}
+
+impl MembraneReport {
+    /// One line about the coverage and the triangles without tension.
+    pub fn summary(&self) -> String {
+        let Self { triangles, coverage, facing_away, normals_from_facets } = self;
+        let lines = match coverage {
+            Some(coverage) => format!("a direction on {:.1} % of the skin", 100.0 * coverage),
+            None => "no direction: the skin is isotropic".to_owned(),
+        };
+        format!(
+            "{lines}; {facing_away} of {triangles} triangles face away and hold no tension, \
+             {normals_from_facets} have the normal of their facets"
+        )
     }
 }
 
@@ -298,6 +338,14 @@ impl From<&cutis_solver::Residual> for KindResidual {
 }
 
 impl Report {
+    /// One line per constraint kind with the tension of the skin in the scan, and one about its
+    /// lines.
+    pub fn tension_summary(&self) -> Vec<String> {
+        let tension = self.tension.iter().map(|(kind, tension)| format!("tension, {kind}: {tension}"));
+        let lines = self.membrane.iter().map(|membrane| format!("lines of tension: {}", membrane.summary()));
+        tension.chain(lines).collect()
+    }
+
     /// Title and facts of a model that has results of its own; none for other models.
     pub(crate) fn model_table(&self) -> Option<(&'static str, Vec<(&'static str, String)>)> {
         Some(("ChainMail", self.chainmail.as_ref()?.table()))

@@ -86,13 +86,17 @@ paths! {
     after = "after.png";
     /// A slice through the wound.
     slice = "slice.png";
+    /// The lines of tension on the skin.
+    tension = "tension.png";
     /// State from which a run resumes.
     checkpoint = "checkpoint.bin";
 }
 
 impl RunFolder {
     /// Names of existing files that a run with these outputs does not write.
-    pub(crate) fn stale_files(&self, output: &OutputSection) -> Vec<String> {
+    ///
+    /// `has_lines` says whether the body has lines of tension to draw.
+    pub(crate) fn stale_files(&self, output: &OutputSection, has_lines: bool) -> Vec<String> {
         let files = [
             (output.report, self.report()),
             (output.report, self.html()),
@@ -103,6 +107,7 @@ impl RunFolder {
             (output.pictures, self.before()),
             (output.pictures, self.after()),
             (output.pictures, self.slice()),
+            (output.pictures && has_lines, self.tension()),
         ];
         let stale = files.iter().filter(|(written, path)| !written && path.exists());
         stale.filter_map(|(_, path)| Some(path.file_name()?.to_string_lossy().into_owned())).collect()

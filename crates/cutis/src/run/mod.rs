@@ -77,7 +77,7 @@ fn run_with(
         positions: &simulated.result.end.positions,
         on_device: simulated.result.on_device.as_ref(),
         ct: &source.volume,
-        air_below_hu: loaded.scene.tissue.air_below_hu,
+        scene: &loaded.scene,
     };
     let mut stages = Stages::on(simulated.device.as_ref().map(DeviceMeter::gpu).cloned());
     let outputs = output::write(&deformed, &loaded.scene.output, &folder, &mut stages, &mut clock)?;

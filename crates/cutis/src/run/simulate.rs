@@ -7,7 +7,7 @@ use super::files::{self, RunFolder};
 use super::run_loop::{RunLoop, RunResult};
 use super::timing::Timing;
 use crate::backend::{Chosen, DeviceMeter};
-use crate::body::Body;
+use crate::body::{Body, Membrane};
 use crate::cost::Plan;
 use crate::ct::source::Source;
 use crate::model::{Model, ModelInput, Simulation, Started};
@@ -85,7 +85,8 @@ pub(super) fn warn(plan: &mut Plan, warnings: &[String], progress: &dyn Progress
 
 /// Warning about files of an earlier run that this run will not replace.
 fn stale_files(setup: &Setup<'_>) -> Option<String> {
-    let stale = setup.folder.stale_files(&setup.loaded.scene.output);
+    let has_lines = setup.body.membrane.as_ref().is_some_and(Membrane::has_lines);
+    let stale = setup.folder.stale_files(&setup.loaded.scene.output, has_lines);
     (!stale.is_empty() && !setup.options.resume).then(|| {
         format!(
             "{} holds files of an earlier run that this one does not write: {}",

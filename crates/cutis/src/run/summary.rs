@@ -38,6 +38,8 @@ pub(super) fn report(
         backend: plan.backend,
         sizes: plan.sizes,
         skin: body.skin_report.as_ref().map(Into::into),
+        tension: plan.tension,
+        membrane: plan.membrane,
         colors: plan.colors,
         memory: plan.memory,
         device_memory: plan.device_memory,

@@ -197,7 +197,7 @@ impl Baseline<'_> {
             positions: &self.run.positions,
             on_device: None,
             ct: self.volume(),
-            air_below_hu: self.loaded.scene.tissue.air_below_hu,
+            scene: &self.loaded.scene,
         };
         let mut stages = Stages::on(self.bench.backend.device()?);
         let before = clock.stages.len();
@@ -220,7 +220,7 @@ impl Baseline<'_> {
                 output.pictures,
                 "pictures",
                 ms(&["pictures", resample(output.volume)]),
-                &[scratch.0.before(), scratch.0.after(), scratch.0.slice()],
+                &[scratch.0.before(), scratch.0.after(), scratch.0.slice(), scratch.0.tension()],
             ),
         ];
         let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |file| file.len() as i64);

@@ -90,13 +90,15 @@ pub struct OutputSection {
     /// `deformed.nii.gz`: the deformed CT.
     #[serde(default)]
     pub volume: bool,
-    /// `skin.vtu`: the deformed skin.
+    /// `skin.vtu`: the deformed skin. With `constraints.membrane` also its normals, lines and tension
+    /// in the scan.
     #[serde(default)]
     pub surface: bool,
     /// `tissue.vtu`: the deformed tetrahedra.
     #[serde(default)]
     pub tissue: bool,
-    /// `before.png`, `after.png`, `slice.png`.
+    /// `before.png`, `after.png`, `slice.png`. With directions of `constraints.membrane` also
+    /// `tension.png`, the lines of tension on the skin.
     #[serde(default)]
     pub pictures: bool,
     /// `report.json`, `report.html`, `frames.csv`.

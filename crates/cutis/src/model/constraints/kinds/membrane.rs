@@ -134,50 +134,75 @@ impl MembraneSection {
         self.directions.clone().or_else(|| self.preset().map(|preset| (preset.directions)()))
     }
 
-    /// The directions for the field of the skin. Isotropic skin needs none, and gets any.
+    /// The directions for the field of the skin, and true. Isotropic skin needs none: it gets any,
+    /// and false.
     ///
     /// # Errors
     /// [`Error`] for a file of strokes that cannot be read.
-    pub(crate) fn directions(&self, file: SceneFile<'_>) -> Result<Directions, Error> {
+    pub(crate) fn directions(&self, file: SceneFile<'_>) -> Result<(Directions, bool), Error> {
         let any = Directions::Around([0.0, 0.0, 1.0]);
-        let Some(lines) = self.lines() else { return Ok(any) };
+        let Some(lines) = self.lines() else { return Ok((any, false)) };
         Ok(match (lines.around, lines.along, lines.strokes) {
-            (_, Some(axis), _) => Directions::Along(axis),
+            (_, Some(axis), _) => (Directions::Along(axis), true),
             (_, _, Some(path)) => {
                 let read =
                     Strokes::read(&path).map_err(file.blame("constraints.membrane.directions.strokes"))?;
-                Directions::Strokes(read)
+                (Directions::Strokes(read), true)
             }
-            (Some(axis), ..) => Directions::Around(axis),
-            (None, None, None) => any,
+            (Some(axis), ..) => (Directions::Around(axis), true),
+            (None, None, None) => (any, false),
         })
     }
 
-    /// The strips of some triangles, two per triangle, and the number of triangles that face away
-    /// from the smooth skin and hold no strip.
+    /// Whether a triangle `x` (m, in the scan) holds tension. One that faces away from the smooth
+    /// skin does not.
+    ///
+    /// # Errors
+    /// [`MaterialError`] for a triangle without area.
+    pub(crate) fn holds(
+        &self,
+        normal: &Vector3<f64>,
+        along: &Vector3<f64>,
+        x: &[Point3<f64>; 3],
+    ) -> Result<bool, MaterialError> {
+        let Some(values) = self.values() else { return Ok(false) };
+        let [law, _] = values.laws;
+        match SkinStripMaterial::new((*normal).into(), (*along).into(), law)?.shape(x) {
+            Ok(_) => Ok(true),
+            Err(MaterialError::NotFacing { .. }) => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Tension in the scan along and across the lines at a place of the skin, N/m. None if the
+    /// formulation knows no forces.
+    pub(crate) fn tension_at(&self, tangent: &Tangent, formulation: Formulation) -> Option<[f64; 2]> {
+        let values = self.values().filter(|_| formulation != Formulation::Pbd)?;
+        let tension = values.blended(tangent.weight).map(|law| law.tension_n_per_m);
+        Some(if tangent.holds { tension } else { [0.0; 2] })
+    }
+
+    /// The strips of some triangles, two per triangle that holds tension.
     ///
     /// # Errors
     /// [`Error`] for a material that a triangle cannot have.
-    fn strips(&self, parts: &BodyParts<'_>, skin: &[[u32; 3]]) -> Result<(Vec<Strip>, usize), Error> {
-        let (Some(membrane), Some(values)) = (&parts.body.membrane, self.values()) else {
-            return Ok(Default::default());
+    fn strips(&self, parts: &BodyParts<'_>, skin: &[[u32; 3]]) -> Result<Vec<Strip>, Error> {
+        let (Some(tangents), Some(values)) = (parts.body.tangents(skin), self.values()) else {
+            return Ok(Vec::new());
         };
-        let (mut strips, mut skipped) = (Vec::with_capacity(2 * skin.len()), 0);
-        for triangle in skin {
-            let Tangent { normal, along, weight } = membrane.at(&parts.body.mesh, triangle);
+        let mut strips = Vec::with_capacity(2 * skin.len());
+        for (triangle, tangent) in skin.iter().zip(tangents).filter(|(_, tangent)| tangent.holds) {
+            let Tangent { normal, along, weight, .. } = tangent;
             let directions = [along, normal.cross(&along)];
             let x = triangle.map(|v| parts.position(v));
             for (direction, law) in directions.into_iter().zip(values.blended(weight)) {
                 let material =
                     SkinStripMaterial::new(normal.into(), direction.into(), law).map_err(Error::Material)?;
-                match material.compliance(&x) {
-                    Ok(compliance) => strips.push(Strip { triangle: *triangle, material, compliance }),
-                    Err(MaterialError::NotFacing { .. }) => skipped += 1,
-                    Err(error) => return Err(Error::Material(error)),
-                }
+                let compliance = material.compliance(&x).map_err(Error::Material)?;
+                strips.push(Strip { triangle: *triangle, material, compliance });
             }
         }
-        Ok((strips, skipped / 2))
+        Ok(strips)
     }
 
     /// Adds one type of strip for all strips.
@@ -267,7 +292,7 @@ impl ConstraintKind for MembraneSection {
         builder: SystemBuilder<f32>,
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
-        let (strips, _) = self.strips(parts, &parts.body.skin)?;
+        let strips = self.strips(parts, &parts.body.skin)?;
         // Vertex block descent holds the scan by a load on each vertex.
         if !parts.at_rest || parts.solver.formulation == Formulation::Vbd {
             return self.add_type::<SkinStrip>(builder, parts, &strips);
@@ -278,7 +303,7 @@ impl ConstraintKind for MembraneSection {
     }
 
     fn add_loads(&self, parts: &BodyParts<'_>, loads: &mut [Vector3<f64>]) -> Result<(), Error> {
-        for strip in self.strips(parts, &parts.body.removed.triangles)?.0 {
+        for strip in self.strips(parts, &parts.body.removed.triangles)? {
             let x: [Point3<f64>; 3] = strip.triangle.map(|v| parts.position(v));
             let params = SkinStrip::from_rest(&x, &strip.material);
             let strength = match parts.compliant() {
@@ -315,12 +340,6 @@ impl ConstraintKind for MembraneSection {
         if parts.nothing_fixed && !parts.at_rest {
             warnings
                 .push("skin tension acts and nothing is fixed: the whole body may shrink and drift".into());
-        }
-        if let Ok((_, skipped @ 1..)) = self.strips(parts, &parts.body.skin) {
-            warnings.push(format!(
-                "{skipped} of {} skin triangles face away from the smooth skin and hold no tension",
-                parts.body.skin.len()
-            ));
         }
         warnings
     }

@@ -11,6 +11,8 @@ mod membrane_presets;
 mod skin_tension;
 mod tet_volume;
 
+use std::fmt;
+
 use cutis_solver::{Formulation, Stiffness, SystemBuilder, Values};
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
@@ -136,6 +138,17 @@ pub struct ScanTension {
     /// Range and source of a preset.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
+}
+
+impl fmt::Display for ScanTension {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { along_n_per_m: along, across_n_per_m: across, source } = self;
+        match along == across {
+            true => write!(out, "{along:.1} N/m in all directions")?,
+            false => write!(out, "{along:.1} N/m along the lines, {across:.1} N/m across them")?,
+        }
+        source.as_ref().map_or(Ok(()), |source| write!(out, " ({source})"))
+    }
 }
 
 /// The inputs from which a constraint kind is built.
