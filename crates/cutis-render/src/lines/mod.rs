@@ -17,7 +17,7 @@ use evenly_spaced::{LinePoint, evenly_spaced};
 use visible::VisibleField;
 
 /// Distance between neighboring lines, in font pixels.
-const SPACING: f64 = 6.0;
+const SPACING: f64 = 9.0;
 /// Thickness of a line, in font pixels.
 const THICKNESS: f64 = 0.75;
 /// Opacity of a line where the weight is 1.
