@@ -106,9 +106,9 @@ pub struct Piece<'a> {
 /// ```
 ///
 /// # Errors
-/// [`MeshError::VertexIndex`], [`MeshError::ArrayLength`] or [`MeshError::ArrayName`] if the piece is
-/// not consistent. [`MeshError::TooManyCells`] if the offsets exceed 32 bits. [`MeshError::Volume`]
-/// or [`MeshError::Write`] if the file cannot be written.
+/// [`MeshError::VertexIndex`], [`MeshError::ArrayLength`] or [`MeshError::ArrayName`] if the piece
+/// is not consistent. [`MeshError::TooManyCells`] if the offsets exceed 32 bits.
+/// [`MeshError::Volume`] or [`MeshError::Write`] if the file cannot be written.
 pub fn write_vtu(path: &Path, space: Space, piece: &Piece<'_>) -> Result<(), MeshError> {
     MeshFile::new(path, space, piece, Format::UnstructuredGrid)?.write()
 }

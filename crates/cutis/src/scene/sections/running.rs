@@ -90,8 +90,8 @@ pub struct OutputSection {
     /// `deformed.nii.gz`: the deformed CT.
     #[serde(default)]
     pub volume: bool,
-    /// `skin.vtu`: the deformed skin. With `constraints.membrane` also its normals, lines and tension
-    /// in the scan.
+    /// `skin.vtu`: the deformed skin. With `constraints.membrane` also its normals, lines and
+    /// tension in the scan.
     #[serde(default)]
     pub surface: bool,
     /// `tissue.vtu`: the deformed tetrahedra.
