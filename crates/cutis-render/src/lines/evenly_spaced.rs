@@ -113,8 +113,7 @@ impl<F: Fn([f64; 2]) -> Option<Sample>> Plane<F> {
         let step = STEP * self.spacing;
         let recent = (1.0 / STEP) as usize;
         let (mut line, mut place, mut heading) = (Vec::new(), from.place, direction);
-        loop {
-            let Some(middle) = self.turned(ahead(place, heading, step / 2.0), heading) else { break };
+        while let Some(middle) = self.turned(ahead(place, heading, step / 2.0), heading) {
             let next = ahead(place, middle.direction, step);
             let Some(sample) = self.turned(next, middle.direction) else { break };
             let mut own = before.iter().chain(&line).rev().skip(recent);
