@@ -35,7 +35,7 @@ fn extreme_cases_end_as_expected_in_double_precision() {
 /// absolute length would cause a failure.
 #[test]
 fn extreme_cases_end_as_they_must_on_a_gpu() {
-    const ON_GPU: [&str; 11] = [
+    const ON_GPU: [&str; 13] = [
         "amplification 1e6, held a hundredfold, XPBD",
         "collapsed to a point, PBD",
         "collapsed to a point, XPBD, compliance 0e0",
@@ -44,6 +44,8 @@ fn extreme_cases_end_as_they_must_on_a_gpu() {
         "one tetrahedron inverted, XPBD",
         "a skin triangle of zero area, XPBD",
         "everything fixed, XPBD, compliance 0e0",
+        "layers 1 : 1000, XPBD",
+        "layers 1 : 1000, VBD",
         "steps 1.9 times as long, VBD",
         "collapsed to a plane, VBD",
         "a corner torn off by ten body sizes at once, VBD, compliance 7e-7",

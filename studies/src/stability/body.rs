@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Constraint, Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
-use cutis_solver::{Formulation, Handle, Stiffness, System, SystemBuilder};
+use cutis_solver::{Formulation, Handle, Stiffness, System, SystemBuilder, Values};
 use nalgebra::{Point3, Vector3};
 
 use super::Failure;
@@ -120,8 +120,11 @@ pub struct Body {
     pub triangles: Vec<[u32; 3]>,
     /// Tetrahedra.
     pub tets: Vec<[u32; 4]>,
-    /// Stiffness of all constraints.
+    /// Stiffness of the constraints.
     pub law: Law,
+    /// Stiffness of the material at each vertex over that of `law`, above 0 and at most 1. An
+    /// element has the harmonic mean of its vertices.
+    pub softening: Vec<f64>,
     /// Amplification of skin tension.
     pub amplification: f64,
     /// Handles that move vertices.
@@ -167,6 +170,7 @@ impl Body {
             start: rest.clone(),
             velocities: vec![Vector3::zeros(); count],
             inverse_masses: vec![1.0; count],
+            softening: vec![1.0; count],
             rest,
             edges,
             triangles,
@@ -185,6 +189,15 @@ impl Body {
         self
     }
 
+    /// Makes the lower half of the body `contrast` times as soft as the upper half.
+    pub fn layered(mut self, contrast: f64) -> Self {
+        let height = |points: &[Point3<f64>]| points.iter().map(|x| x.z).sum::<f64>() / points.len() as f64;
+        let middle = height(&self.rest);
+        let of = |x: &Point3<f64>| if x.z < middle { 1.0 / contrast } else { 1.0 };
+        self.softening = self.rest.iter().map(of).collect();
+        self
+    }
+
     /// The system at a scale.
     ///
     /// # Errors
@@ -199,14 +212,14 @@ impl Body {
             let params = |rest: &[_; 2]| Distance::from_rest(rest, &Default::default());
             let params =
                 self.params(&self.edges, scale, |rest| params(rest).map(|p: f64| T::constant(p * size)));
-            let (stiffness, groups) = (self.stiffness(0, scale), groups(&self.edges, count)?);
+            let (stiffness, groups) = (self.stiffness(&self.edges, 0, scale), groups(&self.edges, count)?);
             builder = builder.add::<Distance, 2>(&self.edges, &params, stiffness, &groups)?;
         }
         if !self.tets.is_empty() {
             let params = |rest: &[_; 4]| Volume::from_rest(rest, &Default::default());
             let params =
                 self.params(&self.tets, scale, |rest| params(rest).map(|p: f64| T::constant(p * size)));
-            let (stiffness, groups) = (self.stiffness(4, scale), groups(&self.tets, count)?);
+            let (stiffness, groups) = (self.stiffness(&self.tets, 4, scale), groups(&self.tets, count)?);
             builder = builder.add::<Volume, 4>(&self.tets, &params, stiffness, &groups)?;
         }
         if !self.triangles.is_empty() {
@@ -216,7 +229,8 @@ impl Body {
                 [T::constant(area * size), T::constant(amplification)]
             };
             let params = self.params(&self.triangles, scale, params);
-            let (stiffness, groups) = (self.stiffness(2, scale), groups(&self.triangles, count)?);
+            let (stiffness, groups) =
+                (self.stiffness(&self.triangles, 2, scale), groups(&self.triangles, count)?);
             builder = builder.add::<SkinTension, 3>(&self.triangles, &params, stiffness, &groups)?;
         }
         for handle in &self.handles {
@@ -235,16 +249,36 @@ impl Body {
         elements.iter().map(|element| params(&element.map(|v| self.rest[v as usize] * scale))).collect()
     }
 
-    /// Stiffness of the kind whose compliance grows by this power of the scale.
-    fn stiffness<T: Scalar>(&self, power: i32, scale: f64) -> Stiffness<T> {
+    /// Stiffness of a kind whose compliance grows by this power of the scale.
+    fn stiffness<T: Scalar, const N: usize>(
+        &self,
+        elements: &[[u32; N]],
+        power: i32,
+        scale: f64,
+    ) -> Stiffness<T> {
         match self.law {
-            Law::Pbd(share) => Stiffness::pbd(T::constant(share)),
+            Law::Pbd(share) => Stiffness::Pbd(self.values(elements, |softening| share * softening)),
             Law::Xpbd(Compliances { distance, skin, volume })
             | Law::Vbd(Compliances { distance, skin, volume }) => {
-                let compliance = [distance, skin, volume][power as usize / 2];
-                Stiffness::compliance(T::constant(compliance * scale.powi(power)))
+                let compliance = [distance, skin, volume][power as usize / 2] * scale.powi(power);
+                Stiffness::Compliance(self.values(elements, |softening| compliance / softening))
             }
         }
+    }
+
+    /// A value for each element from its softening, or one for all if all materials are the same.
+    fn values<T: Scalar, const N: usize>(
+        &self,
+        elements: &[[u32; N]],
+        value: impl Fn(f64) -> f64,
+    ) -> Values<T> {
+        if self.softening.iter().all(|softening| *softening == 1.0) {
+            return Values::Uniform(T::constant(value(1.0)));
+        }
+        let softening = |element: &[u32; N]| {
+            N as f64 / element.iter().map(|&v| 1.0 / self.softening[v as usize]).sum::<f64>()
+        };
+        Values::Each(elements.iter().map(|element| T::constant(value(softening(element)))).collect())
     }
 }
 

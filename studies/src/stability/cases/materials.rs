@@ -1,5 +1,5 @@
-//! Materials: compliances from 0 to 1e6, all stiffnesses of PBD, amplifications and mass ratios up
-//! to 1e6.
+//! Materials: compliances from 0 to 1e6, all stiffnesses of PBD, layers with contrasts up to 1e3,
+//! amplifications and mass ratios up to 1e6.
 
 use cutis_test_kit::Random;
 use nalgebra::Point3;
@@ -23,6 +23,7 @@ const UNDAMPED: Run = Run {
 
 pub fn cases() -> Vec<Case> {
     let mut cases = compliances();
+    cases.extend(layers());
     cases.extend(amplifications());
     cases.extend(masses());
     cases
@@ -77,6 +78,28 @@ fn compliance_cases(cases: &mut Vec<Case>, law: Law, end: End, quick: bool) {
     add("", end, Run::default());
     add(", undamped", End::Bounded, UNDAMPED);
     add(", 8 iterations", end, Run { iterations: 8, ..Run::default() });
+}
+
+/// A block whose lower half is softer than its upper half.
+fn layers() -> Vec<Case> {
+    const STIFF: Law = Law::Xpbd(Compliances::STIFF);
+    let mut cases = Vec::new();
+    for contrast in [10.0, 100.0, 1000.0] {
+        for law in [Law::SOFT, STIFF, Law::PBD, Law::DESCENT, Law::STIFF_DESCENT] {
+            let mut random = Random::new(5);
+            let mut body = Body::block([3, 3, 6], law).placed(deformed()).layered(contrast);
+            body.velocities.iter_mut().for_each(|v| *v = random.vector());
+            let mut add = |name: &str, run| {
+                let name = format!("layers 1 : {contrast}{name}, {}", law.name());
+                let case = Case::new(name, body.clone(), End::Bounded).run(run);
+                cases.push(Case { quick: contrast == 1000.0, ..case });
+            };
+            add("", Run::default());
+            add(", undamped", UNDAMPED);
+            add(", 8 iterations", Run { iterations: 8, ..Run::default() });
+        }
+    }
+    cases
 }
 
 /// A free sheet with stretched skin, and a sheet fixed at its border at a hundred times its area.
