@@ -47,8 +47,32 @@ move_mm = [1, 0, 0]
 dt_s = 0.1
 "#;
 
+/// The section that replaces the moduli of the constraint kinds.
+const MATERIALS: &str = r#"
+[[materials]]
+name = "skin"
+hu = [0, 2]
+depth_mm = [0, 2]
+youngs_modulus_pa = 6e3
+bulk_modulus_pa = 6e4
+source = "nobody"
+[[materials]]
+name = "rest"
+youngs_modulus_pa = 6e3
+bulk_modulus_pa = 6e4
+"#;
+
+/// The scene with every section, and with `materials` in place of the moduli of the constraint
+/// kinds.
+fn with_materials() -> String {
+    EVERYTHING.replace("youngs_modulus_pa = 1e4\n", "").replace("bulk_modulus_pa = 1e5\n", "") + MATERIALS
+}
+
+/// The scene with every section. Overrides of `materials` change the scene that has it.
 fn parse(set: &[(&str, &str)]) -> Result<LoadedScene, Error> {
-    Scene::parse(EVERYTHING, Path::new("every.toml"), Path::new(""), &overrides(set))
+    let materials = set.iter().any(|(key, _)| key.starts_with("materials"));
+    let text = if materials { with_materials() } else { EVERYTHING.to_owned() };
+    Scene::parse(&text, Path::new("every.toml"), Path::new(""), &overrides(set))
 }
 
 /// For every row of the reference: the key as `--set` accepts it, the key as messages name it, and
@@ -115,6 +139,9 @@ fn nan_infinity_and_wrong_types_are_refused() {
             "[number, number, number]" => {
                 &["[nan, 0, 0]", "[0, inf, 0]", "[0, 0, -inf]", "[1, 2]", "[1, 2, 3, 4]", "1.0", "\"text\""]
             }
+            "[number, number]" => {
+                &["[nan, 0]", "[0, inf]", "[-inf, 0]", "[1]", "[1, 2, 3]", "1.0", "\"text\""]
+            }
             "[whole number, whole number, whole number]" => {
                 &["[-1, 2, 2]", "[1.5, 2, 2]", "[2, 2]", "2", "[2, 2, nan]"]
             }
@@ -139,6 +166,8 @@ fn numbers_out_of_range_are_refused() {
         "lattice.spacing_mm",
         "constraints.distance.youngs_modulus_pa",
         "constraints.volume.bulk_modulus_pa",
+        "materials.0.youngs_modulus_pa",
+        "materials.1.bulk_modulus_pa",
         "constraints.stc.area_modulus_n_per_m",
         "constraints.stc.rest_area_scale",
         "constraints.membrane.modulus_along_n_per_m",
@@ -180,6 +209,13 @@ fn numbers_out_of_range_are_refused() {
         ("fixed.bone_above_hu", "-1e300"),
         ("incision.0.at_s", "-0.1"),
         ("incision.0.at_s", "6"),
+        ("materials", "[]"),
+        ("materials", "unheard of"),
+        ("materials.0.name", "\" \""),
+        ("materials.0.hu", "[2, 2]"),
+        ("materials.1.hu", "[2, 1]"),
+        ("materials.0.depth_mm", "[-1, 2]"),
+        ("materials.0.depth_mm", "[2, 0]"),
         ("chainmail.materials", "[]"),
         ("chainmail.materials.0.from_hu", "3"),
         ("chainmail.materials.0.shortest", "1.1"),
@@ -191,7 +227,7 @@ fn numbers_out_of_range_are_refused() {
     ];
     let rows = positive.iter().flat_map(|&key| [(key, "0"), (key, "-1.5")]);
     let rows = rows.chain(shares.iter().flat_map(|&key| [(key, "-0.1"), (key, "1.1")])).chain(others);
-    let name = |key: &str| key.replace(".0.", "[0].");
+    let name = |key: &str| key.replace(".0.", "[0].").replace(".1.", "[1].");
     let failures: Vec<String> =
         rows.filter_map(|(key, value)| refused(key, &name(key), value).err()).collect();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
@@ -211,7 +247,12 @@ fn numbers_out_of_range_are_refused() {
 
 #[test]
 fn contradicting_values_are_refused() {
-    let cases: [(&[(&str, &str)], &str); 9] = [
+    let moduli = ["constraints.distance.youngs_modulus_pa", "constraints.volume.bulk_modulus_pa"];
+    let cases: [(&[(&str, &str)], &str); 13] = [
+        (&[("materials", "layered"), (moduli[0], "1e4")], moduli[0]),
+        (&[("materials", "layered"), (moduli[1], "1e5")], moduli[1]),
+        (&[("constraints.distance", "{}")], moduli[0]),
+        (&[("constraints.volume", "{ stiffness = 1.0 }")], moduli[1]),
         (&[("volume.path", "ct.nii")], "volume"),
         (&[("volume", "{}")], "volume"),
         (&[("volume", "{ path = \"\" }")], "volume.path"),
@@ -241,6 +282,12 @@ fn contradicting_values_are_refused() {
         }
     }
     parse(&[("solver.formulation", "pbd"), ("constraints.stc.form", "paper")]).unwrap();
+    parse(&[("materials", "layered")]).unwrap();
+    // The message names the other place of the modulus.
+    for set in [&[("materials", "layered"), (moduli[0], "1e4")][..], &[("constraints.distance", "{}")]] {
+        let text = parse(set).unwrap_err().to_string();
+        assert!(text.contains("`materials`"), "{text}");
+    }
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod determinism;
 mod gpu;
 mod identity;
 mod left_out;
+mod materials;
 mod outputs;
 mod paper_form;
 mod patch;

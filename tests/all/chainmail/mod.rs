@@ -101,7 +101,8 @@ impl Twin {
     fn of(loaded: &LoadedScene) -> Self {
         let mut other = loaded.clone();
         other.scene.model = ModelChoice::Pbd;
-        other.scene.constraints.distance = Some(DistanceSection { youngs_modulus_pa: 1e4, stiffness: 1.0 });
+        other.scene.constraints.distance =
+            Some(DistanceSection { youngs_modulus_pa: Some(1e4), stiffness: 1.0 });
         let SceneSystem { system, .. } = cutis::build_system(&other).unwrap();
         let rest = system.positions();
         let along = |edge: &[u32]| {

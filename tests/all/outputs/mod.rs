@@ -14,4 +14,4 @@ mod page;
 mod pictures;
 mod report;
 mod tension;
-mod vtu;
+pub mod vtu;

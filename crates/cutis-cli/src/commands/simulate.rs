@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cutis::report::{Backend, Report};
+use cutis::report::{Backend, MaterialRow, Report};
 use cutis::volume::sample::LatticeSize;
 use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOptions, Scene};
 
@@ -111,6 +111,7 @@ fn table(plan: &Plan) -> String {
     ];
     lines.extend(plan.tension.iter().map(|(kind, tension)| format!("tension          {kind}: {tension}")));
     lines.extend(plan.membrane.iter().map(|membrane| format!("lines of tension {}", membrane.summary())));
+    lines.extend(material_lines(&plan.materials));
     lines.extend(cost_lines(plan));
     if !plan.device_memory.is_empty() {
         let parts: Vec<&str> = plan.device_memory.iter().map(|part| part.part.as_str()).collect();
@@ -120,6 +121,29 @@ fn table(plan: &Plan) -> String {
     lines.extend(plan.left_out.iter().map(|line| format!("  {line}")));
     lines.extend(plan.warnings.iter().map(|line| format!("note: {line}")));
     lines.join("\n")
+}
+
+/// The table of materials with the counts of each row, and below each row the source of its values.
+fn material_lines(materials: &[MaterialRow]) -> Vec<String> {
+    if materials.is_empty() {
+        return Vec::new();
+    }
+    let line = |name: &str, [hu, depth, young, bulk, vertices, tets]: [&str; 6]| {
+        format!("  {name:18} {hu:>14} {depth:>10} {young:>10} {bulk:>10} {vertices:>10} {tets:>11}")
+    };
+    let titles = ["HU", "depth, mm", "E, kPa", "K, kPa", "vertices", "tetrahedra"];
+    let mut lines = vec!["materials:".to_owned(), line("name", titles)];
+    let range = |range: Option<[f64; 2]>| {
+        range.map_or_else(|| "any".to_owned(), |[low, high]| format!("{low} to {high}"))
+    };
+    for row in materials {
+        let moduli = [row.youngs_modulus_pa, row.bulk_modulus_pa].map(|pa| format!("{}", pa / 1e3));
+        let counts = [row.vertices, row.tets].map(|count| count.to_string());
+        let (hu, depth) = (range(row.hu), range(row.depth_mm));
+        lines.push(line(&row.name, [&hu, &depth, &moduli[0], &moduli[1], &counts[0], &counts[1]]));
+        lines.extend(row.source.iter().map(|source| format!("    {source}")));
+    }
+    lines
 }
 
 /// The cost report as a table: exact bytes and measured times.

@@ -4,7 +4,7 @@ use cutis_mesh::{Cut, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask
 use cutis_volume::{TableKind, Volume};
 
 use super::lattice::lattice;
-use super::{Body, BodySections, Membrane, air, handles, region};
+use super::{Body, BodyMaterials, BodySections, Membrane, air, handles, region};
 use crate::Error;
 use crate::scene::Keep;
 
@@ -30,6 +30,8 @@ impl Body {
             sections.membrane.map(|section| Membrane::find(file, section, &whole, &hu, &skin)).transpose()?;
         warnings.extend(membrane.iter().flat_map(|membrane| membrane.warnings.iter().cloned()));
         let mut mesh = region::mesh(sections, &whole, &hu, &slits)?;
+        let materials = BodyMaterials::assign(sections, &whole, &hu, &mesh, &skin)?;
+        warnings.extend(materials.iter().flat_map(|materials| materials.warnings(&mesh)));
         let (mut skin, inactive_skin) = mesh.divide_skin(&skin);
         let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
         drop(hu);
@@ -51,6 +53,7 @@ impl Body {
             removed,
             membrane,
             grabbed,
+            materials,
             masses,
             air,
             warnings,

@@ -5,6 +5,7 @@ mod find_skin;
 mod fixed;
 mod handles;
 mod lattice;
+mod materials;
 mod membrane;
 mod region;
 mod sections;
@@ -18,6 +19,7 @@ pub use find_skin::{SkinRequest, find_skin};
 pub(crate) use lattice::even_shape;
 #[cfg(test)]
 pub(crate) use lattice::lattice;
+pub(crate) use materials::BodyMaterials;
 pub(crate) use membrane::{Membrane, Tangent};
 pub(crate) use sections::{BodySections, needs_skin};
 
@@ -50,6 +52,8 @@ pub(crate) struct Body {
     pub(crate) membrane: Option<Membrane>,
     /// Vertices that each handle of the scene grabs, in ascending order.
     pub(crate) grabbed: Vec<Vec<u32>>,
+    /// The material of each vertex; none if the scene has no table of materials.
+    pub(crate) materials: Option<BodyMaterials>,
     /// Lumped masses before the cut, kg.
     masses: Vec<f32>,
     /// Per lattice point: whether it is air.

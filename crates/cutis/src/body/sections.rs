@@ -5,7 +5,7 @@ use cutis_mesh::{Incision, SkinMode};
 use crate::model::ModelChoice;
 use crate::scene::{
     HandleSection, IncisionSection, LatticeSection, LoadedScene, MembraneSection, Scene, SceneFile,
-    TissueSection,
+    TissueMaterials, TissueSection,
 };
 
 /// The sections of a scene that a body is built from.
@@ -19,6 +19,8 @@ pub(crate) struct BodySections<'a> {
     /// The membrane that needs normals and directions of the skin; none if the scene has none, or a
     /// model without constraints.
     pub(crate) membrane: Option<&'a MembraneSection>,
+    /// The table of materials; none if the scene has none or its model does not use it.
+    pub(crate) materials: Option<&'a TissueMaterials>,
     pub(crate) incisions: &'a [IncisionSection],
     pub(crate) handles: &'a [HandleSection],
 }
@@ -32,6 +34,7 @@ impl<'a> BodySections<'a> {
             tissue: &scene.tissue,
             skin: needs_skin(scene).then_some(scene.skin.mode),
             membrane: scene.constraints.membrane.as_ref().filter(|_| scene.model == ModelChoice::Pbd),
+            materials: scene.used_materials(),
             incisions: &scene.incision,
             handles: &scene.handle,
         }
@@ -44,6 +47,7 @@ pub(crate) fn needs_skin(scene: &Scene) -> bool {
         || !scene.incision.is_empty()
         || scene.output.surface
         || scene.output.pictures
+        || scene.used_materials().is_some_and(TissueMaterials::name_depth)
 }
 
 impl From<&IncisionSection> for Incision {

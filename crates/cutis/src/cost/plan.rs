@@ -11,7 +11,7 @@ use crate::body::{Body, Membrane};
 use crate::ct::source::Source;
 use crate::model::constraints::kinds::{ConstraintKind, KindRow, ScanTension};
 use crate::model::{ModelChoice, ModelCosts, ModelInput};
-use crate::output::report::{Backend, MembraneReport, MemoryPart, Sizes, Stage};
+use crate::output::report::{Backend, MaterialRow, MembraneReport, MemoryPart, Sizes, Stage};
 use crate::run::clock::Clock;
 use crate::run::prepare::{Prepared, prepare};
 use crate::scene::{IncisionSection, LoadedScene, Scene};
@@ -33,6 +33,9 @@ pub struct Plan {
     /// Normals and lines of tension of `constraints.membrane`, if the scene has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub membrane: Option<MembraneReport>,
+    /// The scene's table of materials, if its model uses one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<MaterialRow>,
     /// Colors per constraint kind; in vertex block descent only the colors of the vertices, as
     /// `descent`.
     pub colors: BTreeMap<String, usize>,
@@ -91,6 +94,7 @@ impl Plan {
             sizes,
             tension: tensions(scene),
             membrane: body.membrane.as_ref().map(Membrane::report),
+            materials: body.materials.as_ref().map(|of_body| of_body.report(&body.mesh)).unwrap_or_default(),
             colors,
             costs: CostReport::of_memory(&memory, &device_memory, NO_DEVICE),
             memory,

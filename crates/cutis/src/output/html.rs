@@ -7,7 +7,7 @@ use base64::Engine;
 
 use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
 
-use super::report::{Report, Wound};
+use super::report::{MaterialRow, Report, Wound};
 use crate::run::files::{self, RunFolder};
 use crate::run::frames::FrameRow;
 use crate::{CostReport, Error};
@@ -139,6 +139,7 @@ fn tables(report: &Report) -> String {
         );
     }
     out.push_str("</table>");
+    out.push_str(&material_table(&report.materials));
     out.push_str(&report.model_table().map_or_else(|| constraints(report), facts));
     out.push_str(&cost_table(&report.costs));
     if let Some(r) = &report.resample {
@@ -148,6 +149,37 @@ fn tables(report: &Report) -> String {
             r.covered_voxels, r.vacated_voxels, r.folds
         );
     }
+    out
+}
+
+/// The table of materials, with the source of each row.
+fn material_table(materials: &[MaterialRow]) -> String {
+    if materials.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from(
+        "<h2>Materials</h2><table><tr><th>tissue</th><th>HU</th><th>depth, mm</th><th>Young's modulus, kPa</th>\
+         <th>bulk modulus, kPa</th><th>vertices</th><th>tetrahedra</th><th>source</th></tr>",
+    );
+    let range = |range: Option<[f64; 2]>| {
+        range.map_or_else(|| "any".to_owned(), |[low, high]| format!("{low} to {high}"))
+    };
+    for row in materials {
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td>{}</td></tr>",
+            escape(&row.name),
+            range(row.hu),
+            range(row.depth_mm),
+            row.youngs_modulus_pa / 1e3,
+            row.bulk_modulus_pa / 1e3,
+            row.vertices,
+            row.tets,
+            escape(row.source.as_deref().unwrap_or_default()),
+        );
+    }
+    out.push_str("</table>");
     out
 }
 

@@ -31,6 +31,9 @@ pub struct Report {
     pub backend: Backend,
     /// Element counts.
     pub sizes: Sizes,
+    /// The scene's table of materials, if its model uses one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<MaterialRow>,
     /// Quality of the detected skin, if the scene needs the skin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinQuality>,
@@ -143,6 +146,27 @@ pub struct Sizes {
     /// Tetrahedra of the body outside the region of interest.
     #[serde(default)]
     pub frozen_tets: usize,
+}
+
+/// A row of the table of materials, and the part of the body that it holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MaterialRow {
+    /// Name of the tissue.
+    pub name: String,
+    /// Range of HU; none for any HU.
+    pub hu: Option<[f64; 2]>,
+    /// Range of depth below the skin, mm; none for any depth.
+    pub depth_mm: Option<[f64; 2]>,
+    /// Young's modulus of the tissue, Pa; its springs have four times as much.
+    pub youngs_modulus_pa: f64,
+    /// Bulk modulus, Pa.
+    pub bulk_modulus_pa: f64,
+    /// Vertices of this material.
+    pub vertices: usize,
+    /// Tetrahedra whose four vertices are of this material.
+    pub tets: usize,
+    /// Source of the values.
+    pub source: Option<String>,
 }
 
 /// Quality of the detected skin, before the incisions.

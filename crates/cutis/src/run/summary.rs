@@ -37,6 +37,7 @@ pub(super) fn report(
         scene: loaded.scene.clone(),
         backend: plan.backend,
         sizes: plan.sizes,
+        materials: plan.materials,
         skin: body.skin_report.as_ref().map(Into::into),
         tension: plan.tension,
         membrane: plan.membrane,

@@ -54,6 +54,10 @@ pub struct Scene {
     /// Which triangles are skin.
     #[serde(default)]
     pub skin: SkinSection,
+    /// Moduli by HU and by depth below the skin: preset `layered`, `trunk`, `limb` or `head`, or
+    /// rows. Left out: each constraint kind has one modulus for the whole body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub materials: Option<TissueMaterials>,
     /// The constraint kinds; a kind that is left out costs nothing.
     #[serde(default)]
     pub constraints: ConstraintsSection,

@@ -21,13 +21,13 @@ and values out of range are refused by name. `cutis scene new` prints a scene to
 pub fn reference() -> String {
     let page = Page { schema: schema() };
     let mut out = HEAD.to_owned();
-    let (sections, keys): (Vec<_>, Vec<_>) =
-        properties(&page.schema).into_iter().partition(|(_, property)| page.section(property).is_some());
+    let all = properties(&page.schema);
+    let keys: Vec<_> = all.iter().copied().filter(|(_, property)| page.section(property).is_none()).collect();
     if !keys.is_empty() {
         out.push_str("\n## Before the first section\n");
         page.table(&mut out, &page.schema, &keys);
     }
-    for (name, property) in sections {
+    for (name, property) in all {
         page.write_section(&mut out, name, property, required(&page.schema, name));
     }
     out

@@ -89,6 +89,7 @@ impl Scene {
         self.validate_volume(&check)?;
         self.validate_lattice(&check)?;
         self.validate_tissue(&check)?;
+        self.validate_materials(&check)?;
         model::validate(self, &check)?;
         self.validate_incisions(&check)?;
         self.validate_handles(&check)?;

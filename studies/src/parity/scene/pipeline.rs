@@ -49,11 +49,11 @@ pub fn compare(bench: &mut Bench<'_, '_>, case: &SceneCase) -> Result<(), Failur
     }
     let constraints = &mut stiffer.scene.constraints;
     if let Some(distance) = &mut constraints.distance {
-        distance.youngs_modulus_pa *= 1.1;
+        distance.youngs_modulus_pa = distance.youngs_modulus_pa.map(|pa| 1.1 * pa);
         distance.stiffness *= 0.99;
     }
     if let Some(volume) = &mut constraints.volume {
-        volume.bulk_modulus_pa *= 1.1;
+        volume.bulk_modulus_pa = volume.bulk_modulus_pa.map(|pa| 1.1 * pa);
         volume.stiffness *= 0.99;
     }
     if let Some(stc) = &mut constraints.stc {

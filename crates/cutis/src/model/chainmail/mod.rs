@@ -124,6 +124,10 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
     lines_that_hold(&[
         (scene.constraints != Default::default(), "constraints have no effect with model = \"chainmail\""),
         (
+            scene.materials.is_some(),
+            "materials have no effect with model = \"chainmail\", whose limits are in chainmail.materials",
+        ),
+        (
             scene.solver.gravity_m_s2 != [0.0; 3],
             "solver.gravity_m_s2 has no effect with model = \"chainmail\"",
         ),

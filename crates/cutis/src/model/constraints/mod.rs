@@ -9,14 +9,14 @@ mod start;
 
 use std::collections::BTreeMap;
 
-use cutis_solver::{Settings, StepProfile, System};
+use cutis_solver::{Formulation, Settings, StepProfile, System};
 
 use super::costs::{lines_that_hold, sizes, unfinished_handles};
 use super::{Model, ModelCosts, ModelInput, Started};
 use crate::backend::{Chosen, Request};
 use crate::run::clock::Clock;
-use crate::scene::Scene;
 use crate::scene::validate::Check;
+use crate::scene::{Scene, TissueMaterials};
 use crate::{CostReport, Error, Progress};
 
 pub(crate) use estimate::CostEstimate;
@@ -99,6 +99,12 @@ fn left_out(scene: &Scene) -> Vec<String> {
     let mut lines: Vec<String> = absent
         .map(|row| format!("{}: no {} constraints are stored or projected", row.key, row.facts.element))
         .collect();
+    if scene.materials.is_none() {
+        lines.push("materials: each kind has one modulus for all elements".to_owned());
+    } else if !scene.used_materials().is_some_and(TissueMaterials::name_depth) {
+        lines
+            .push("depth: no material depends on the depth below the skin, so it is not computed".to_owned());
+    }
     if scene.solver.iterations == 1 {
         lines.push("multipliers: one iteration per substep needs none stored".to_owned());
     }
@@ -122,6 +128,16 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
         (
             gravity && scene.scan_is_at_rest,
             "solver.gravity_m_s2 moves nothing: the scan is at rest under its weight (scan_is_at_rest)",
+        ),
+        (
+            scene.materials.is_some() && scene.solver.formulation == Formulation::Pbd,
+            "materials have no effect with solver.formulation = \"pbd\", which has no moduli",
+        ),
+        (
+            scene.materials.is_some()
+                && scene.constraints.distance.is_none()
+                && scene.constraints.volume.is_none(),
+            "materials have no effect without constraints.distance and constraints.volume",
         ),
     ])
 }

@@ -2,8 +2,11 @@
 
 mod actions;
 mod body;
+mod material_presets;
+mod materials;
 mod running;
 
 pub use actions::*;
 pub use body::*;
+pub use materials::*;
 pub use running::*;

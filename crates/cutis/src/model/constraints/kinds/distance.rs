@@ -6,17 +6,23 @@ use cutis_solver::{Stiffness, SystemBuilder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::moduli::{self, SPRINGS_OVER_BODY};
 use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
 use crate::Error;
-use crate::scene::Scene;
 use crate::scene::validate::Check;
+use crate::scene::{Scene, TissueMaterialSection};
+
+/// Key of the modulus.
+const MODULUS_KEY: &str = "constraints.distance.youngs_modulus_pa";
 
 /// Springs along the lattice edges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DistanceSection {
-    /// Young's modulus, Pa (`xpbd`).
-    pub youngs_modulus_pa: f64,
+    /// Young's modulus of the springs, Pa (`xpbd`, `vbd`): about four times that of the body.
+    /// Required without `materials`; to be left out with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub youngs_modulus_pa: Option<f64>,
     /// Share of the error that a projection removes, 0 to 1 (`pbd`).
     #[serde(default = "one")]
     pub stiffness: f64,
@@ -34,8 +40,8 @@ impl DistanceSection {
 }
 
 impl ConstraintKind for DistanceSection {
-    fn validate(&self, _: &Scene, check: &Check<'_>) -> Result<(), Error> {
-        check.positive("constraints.distance.youngs_modulus_pa", self.youngs_modulus_pa)?;
+    fn validate(&self, scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
+        moduli::validate(scene, check, MODULUS_KEY, self.youngs_modulus_pa)?;
         check.share("constraints.distance.stiffness", self.stiffness)
     }
 
@@ -48,9 +54,11 @@ impl ConstraintKind for DistanceSection {
         let groups = Groups::from_colors(&mesh.edge_colors(&mesh.edges))?;
         let stiffness = if parts.compliant() {
             let volumes = mesh.edge_volumes();
+            let of_row = |row: &TissueMaterialSection| SPRINGS_OVER_BODY * row.youngs_modulus_pa;
+            let moduli = parts.moduli(MODULUS_KEY, self.youngs_modulus_pa, of_row)?;
             compliances(&mesh.edges, |n, [a, b]| {
                 let length = nalgebra::distance(&parts.position(a), &parts.position(b));
-                cutis_constraints::distance_compliance(length, self.youngs_modulus_pa, f64::from(volumes[n]))
+                cutis_constraints::distance_compliance(length, moduli.of([a, b]), f64::from(volumes[n]))
             })?
         } else {
             Stiffness::pbd(self.stiffness as f32)

@@ -8,6 +8,7 @@ mod distance;
 mod freed;
 mod membrane;
 mod membrane_presets;
+mod moduli;
 mod skin_tension;
 mod tet_volume;
 

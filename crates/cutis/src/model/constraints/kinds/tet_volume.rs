@@ -6,17 +6,21 @@ use cutis_solver::{Stiffness, SystemBuilder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
+use super::{BodyParts, ConstraintKind, KindFacts, compliances, moduli, one};
 use crate::Error;
 use crate::scene::Scene;
 use crate::scene::validate::Check;
+
+/// Key of the modulus.
+const MODULUS_KEY: &str = "constraints.volume.bulk_modulus_pa";
 
 /// Volumes of the tetrahedra.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeConstraintSection {
-    /// Bulk modulus, Pa (`xpbd`).
-    pub bulk_modulus_pa: f64,
+    /// Bulk modulus, Pa (`xpbd`, `vbd`). Required without `materials`; to be left out with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bulk_modulus_pa: Option<f64>,
     /// Share of the error that a projection removes, 0 to 1 (`pbd`).
     #[serde(default = "one")]
     pub stiffness: f64,
@@ -34,8 +38,8 @@ impl VolumeConstraintSection {
 }
 
 impl ConstraintKind for VolumeConstraintSection {
-    fn validate(&self, _: &Scene, check: &Check<'_>) -> Result<(), Error> {
-        check.positive("constraints.volume.bulk_modulus_pa", self.bulk_modulus_pa)?;
+    fn validate(&self, scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
+        moduli::validate(scene, check, MODULUS_KEY, self.bulk_modulus_pa)?;
         check.share("constraints.volume.stiffness", self.stiffness)
     }
 
@@ -48,8 +52,9 @@ impl ConstraintKind for VolumeConstraintSection {
         let groups = Groups::from_colors(&mesh.tet_colors(&mesh.tets))?;
         let stiffness = if parts.compliant() {
             let volumes = mesh.tet_volumes();
-            compliances(&mesh.tets, |n, _| {
-                cutis_constraints::volume_compliance(f64::from(volumes[n]), self.bulk_modulus_pa)
+            let moduli = parts.moduli(MODULUS_KEY, self.bulk_modulus_pa, |row| row.bulk_modulus_pa)?;
+            compliances(&mesh.tets, |n, tet| {
+                cutis_constraints::volume_compliance(f64::from(volumes[n]), moduli.of(tet))
             })?
         } else {
             Stiffness::pbd(self.stiffness as f32)
