@@ -1,5 +1,6 @@
 //! Cost and error of a region of interest and of a graded lattice, compared with the whole body, on
-//! the phantom and on a real abdomen.
+//! the phantom and on a real abdomen. And the error of regions in a body that is not at rest in the
+//! scan.
 
 use std::io::Write;
 
@@ -24,7 +25,8 @@ pub struct Options {
 /// Number of scenes of the main job in this study.
 const COMPARED: usize = 2;
 /// Tables of the page.
-pub const TABLES: [&str; 4] = ["provenance", "demo", "abdomen-incision", "checks"];
+pub const TABLES: [&str; 6] =
+    ["provenance", "demo", "demo-not-at-rest", "abdomen-incision", "abdomen-incision-not-at-rest", "checks"];
 
 /// Region and grading of each variant, as TOML. The first is the whole body, then the regions by
 /// size.
@@ -47,6 +49,8 @@ const VARIANTS: [(Option<&str>, Option<&str>); 15] = [
 ];
 /// Index of the smallest and of the largest region.
 const REGIONS: [usize; 2] = [1, 6];
+/// Index of the region of 40 mm.
+const REGION_40: usize = 3;
 /// Frames of the second run of each variant, which only measures time.
 const TIMED_FRAMES: &str = "10";
 
@@ -85,8 +89,20 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         check(name, &variants, &mut checks);
         let table = table(&variants).markdown();
         writeln!(out, "{name}\n\n{table}")?;
+        let mut moving = Vec::new();
+        for (region, grading) in VARIANTS.into_iter().take(REGIONS[1] + 1) {
+            let report = simulate((region, grading), &["--set", "scan_is_at_rest=false"])?;
+            moving.push(Variant::of(region, grading, &report)?);
+        }
+        let [at_rest, not] = [&variants, &moving].map(|of| of[REGION_40].error(&of[0]).abs());
+        let what =
+            format!("{name}: 40 mm have a larger error if the scan is not at rest ({at_rest:.3}, {not:.3})");
+        checks.control(what, not > at_rest);
+        let errors = errors(&moving).markdown();
+        writeln!(out, "{errors}")?;
         if let Some(page) = &mut page {
             page.set(name, &table)?;
+            page.set(&format!("{name}-not-at-rest"), &errors)?;
         }
     }
     checks.print(out)?;
@@ -172,6 +188,20 @@ fn table(variants: &[Variant]) -> Table {
             format!("{:.0} %", 100.0 * variant.ms_min / whole.ms_min),
             format!("{:.2}", variant.growth_mm),
             format!("{:+.1} %", 100.0 * variant.error(whole)),
+            optional(variant.border_mm, |border| format!("{border:.2} of {:.2}", variant.largest_mm)),
+        ]);
+    }
+    table
+}
+
+/// Growth of the opening and error by region.
+fn errors(variants: &[Variant]) -> Table {
+    let mut table = Table::new(["region", "growth, mm", "error", "displacement at the border, mm"]);
+    for variant in variants {
+        table.add([
+            variant.region.clone(),
+            format!("{:.2}", variant.growth_mm),
+            format!("{:+.1} %", 100.0 * variant.error(&variants[0])),
             optional(variant.border_mm, |border| format!("{border:.2} of {:.2}", variant.largest_mm)),
         ]);
     }

@@ -19,6 +19,15 @@ fn skin_that_is_too_stiff_for_the_substeps_causes_a_warning() {
 }
 
 #[test]
+fn a_membrane_that_is_too_stiff_for_the_substeps_causes_a_warning() {
+    let membrane = ("constraints", "{ membrane = { preset = 'trunk' } }");
+    assert!(warns(&[membrane, ("scan_is_at_rest", "true"), ("solver.substeps", "5")], "opens too far"));
+    assert!(warns(&[membrane, ("solver.substeps", "5")], "opens less"));
+    assert!(!warns(&[membrane, ("solver.substeps", "1000")], "stiffer than"));
+    assert!(!warns(&[membrane, ("solver.substeps", "5"), ("solver.formulation", "vbd")], "stiffer than"));
+}
+
+#[test]
 fn narrow_slits_and_free_bodies_cause_warnings() {
     assert!(warns(&[("incision[0].width_mm", "2.0")], "incision[0].width_mm = 2"));
     assert!(!warns(&[("incision.0.width_mm", "12.0")], "width_mm"));

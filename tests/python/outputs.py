@@ -24,6 +24,7 @@ from _compare import (
 
 # Springs at rest, so that only gravity moves the body in these scenes.
 SCENE = """
+scan_is_at_rest = false
 [volume]
 path = "{volume}"
 [tissue]
@@ -70,7 +71,7 @@ REPORT_KEYS = {
     "inputs": (),
     "backend": ("name", "adapter"),
     "sizes": ("vertices", "edges", "tets", "skin_triangles"),
-    "colors": ("distance", "volume", "stc"),
+    "colors": ("distance", "volume", "membrane"),
     "stages": (),
     "frames": ("count", "ms_mean", "ms_min"),
     "wound": ("initial_mm", "final_mm", "mid_mm"),

@@ -46,6 +46,7 @@ pub const VOXEL_MM: f64 = 4.0;
 pub const STEP_MM: f64 = 8.0;
 
 const SCENE: &str = r#"
+scan_is_at_rest = false
 [constraints]
 distance = { youngs_modulus_pa = 5.0e3 }
 volume = { bulk_modulus_pa = 5.0e4 }

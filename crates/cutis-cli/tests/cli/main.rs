@@ -20,6 +20,7 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_cutis");
 
 /// A torso of a few thousand vertices with an incision. A run takes a fraction of a second.
 const SCENE: &str = r#"
+scan_is_at_rest = false
 incision = [{ from_mm = [30, 110, -50], to_mm = [30, 110, 50], depth_mm = 20.0, width_mm = 10.0 }]
 [volume]
 phantom = { size = [48, 48, 36], seed = 1 }

@@ -116,7 +116,8 @@ fn not_held(
     depth_mm: Option<f32>,
     count: usize,
 ) -> String {
-    let (hu, depth) = (mesh.hu[vertex], depth_mm.unwrap_or(0.0));
+    let deepest = rows.iter().filter_map(|row| row.depth_mm).map(|[_, high]| high as f32).fold(0.0, f32::max);
+    let (hu, depth) = (mesh.hu[vertex], depth_mm.unwrap_or(0.0).min(deepest));
     let shown = match depth_mm {
         Some(depth) if depth.is_finite() => format!(", {depth} mm below the skin"),
         Some(_) => ", deeper below the skin than all layers".to_owned(),

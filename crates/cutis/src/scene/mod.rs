@@ -41,7 +41,7 @@ pub struct Scene {
     /// Whether the scan shows the body in equilibrium (`pbd`). If so, a constant load balances the
     /// skin's tension and the weight of the uncut body, so that only a cut or a handle moves it. If
     /// not, the body shrinks and sags from the first frame, as in the paper.
-    #[serde(default)]
+    #[serde(default = "at_rest")]
     pub scan_is_at_rest: bool,
     /// Where the CT comes from.
     pub volume: VolumeSection,
@@ -82,4 +82,8 @@ pub struct Scene {
     /// The files to write. Left out: everything but the tissue mesh.
     #[serde(default)]
     pub output: OutputSection,
+}
+
+fn at_rest() -> bool {
+    true
 }

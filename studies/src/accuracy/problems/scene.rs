@@ -18,7 +18,7 @@ pub fn incision(spacing_mm: f64) -> Result<Problem, Failure> {
     let what = format!(
         "the demo's phantom on a lattice of {spacing_mm} mm, cut on the belly; skin tension opens the wound"
     );
-    from_scene("incision", what, "demo", &[("lattice.spacing_mm", spacing_mm.to_string())])
+    from_scene("incision", what, "demo-paper", &[("lattice.spacing_mm", spacing_mm.to_string())])
 }
 
 /// Path of the scan of [`abdomen`].
@@ -41,7 +41,7 @@ pub fn abdomen(spacing_mm: f64) -> Result<Option<Problem>, Failure> {
         "a real abdomen on a lattice of {spacing_mm} mm, cut on the belly; skin tension opens the wound"
     );
     let set = [("lattice.spacing_mm", spacing_mm.to_string()), ("volume.path", path.display().to_string())];
-    from_scene("abdomen", what, "abdomen-incision", &set).map(Some)
+    from_scene("abdomen", what, "abdomen-paper", &set).map(Some)
 }
 
 /// The phantom without an incision. A handle on the skin of the belly pulls it up and to the side.
@@ -61,7 +61,7 @@ pub fn drag(spacing_mm: f64) -> Result<Problem, Failure> {
         ("constraints.stc.rest_area_scale", "1.0".to_owned()),
         ("handle", handle.to_owned()),
     ];
-    let mut problem = from_scene("drag", what, "demo", &set)?;
+    let mut problem = from_scene("drag", what, "demo-paper", &set)?;
     problem.instants = vec![4, 10];
     problem.compared_at = 12;
     Ok(problem)

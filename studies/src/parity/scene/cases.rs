@@ -30,13 +30,19 @@ pub fn all(effort: Effort) -> Result<Vec<SceneCase>, Failure> {
     let frames = if quick { 2 } else { 5 };
     let (size, spacing) = if quick { ("[64, 64, 48]", "12.0") } else { ("[96, 96, 64]", "8.0") };
     let phantom = format!("{{ size = {size}, seed = 1 }}");
-    let coarse =
-        [("volume.phantom", phantom.as_str()), ("lattice.spacing_mm", spacing), ("solver.substeps", "5")];
+    let coarse = [
+        ("volume.phantom", phantom.as_str()),
+        ("lattice.spacing_mm", spacing),
+        ("solver.formulation", "xpbd"),
+        ("solver.substeps", "5"),
+        ("solver.iterations", "1"),
+    ];
     let mut cases = vec![
         SceneCase::new("demo, coarse", cutis::demo(&set(&coarse))?, frames, true),
         SceneCase::new("demo, coarse, PBD", pbd(cutis::demo(&set(&coarse))?), frames, false),
         SceneCase::new("demo, coarse, VBD", vbd(cutis::demo(&set(&coarse))?), frames, false),
         SceneCase::new("demo, coarse, 3 iterations", iterated(cutis::demo(&set(&coarse))?), frames, false),
+        SceneCase::new("demo of the paper, coarse", fixture("demo-paper", &coarse)?, frames, true),
         abdomen(quick, frames)?,
         handle(frames)?,
     ];
@@ -96,6 +102,13 @@ fn kinds(frames: u32) -> Result<Vec<SceneCase>, Failure> {
             constraints.volume = constraints.volume.take().filter(|_| kept[1]);
             constraints.stc = constraints.stc.take().filter(|_| kept[2]);
             cases.push(SceneCase::new(&format!("{kind}, {formula}"), loaded, frames, false));
+        }
+        for (state, at_rest) in [("at rest", "true"), ("free", "false")] {
+            let membrane =
+                [("constraints", "{ membrane = { preset = 'trunk' } }"), ("scan_is_at_rest", at_rest)];
+            let mut loaded = fixture("phantom-small", &[SMALL, &membrane].concat())?;
+            loaded.scene.solver.formulation = formulation;
+            cases.push(SceneCase::new(&format!("membrane, {state}, {formula}"), loaded, frames, false));
         }
     }
     let mut loaded = pbd(fixture("phantom-small", SMALL)?);

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::freed::Strength;
 use super::membrane_presets::{MembranePreset, PRESETS, preset};
+use super::too_stiff::too_stiff;
 use super::{BodyParts, ConstraintKind, KindFacts, ScanTension, one};
 use crate::Error;
 use crate::body::Tangent;
@@ -26,7 +27,7 @@ use crate::scene::{Scene, SceneFile};
 #[serde(deny_unknown_fields)]
 pub struct MembraneSection {
     /// Part of the body whose values are used unless a key gives another one: `arm`, `limb`,
-    /// `trunk`, `cheek`.
+    /// `trunk`, `head`, `cheek`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preset: Option<String>,
     /// Tension along the lines in the scan, N/m; below the modulus.
@@ -205,6 +206,20 @@ impl MembraneSection {
         Ok(strips)
     }
 
+    /// Mean over the strips of √(Σ w|∇C|²/α), 1/s: the angular frequency at which a strip alone
+    /// would oscillate. Zero without strips.
+    fn frequency(&self, parts: &BodyParts<'_>) -> f64 {
+        let strips = self.strips(parts, &parts.body.skin).unwrap_or_default();
+        let frequency = |strip: &Strip| {
+            let [b1, b2, ..] =
+                SkinStrip::from_rest(&strip.triangle.map(|v| parts.position(v)), &strip.material);
+            let weighted = |(v, b): (u32, f64)| f64::from(parts.inverse_masses[v as usize]) * b * b;
+            let sum: f64 = strip.triangle.into_iter().zip([b1, b2, -b1 - b2]).map(weighted).sum();
+            (sum / strip.compliance).sqrt()
+        };
+        strips.iter().map(frequency).sum::<f64>() / strips.len().max(1) as f64
+    }
+
     /// Adds one type of strip for all strips.
     fn add_type<C: Constraint<3, Material = SkinStripMaterial>>(
         &self,
@@ -340,6 +355,10 @@ impl ConstraintKind for MembraneSection {
         if parts.nothing_fixed && !parts.at_rest {
             warnings
                 .push("skin tension acts and nothing is fixed: the whole body may shrink and drift".into());
+        }
+        if parts.solver.formulation == Formulation::Xpbd {
+            let does = if parts.at_rest { "opens too far" } else { "opens less than its modulus asks for" };
+            warnings.extend(too_stiff(does, parts.solver, self.frequency(parts)));
         }
         warnings
     }

@@ -59,6 +59,14 @@ pub(crate) const PRESETS: &[MembranePreset] = &[
         source: "chosen between the arm (Flynn, Taberner, Nielsen 2011) and the face (Flynn et al. 2018)",
     },
     MembranePreset {
+        name: "head",
+        tension: [20.0, 10.0],
+        tension_range: [7.0, 106.0],
+        modulus: [80.0, 50.0],
+        directions: around,
+        source: "chosen between the trunk and the cheek, for the neck and the rest of the head",
+    },
+    MembranePreset {
         name: "cheek",
         tension: [40.0, 20.0],
         tension_range: [7.0, 106.0],

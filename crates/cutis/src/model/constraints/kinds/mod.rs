@@ -11,6 +11,7 @@ mod membrane_presets;
 mod moduli;
 mod skin_tension;
 mod tet_volume;
+mod too_stiff;
 
 use std::fmt;
 

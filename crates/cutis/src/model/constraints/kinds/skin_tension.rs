@@ -12,10 +12,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::freed::Strength;
+use super::too_stiff::too_stiff;
 use super::{BodyParts, ConstraintKind, KindFacts, ScanTension, compliances, one};
 use crate::Error;
 use crate::scene::validate::Check;
-use crate::scene::{Scene, SolverSection, TableChoice};
+use crate::scene::{Scene, TableChoice};
 
 /// Key of the table that scales the modulus.
 const TABLE_KEY: &str = "constraints.stc.stiffness_table";
@@ -313,27 +314,14 @@ impl ConstraintKind for StcSection {
         if parts.body.skin.is_empty() {
             warnings.push("no skin was found: skin tension has nothing to act on".to_owned());
         } else if parts.solver.formulation == Formulation::Xpbd {
-            warnings.extend(too_stiff(parts.solver, self.frequency(parts)));
+            warnings.extend(too_stiff(
+                "opens less than its modulus asks for",
+                parts.solver,
+                self.frequency(parts),
+            ));
         }
         warnings
     }
-}
-
-/// Warns if skin tension is too stiff for the substeps. One projection per substep moves a vertex
-/// as far as its inertia lets it within `h`. Beyond `h·frequency` of about one half, the wound
-/// opens less than the modulus asks for, and the deficit grows as the lattice gets finer. With 2
-/// projections per 1/frequency, the openings of the demo were within 5 % of those with many more.
-fn too_stiff(solver: &SolverSection, frequency: f64) -> Option<String> {
-    let projections = f64::from(solver.substeps) * f64::from(solver.iterations);
-    let needed = (2.0 * solver.dt_s * frequency / f64::from(solver.iterations)).ceil();
-    (projections < 1.5 * solver.dt_s * frequency).then(|| {
-        format!(
-            "skin tension is stiffer than {} substeps can follow on this lattice: the wound will open less \
-             than the modulus asks for; about {needed} substeps would do (or a coarser lattice, or a lower \
-             area modulus)",
-            solver.substeps
-        )
-    })
 }
 
 fn corners(parts: &BodyParts<'_>, triangle: &[u32; 3]) -> [Point3<f32>; 3] {
