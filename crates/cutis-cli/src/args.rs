@@ -109,6 +109,10 @@ pub(crate) enum Command {
         /// Seed of the anatomy and the noise
         #[arg(long, default_value_t = 0)]
         seed: u64,
+        /// Turn the person in the scanner: degrees about the x axis first, then about y, then z
+        #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], value_parser = angle,
+              allow_negative_numbers = true)]
+        turn_deg: Vec<f64>,
         /// File to write (.nii or .nii.gz)
         #[arg(long)]
         out: PathBuf,
@@ -254,6 +258,11 @@ fn one_of<T: Copy + Send + Sync>(values: &'static [Named<T>]) -> impl TypedValue
         let named = values.iter().find(|(name, ..)| *name == text);
         named.map(|&(_, value, _)| value).ok_or("not one of the values")
     })
+}
+
+fn angle(text: &str) -> Result<f64, String> {
+    let angle = text.parse().ok().filter(|angle: &f64| angle.is_finite());
+    angle.ok_or_else(|| format!("`{text}` must be an angle in degrees, for example 15 or -22.5"))
 }
 
 fn size(text: &str) -> Result<[usize; 3], String> {

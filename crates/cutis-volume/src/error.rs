@@ -171,6 +171,12 @@ pub enum VolumeError {
         /// Largest number of voxels per axis.
         most: usize,
     },
+    /// An angle by which a phantom is to be turned is not finite.
+    #[error("turn_deg = {turn_deg:?} is not possible: expected three finite angles in degrees")]
+    PhantomTurn {
+        /// Angles about x, y and z in degrees.
+        turn_deg: [f64; 3],
+    },
     /// A range of slices is not within the volume.
     #[error("slices {start}..{end} do not exist: the volume has {count}")]
     SliceRange {

@@ -75,8 +75,11 @@ fn skin_page(report: &SkinReport, out: Option<&Path>) -> String {
     lines.join("\n")
 }
 
-pub(crate) fn phantom(size: [usize; 3], seed: u64, out: &Path) -> Result<(), Error> {
-    let phantom = Phantom::new(size, seed)?;
+pub(crate) fn phantom(size: [usize; 3], seed: u64, turn_deg: &[f64], out: &Path) -> Result<(), Error> {
+    let mut phantom = Phantom::new(size, seed)?;
+    if let &[x, y, z] = turn_deg {
+        phantom = phantom.turned([x, y, z])?;
+    }
     let terminal = Terminal::new();
     terminal.begin("make the phantom", size[2] as u64);
     phantom.write(out, &|done, _total| terminal.advance(done as u64))?;

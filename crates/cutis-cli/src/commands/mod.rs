@@ -26,7 +26,7 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
         Command::Skin { volume, lattice, mode, split, out, json } => {
             look::skin(&volume, lattice, mode, split, out.as_deref(), json)
         }
-        Command::Phantom { size, seed, out } => look::phantom(size, seed, &out),
+        Command::Phantom { size, seed, turn_deg, out } => look::phantom(size, seed, &turn_deg, &out),
         Command::Render { volume, out, side, slice, window, focus, zoom, pixels } => {
             look::render(&volume, &out, &look::Look { side, slice, window, focus, zoom, pixels })
         }

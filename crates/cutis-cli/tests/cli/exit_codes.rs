@@ -24,7 +24,7 @@ fn successful_calls_end_with_zero() {
 #[test]
 fn usage_errors_end_with_two() {
     let desk = Desk::new();
-    let calls: [&[&str]; 13] = [
+    let calls: [&[&str]; 15] = [
         &[],
         &["unheard-of"],
         &["run"],
@@ -36,6 +36,8 @@ fn usage_errors_end_with_two() {
         &["check", "scene.toml", "--lattice", "1,2"],
         &["skin", "a.nii", "--mode", "unheard-of"],
         &["phantom", "--size", "8,8", "--out", "a.nii"],
+        &["phantom", "--turn-deg", "15", "0", "--out", "a.nii"],
+        &["phantom", "--turn-deg", "15", "nan", "0", "--out", "a.nii"],
         &["render", "a.nii", "--out", "a.png", "--side", "inside"],
         &["render", "a.nii", "--out", "a.png", "--slice", "axial@1", "--side", "left"],
     ];

@@ -126,6 +126,17 @@ fn inspect_prints_the_values_of_its_json() {
     assert!(page.contains(&format!("spacing      {} mm", spacing.join(" x "))), "{page}");
 }
 
+#[test]
+fn a_turned_phantom_is_cut_at_the_turned_place() {
+    let desk = Desk::new();
+    let place = |options: &str| call(&desk, &format!("phantom --size 20,20,12 --seed 7 {options}")).stdout;
+    let upright = place("--out a.nii");
+    assert!(upright.contains("from_mm = [36.0, 109.3, -85.0]"), "{upright}");
+    let turned = place("--turn-deg 0 0 -90 --out b.nii");
+    assert!(turned.contains("from_mm = [109.3, -36.0, -85.0]"), "{turned}");
+    assert_ne!(std::fs::read(desk.path("a.nii")).unwrap(), std::fs::read(desk.path("b.nii")).unwrap());
+}
+
 /// Draws a picture and returns its pixels and its width.
 fn pixels(desk: &Desk, options: &str) -> (Vec<[u8; 3]>, usize) {
     call(desk, &format!("render ct.nii --out picture.png --pixels 200 {options}"));

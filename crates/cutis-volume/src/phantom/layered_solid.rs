@@ -63,31 +63,41 @@ impl LayeredSolid {
     }
 }
 
-/// A layered solid with those of its solids that reach one axial plane.
-pub(super) struct InPlane<'a> {
+/// A layered solid with those of its solids that reach one box of the scan.
+pub(super) struct InBox<'a> {
     whole: &'a LayeredSolid,
     solids: Vec<&'a (Solid, Bounds)>,
 }
 
-impl InPlane<'_> {
+impl InBox<'_> {
     fn reaches_row(&self, y: f32, blend_mm: f32) -> bool {
         self.solids.iter().any(|(_, bounds)| bounds.covers(1, y, self.whole.wobble_mm + blend_mm))
     }
 }
 
-/// The layered solids that reach the plane at height `z`, in painting order.
-pub(super) fn in_plane(all: &[LayeredSolid], z: f32, blend_mm: f32) -> Vec<InPlane<'_>> {
-    let reaches = |whole: &LayeredSolid, bounds: &Bounds| bounds.covers(2, z, whole.wobble_mm + blend_mm);
-    let cut = all.iter().map(|whole| InPlane {
+/// The layered solids that reach the box between two corners, in painting order. Edges are blended
+/// over `blend_mm`.
+pub(super) fn in_box(all: &[LayeredSolid], [low, high]: [[f32; 3]; 2], blend_mm: f32) -> Vec<InBox<'_>> {
+    let reaches = |whole: &LayeredSolid, bounds: &Bounds| {
+        let margin = whole.wobble_mm + blend_mm;
+        (0..3).all(|axis| high[axis] >= bounds.low[axis] - margin && low[axis] <= bounds.high[axis] + margin)
+    };
+    let cut = all.iter().map(|whole| InBox {
         whole,
         solids: whole.solids.iter().filter(|(_, bounds)| reaches(whole, bounds)).collect(),
     });
-    cut.filter(|in_plane| !in_plane.solids.is_empty()).collect()
+    cut.filter(|in_box| !in_box.solids.is_empty()).collect()
+}
+
+/// The layered solids that reach the axial plane at height `z`, in painting order.
+pub(super) fn in_plane(all: &[LayeredSolid], z: f32, blend_mm: f32) -> Vec<InBox<'_>> {
+    const ALL: f32 = f32::INFINITY;
+    in_box(all, [[-ALL, -ALL, z], [ALL, ALL, z]], blend_mm)
 }
 
 /// A row of sample points along x, with buffers for painting it.
-pub(super) struct SampleRow<'a> {
-    xs: &'a [f32],
+pub(super) struct SampleRow {
+    xs: Vec<f32>,
     step: f32,
     blend_mm: f32,
     hu: Vec<f32>,
@@ -105,13 +115,13 @@ pub(super) struct Surroundings {
     pub(super) grain: Field,
 }
 
-impl<'a> SampleRow<'a> {
+impl SampleRow {
     /// Creates a row with the sample points `xs`, ascending with distance `step`. Edges are blended
     /// over `blend_mm`.
-    pub(super) fn new(xs: &'a [f32], step: f32, blend_mm: f32) -> Self {
+    pub(super) fn new(xs: &[f32], step: f32, blend_mm: f32) -> Self {
         let zeros = || vec![0.0; xs.len()];
         Self {
-            xs,
+            xs: xs.to_vec(),
             step,
             blend_mm,
             hu: zeros(),
@@ -123,11 +133,23 @@ impl<'a> SampleRow<'a> {
         }
     }
 
+    /// Hounsfield units at one point, for a row of one sample.
+    pub(super) fn paint_point(
+        &mut self,
+        solids: &[InBox<'_>],
+        around: &Surroundings,
+        [x, y, z]: [f32; 3],
+        background_hu: f32,
+    ) -> f32 {
+        self.xs[0] = x;
+        self.paint(solids, around, y, z, background_hu)[0]
+    }
+
     /// Hounsfield units of the row at `(y, z)`: the background with the solids painted over it in
     /// order.
     pub(super) fn paint(
         &mut self,
-        solids: &[InPlane<'_>],
+        solids: &[InBox<'_>],
         around: &Surroundings,
         y: f32,
         z: f32,
@@ -138,17 +160,17 @@ impl<'a> SampleRow<'a> {
             return &self.hu;
         }
         self.cavity.fill(f32::INFINITY);
-        around.cavity.lower_row(self.xs, y, z, &mut self.cavity);
-        around.wobble.fill_row(self.xs, y, z, &mut self.columns, &mut self.wobble);
-        around.grain.fill_row(self.xs, y, z, &mut self.columns, &mut self.grain);
+        around.cavity.lower_row(&self.xs, y, z, &mut self.cavity);
+        around.wobble.fill_row(&self.xs, y, z, &mut self.columns, &mut self.wobble);
+        around.grain.fill_row(&self.xs, y, z, &mut self.columns, &mut self.grain);
         for solid in solids {
             self.paint_solid(solid, y, z);
         }
         &self.hu
     }
 
-    fn paint_solid(&mut self, in_plane: &InPlane<'_>, y: f32, z: f32) {
-        let whole = in_plane.whole;
+    fn paint_solid(&mut self, in_box: &InBox<'_>, y: f32, z: f32) {
+        let whole = in_box.whole;
         let scale = 1.0 / self.blend_mm;
         let side = match whole.above {
             Some((axis, level)) => coverage(level - if axis == 1 { y } else { z }, scale),
@@ -159,8 +181,8 @@ impl<'a> SampleRow<'a> {
         }
         let margin = whole.wobble_mm + self.blend_mm;
         let mut touched = self.xs.len()..0;
-        for (solid, bounds) in &in_plane.solids {
-            if bounds.covers(1, y, margin) {
+        for (solid, bounds) in &in_box.solids {
+            if bounds.covers(1, y, margin) && bounds.covers(2, z, margin) {
                 let span = self.span(bounds.low[0] - margin, bounds.high[0] + margin);
                 solid.lower_row(&self.xs[span.clone()], y, z, &mut self.distance[span.clone()]);
                 touched = touched.start.min(span.start)..touched.end.max(span.end);

@@ -19,12 +19,14 @@ mod scan;
 mod skeleton;
 mod solid;
 mod solids;
+mod turn;
 
 use std::ops::Range;
 use std::path::Path;
 
 use anatomy::Anatomy;
 use solid::{Capsule, Solid};
+use turn::Turn;
 
 pub use solids::{nested_spheres, sphere};
 
@@ -43,6 +45,7 @@ const PORTION_BYTES: usize = 16 << 20;
 ///
 /// The person lies on the back. The frame is RAS+ with the origin in the middle of the body. The
 /// belly is at +y, the table at −y and the head at +z. The index axes run along +x, +y and +z.
+/// [`turned`](Self::turned) turns the person in this frame.
 ///
 /// The field of view is 400 × 400 mm, so the axial spacing is `400/nx` × `400/ny`. The slice
 /// spacing equals the finer of these two, within limits on the length of the scan: at least 300 mm
@@ -65,6 +68,7 @@ pub struct Phantom {
     grid: Grid,
     seed: u64,
     anatomy: Anatomy,
+    turn: Option<Turn>,
 }
 
 impl Phantom {
@@ -78,7 +82,30 @@ impl Phantom {
         let (sx, sy) = (FIELD_OF_VIEW_MM / nx, FIELD_OF_VIEW_MM / ny);
         let length = (nz * sx.min(sy)).clamp(LENGTH_MM[0], LENGTH_MM[1]);
         let grid = centered_grid(shape, [sx, sy, length / nz])?;
-        Ok(Self { grid, seed, anatomy: Anatomy::new(seed) })
+        Ok(Self { grid, seed, anatomy: Anatomy::new(seed), turn: None })
+    }
+
+    /// Turns the person in the scanner by angles in degrees: about the x axis first, then about y,
+    /// then about z. A positive angle turns as a right-handed screw. All axes pass through the
+    /// middle of the scan.
+    ///
+    /// The table turns with the person, and so do the levels of fluid in the bowel: the scan is
+    /// that of the same person in another frame. Only the noise belongs to the scanner. With angles
+    /// of zero the voxels stay the same.
+    ///
+    /// # Errors
+    /// [`VolumeError::PhantomTurn`] if an angle is not finite.
+    pub fn turned(mut self, turn_deg: [f64; 3]) -> Result<Self, VolumeError> {
+        if !turn_deg.iter().all(|angle| angle.is_finite()) {
+            return Err(VolumeError::PhantomTurn { turn_deg });
+        }
+        self.turn = Turn::new(turn_deg);
+        Ok(self)
+    }
+
+    /// The place in the scan of a point of the person who is not turned, in mm.
+    pub fn place(&self, point_mm: [f64; 3]) -> [f64; 3] {
+        self.turn.as_ref().map_or(point_mm, |turn| turn.to_scanner(point_mm))
     }
 
     /// The grid of the voxel centers.
@@ -90,7 +117,7 @@ impl Phantom {
     /// the body. They suit an incision.
     pub fn incision_site(&self) -> ([f64; 3], [f64; 3]) {
         const X_MM: f32 = 36.0;
-        let at = |z: f32| [X_MM, self.anatomy.person.skin.front_at(X_MM, z), z].map(f64::from);
+        let at = |z: f32| self.place([X_MM, self.anatomy.person.skin.front_at(X_MM, z), z].map(f64::from));
         (at(-85.0), at(15.0))
     }
 
@@ -109,7 +136,7 @@ impl Phantom {
         if out.len() != expected {
             return Err(VolumeError::VoxelCount { shape, expected, found: out.len() });
         }
-        scan::fill(&self.grid, self.seed, &self.anatomy, slices.start, out);
+        scan::fill(&self.grid, self.seed, &self.anatomy, self.turn.as_ref(), slices.start, out);
         Ok(())
     }
 

@@ -18,27 +18,98 @@ fn volume(shape: [usize; 3], seed: u64) -> Volume {
     Phantom::new(shape, seed).and_then(|phantom| phantom.volume()).expect("a small phantom")
 }
 
+fn turned(shape: [usize; 3], seed: u64, turn_deg: [f64; 3]) -> Volume {
+    let phantom = Phantom::new(shape, seed).and_then(|phantom| phantom.turned(turn_deg));
+    phantom.and_then(|phantom| phantom.volume()).expect("a small phantom")
+}
+
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    let one = with_threads(1, || volume([37, 41, 19], 5));
-    for threads in [2, 3, 8] {
-        assert_eq!(with_threads(threads, || volume([37, 41, 19], 5)), one, "{threads} threads");
+    for turn_deg in [[0.0; 3], [20.0, 10.0, -30.0]] {
+        let one = with_threads(1, || turned([37, 41, 19], 5, turn_deg));
+        for threads in [2, 3, 8] {
+            assert_eq!(with_threads(threads, || turned([37, 41, 19], 5, turn_deg)), one, "{threads} threads");
+        }
+        assert_ne!(turned([37, 41, 19], 6, turn_deg), one);
     }
-    assert_ne!(volume([37, 41, 19], 6), one);
 }
 
 /// Published figures use the phantom as a data set, so its bits may change only on purpose.
 #[test]
 fn bits_are_the_recorded_ones() {
     // FNV-1a hash of the little-endian voxels.
-    let hash = volume([40, 32, 24], 1)
-        .voxels()
-        .iter()
-        .flat_map(|hu| hu.to_le_bytes())
-        .fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
-        });
-    assert_eq!(hash, 0x0F7F_2BDD_66CD_0203, "{hash:#018X}");
+    let hash = |volume: Volume| {
+        volume
+            .voxels()
+            .iter()
+            .flat_map(|hu| hu.to_le_bytes())
+            .fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
+            })
+    };
+    let upright = hash(volume([40, 32, 24], 1));
+    assert_eq!(upright, 0x0F7F_2BDD_66CD_0203, "{upright:#018X}");
+    assert_eq!(hash(turned([40, 32, 24], 1, [0.0, 360.0, 0.0])), upright);
+    let turned = hash(turned([40, 32, 24], 1, [15.0, 0.0, 30.0]));
+    assert_eq!(turned, 0x83F0_55BF_092E_D21F, "{turned:#018X}");
+}
+
+/// A quarter turn moves every voxel of a cubic grid to the place of another one. Only the noise
+/// differs.
+#[test]
+fn a_quarter_turn_permutes_the_voxels() {
+    const N: usize = 40;
+    let upright = volume([N; 3], 2);
+    let at = |[i, j, k]: [usize; 3]| f64::from(upright.voxels()[upright.grid().index([i, j, k])]);
+    let last = N - 1;
+    type Source = fn([usize; 3], usize) -> [usize; 3];
+    let turns: [([f64; 3], Source); 3] = [
+        ([90.0, 0.0, 0.0], |[i, j, k], last| [i, k, last - j]),
+        ([0.0, 90.0, 0.0], |[i, j, k], last| [last - k, j, i]),
+        ([0.0, 0.0, 90.0], |[i, j, k], last| [j, last - i, k]),
+    ];
+    for (turn_deg, source) in turns {
+        let turned = turned([N; 3], 2, turn_deg);
+        let difference = |source: &dyn Fn([usize; 3]) -> [usize; 3]| {
+            let each = turned
+                .voxels()
+                .iter()
+                .enumerate()
+                .map(|(index, &hu)| (f64::from(hu) - at(source(turned.grid().point(index)))).abs());
+            each.sum::<f64>() / turned.voxels().len() as f64
+        };
+        let [own, other] = [difference(&|point| source(point, last)), difference(&|point| point)];
+        assert!(own < 15.0 && other > 100.0, "{turn_deg:?}: {own} HU, without the turn {other} HU");
+    }
+}
+
+/// Tissue and air of a turned person are at the turned places.
+#[test]
+fn a_turn_moves_the_tissue_with_it() -> Result<(), VolumeError> {
+    let shape = [80; 3];
+    let upright = volume(shape, 1);
+    let phantom = Phantom::new(shape, 1)?.turned([25.0, -35.0, 50.0])?;
+    let turned = phantom.volume()?;
+    let is_tissue = |volume: &Volume, mm: [f64; 3]| {
+        let point: [f64; 3] = volume.grid().affine.to_index(mm.into()).into();
+        volume.voxels()[volume.grid().index(point.map(|c| c.round() as usize))] > TISSUE_HU
+    };
+    let (mut count, mut same, mut same_without) = (0.0, 0.0, 0.0);
+    for index in 0..upright.grid().len() {
+        let mm = upright.grid().mm(upright.grid().point(index));
+        if mm.coords.norm() < 190.0 {
+            let here = is_tissue(&upright, mm.into());
+            count += 1.0;
+            same += f64::from(u8::from(here == is_tissue(&turned, phantom.place(mm.into()))));
+            same_without += f64::from(u8::from(here == is_tissue(&turned, mm.into())));
+        }
+    }
+    assert!(same / count > 0.95 && same_without / count < 0.9, "{} {}", same / count, same_without / count);
+    let (from, to) = phantom.incision_site();
+    let (upright_from, _) = Phantom::new(shape, 1)?.incision_site();
+    assert_eq!(from, phantom.place(upright_from));
+    assert!((0..3).map(|c| (to[c] - from[c]).powi(2)).sum::<f64>().sqrt() > 98.0);
+    Ok(())
 }
 
 proptest! {
@@ -275,6 +346,10 @@ fn invalid_requests_are_refused() -> Result<(), VolumeError> {
             matches!(sphere([8; 3], spacing, 3.0, 0), Err(VolumeError::SingularAffine { .. })),
             "{spacing:?}"
         );
+    }
+    for angle in [f64::NAN, f64::INFINITY] {
+        let refused = Phantom::new([8; 3], 0)?.turned([0.0, angle, 0.0]).err();
+        assert!(matches!(refused, Some(VolumeError::PhantomTurn { .. })), "{angle}");
     }
     let phantom = Phantom::new([8, 8, 8], 0)?;
     let mut buffer = vec![0; 64 * 2];

@@ -39,12 +39,15 @@ pub(crate) fn load(loaded: &LoadedScene) -> Result<Source, Error> {
             let inputs = vec![scene_input, input];
             Ok(Source { volume: read.volume, sha256, inputs, warnings: read.warnings })
         }
-        VolumeSection { phantom: Some(PhantomSection { size, seed }), path: None } => {
+        VolumeSection { phantom: Some(PhantomSection { size, seed, turn_deg }), path: None } => {
             let volume = Phantom::new(*size, *seed)
-                .and_then(|phantom| phantom.volume())
+                .and_then(|phantom| phantom.turned(*turn_deg)?.volume())
                 .map_err(loaded.file().blame("volume.phantom"))?;
             let sha256 = files::sha256_of_voxels(volume.voxels());
-            let path = format!("phantom {size:?} seed {seed}");
+            let mut path = format!("phantom {size:?} seed {seed}");
+            if *turn_deg != [0.0; 3] {
+                path += &format!(" turned by {turn_deg:?}°");
+            }
             let inputs = vec![scene_input, Input { path, sha256: sha256.clone() }];
             Ok(Source { volume, sha256, inputs, warnings: Vec::new() })
         }

@@ -102,7 +102,7 @@ impl Scene {
                 let name = path.to_string_lossy();
                 check.require(!name.is_empty(), "volume.path", "", "must name a NIfTI file")
             }
-            (None, Some(_)) => Ok(()),
+            (None, Some(phantom)) => check.point("volume.phantom.turn_deg", phantom.turn_deg),
             _ => {
                 let why = "must have exactly one of `path` (a NIfTI file) and `phantom` (a size and a seed)";
                 check.require(false, "volume", "", why)

@@ -30,6 +30,10 @@ pub struct PhantomSection {
     /// Seed of the random anatomy and noise.
     #[serde(default)]
     pub seed: u64,
+    /// Angles by which the person lies turned in the scanner, degrees: about the x axis first, then
+    /// about y, then about z, through the middle of the scan. The table turns with the person.
+    #[serde(default)]
+    pub turn_deg: [f64; 3],
 }
 
 /// The lattice: at most one of `spacing_mm` and `vertices`; neither puts a vertex on every voxel
