@@ -20,6 +20,7 @@ mod region;
 mod resume;
 mod scene_files;
 mod scenes;
+mod sheet_tension;
 mod skin_counts;
 mod stability;
 mod tune;

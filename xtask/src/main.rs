@@ -40,7 +40,7 @@ usage: cargo xtask COMMAND
       accuracy        error against run time for each problem and setting
       stability       stiff and extreme cases on every backend at three length scales
       parity          the GPU backend and the CPU backend, operation by operation
-      patch           skin tension on the staircase of a plane; writes into tension.md
+      patch           skin tension on the staircase of a plane and in a sheet; writes into tension.md
       cantilever      a bent beam and scikit-fem; always writes its page
       chainmail       ChainMail on scans, and position-based dynamics
       main-job        the main job on the phantom and on real scans, with and without skin tension

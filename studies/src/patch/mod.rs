@@ -5,9 +5,13 @@
 //! with the same tension and the same modulus in every direction for which they are equal. The
 //! tension in the plane is the sum `Σ −f_i ⊗ X_i` over the forces of the constraints, divided by
 //! the area of the plane.
+//!
+//! Slits and round holes in a flat sheet of strips open as far as closed forms say.
 
 mod forms;
+mod holed_sheet;
 mod measure;
+mod openings;
 mod skin;
 
 use std::io::Write;
@@ -15,8 +19,15 @@ use std::io::Write;
 use clap::Parser;
 
 pub use forms::Form;
+pub use holed_sheet::{Held, Skin};
 pub use measure::{Measured, Patch, Spread, Staircase, skins};
+pub use openings::{
+    OPENING_TOLERANCE, RATIO_TOLERANCE, around_hole, controls, error, isotropic, orthotropic, round_hole,
+    slit,
+};
 pub use skin::PlaneSkin;
+
+use openings::Openings;
 
 use crate::kit::{Checks, Failure, Page, Provenance, Table, results};
 
@@ -35,7 +46,7 @@ pub struct Options {
 /// Name of the page.
 pub const PAGE: &str = "tension";
 /// Tables of the page.
-pub const TABLES: [&str; 4] = ["provenance", "staircase", "patch", "checks"];
+pub const TABLES: [&str; 7] = ["provenance", "staircase", "patch", "slits", "holes", "sheets", "checks"];
 /// Largest relative error of a tension or modulus of strips.
 pub const TOLERANCE: f64 = 0.01;
 
@@ -51,13 +62,20 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         Form::ALL.into_iter().filter_map(|form| Some((form, Measured::of(form, &skins)?))).collect();
     let staircase = staircase(&skins).markdown();
     let patch = table(measured.iter().map(|(_, measured)| measured)).markdown();
-    let checks = checks(&measured);
-    writeln!(out, "{staircase}\n{patch}")?;
+    let openings = Openings::measure()?;
+    let [slits, holes, sheets] =
+        [&openings.slits, &openings.holes, &openings.sheets].map(|table| table.markdown());
+    let mut checks = checks(&measured);
+    checks.append(openings.checks);
+    writeln!(out, "{staircase}\n{patch}\n{slits}\n{holes}\n{sheets}")?;
     checks.print(out)?;
     if let Some(mut page) = page.filter(|_| checks.pass()) {
         page.set("provenance", &provenance.markdown())?;
         page.set("staircase", &staircase)?;
         page.set("patch", &patch)?;
+        page.set("slits", &slits)?;
+        page.set("holes", &holes)?;
+        page.set("sheets", &sheets)?;
         page.set("checks", &checks.summary())?;
         page.save(&results())?;
     }
