@@ -5,6 +5,7 @@
 //! `tests/`, which uses the problems of this crate.
 
 pub mod accuracy;
+pub mod at_rest;
 pub mod cantilever;
 pub mod chainmail;
 pub mod kit;
@@ -26,6 +27,7 @@ mod tests {
     fn every_page_has_the_tables_of_its_study() {
         for (name, tables) in [
             ("accuracy", &crate::accuracy::TABLES[..]),
+            ("at-rest", &crate::at_rest::TABLES),
             ("cantilever", &crate::cantilever::TABLES),
             ("chainmail", &crate::chainmail::TABLES),
             ("main-job", &crate::main_job::TABLES),

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
-    accuracy, cantilever, chainmail, main_job, mutations, parity, patch, region, stability, tuning,
+    accuracy, at_rest, cantilever, chainmail, main_job, mutations, parity, patch, region, stability, tuning,
 };
 
 /// A study and its options.
@@ -14,6 +14,7 @@ use cutis_studies::{
 #[command(name = "study", bin_name = "cargo xtask study")]
 enum Study {
     Accuracy(accuracy::Options),
+    AtRest(at_rest::Options),
     Cantilever(cantilever::Options),
     Chainmail(chainmail::Options),
     MainJob(main_job::Options),
@@ -29,6 +30,7 @@ impl Study {
     fn run(&self, out: &mut dyn Write) -> Result<bool, Failure> {
         match self {
             Self::Accuracy(options) => accuracy::run(options, out),
+            Self::AtRest(options) => at_rest::run(options, out),
             Self::Cantilever(options) => cantilever::run(options, out),
             Self::Chainmail(options) => chainmail::run(options, out),
             Self::MainJob(options) => main_job::run(options, out),
