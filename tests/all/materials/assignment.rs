@@ -93,8 +93,8 @@ fn each_vertex_has_the_first_row_that_holds_it() {
     }
 }
 
-/// Springs have four times the harmonic mean of their ends' moduli, and volumes the harmonic mean of
-/// their corners' moduli.
+/// Springs have four times the harmonic mean of their ends' moduli. Volumes have the harmonic mean
+/// of their corners' moduli.
 #[test]
 fn elements_have_the_harmonic_mean_of_their_vertices() {
     let loaded = small(&LAYERS, &[UNCUT]);
