@@ -71,7 +71,7 @@ REPORT_KEYS = {
     "inputs": (),
     "backend": ("name", "adapter"),
     "sizes": ("vertices", "edges", "tets", "skin_triangles"),
-    "colors": ("distance", "volume", "membrane"),
+    "colors": ("descent",),
     "stages": (),
     "frames": ("count", "ms_mean", "ms_min"),
     "wound": ("initial_mm", "final_mm", "mid_mm"),
