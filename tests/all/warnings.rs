@@ -12,7 +12,8 @@ fn warns(set: &[(&str, &str)], words: &str) -> bool {
 #[test]
 fn skin_that_is_too_stiff_for_the_substeps_causes_a_warning() {
     let stiff = ("constraints.stc.area_modulus_n_per_m", "1000.0");
-    assert!(warns(&[stiff], "stiffer than 10 substeps"));
+    assert!(warns(&[stiff], "stiffer than 10 substeps") && warns(&[stiff], "opens less"));
+    assert!(warns(&[stiff, ("scan_is_at_rest", "true")], "opens too far"));
     assert!(!warns(&[stiff, ("solver.substeps", "1000")], "stiffer than"));
     assert!(!warns(&[stiff, ("solver.iterations", "100")], "stiffer than"));
     assert!(!warns(&[("constraints.stc.area_modulus_n_per_m", "1.0")], "stiffer than"));

@@ -357,8 +357,7 @@ impl ConstraintKind for MembraneSection {
                 .push("skin tension acts and nothing is fixed: the whole body may shrink and drift".into());
         }
         if parts.solver.formulation == Formulation::Xpbd {
-            let does = if parts.at_rest { "opens too far" } else { "opens less than its modulus asks for" };
-            warnings.extend(too_stiff(does, parts.solver, self.frequency(parts)));
+            warnings.extend(too_stiff(parts, self.frequency(parts)));
         }
         warnings
     }

@@ -314,11 +314,7 @@ impl ConstraintKind for StcSection {
         if parts.body.skin.is_empty() {
             warnings.push("no skin was found: skin tension has nothing to act on".to_owned());
         } else if parts.solver.formulation == Formulation::Xpbd {
-            warnings.extend(too_stiff(
-                "opens less than its modulus asks for",
-                parts.solver,
-                self.frequency(parts),
-            ));
+            warnings.extend(too_stiff(parts, self.frequency(parts)));
         }
         warnings
     }
