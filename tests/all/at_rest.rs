@@ -17,7 +17,7 @@ const UNCUT: (&str, &str) = ("incision", "[]");
 /// A body this small is faster on one thread.
 const ONE_THREAD: (&str, &str) = ("solver.threads", "1");
 /// For the tests of all settings, of 200 frames each.
-const COARSEST: (&str, &str) = ("lattice.spacing_mm", "28");
+const COARSEST: (&str, &str) = ("lattice.spacing_mm", "36");
 const REST: (&str, &str) = ("scan_is_at_rest", "true");
 const MOVES: (&str, &str) = ("scan_is_at_rest", "false");
 

@@ -15,8 +15,8 @@ use crate::scenes::{self, SMALL, run_in};
 /// The small phantom on a coarser lattice, for a shorter time in which it still comes to rest.
 fn scene(set: &[(&str, &str)]) -> LoadedScene {
     let quick = [
-        ("lattice.spacing_mm", "14"),
-        ("incision.0.width_mm", "11"),
+        ("lattice.spacing_mm", "17"),
+        ("incision.0.width_mm", "14"),
         ("solver.damping_per_s", "40"),
         ("run.frames", "16"),
         ("output", "{ report = true }"),

@@ -28,10 +28,12 @@ const FIELD: [&str; 5] = [
     "scan_tension_along_n_per_m",
 ];
 
-/// The small phantom with a membrane.
+const SURFACE: (&str, &str) = ("output", "{ surface = true }");
+
+/// The small phantom with a membrane. It writes the skin only.
 fn phantom(section: &str, set: &[(&str, &str)]) -> Run {
     let constraints = membrane(section);
-    let own = [("constraints", constraints.as_str()), ("run.frames", "2")];
+    let own = [("constraints", constraints.as_str()), ("run.frames", "1"), SURFACE];
     Run::of(&scene(SMALL, &[&own, set].concat()))
 }
 
@@ -141,18 +143,16 @@ fn a_region_has_the_field_of_the_whole_body() {
 /// skin has a field without weight.
 #[test]
 fn arrays_follow_from_the_scene() {
-    let plain = Run::of(&scene(SMALL, &[("run.frames", "1"), ("output", "{ surface = true }")]));
+    let plain = Run::of(&scene(SMALL, &[("run.frames", "1"), SURFACE]));
     assert_eq!(skin(&plain).names(), PLAIN);
     assert!(!String::from_utf8_lossy(&plain.bytes("skin.vtu")).contains("CellData"));
-    let only = ("output", "{ surface = true, pictures = true }");
     let all: Vec<&str> = PLAIN.into_iter().chain(FIELD).collect();
-    assert_eq!(skin(&phantom(TRUNK, &[only])).names(), all);
-    let pbd =
-        phantom(TRUNK, &[only, ("solver.formulation", "pbd"), ("constraints.membrane.stiffness", "0.1")]);
+    assert_eq!(skin(&phantom(TRUNK, &[])).names(), all);
+    let pbd = phantom(TRUNK, &[("solver.formulation", "pbd"), ("constraints.membrane.stiffness", "0.1")]);
     assert_eq!(skin(&pbd).names(), all[..5]);
     let even = "{ tension_along_n_per_m = 8, tension_across_n_per_m = 8, modulus_along_n_per_m = 50, \
                 modulus_across_n_per_m = 50 }";
-    let isotropic = phantom(even, &[only]);
+    let isotropic = phantom(even, &[("output", "{ surface = true, pictures = true }")]);
     let mesh = skin(&isotropic);
     assert!(mesh.cell_scalars("scan_line_weight").iter().all(|weight| *weight == 0.0));
     assert!(!isotropic.names().contains(&"tension.png".to_owned()), "there are no lines to draw");

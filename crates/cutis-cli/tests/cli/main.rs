@@ -18,7 +18,8 @@ use tempfile::TempDir;
 /// The program under test.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_cutis");
 
-/// A torso of a few thousand vertices with an incision. A run takes a fraction of a second.
+/// A torso of a few thousand vertices with an incision, without pictures, which take most of the
+/// time. A run takes a fraction of a second.
 const SCENE: &str = r#"
 scan_is_at_rest = false
 incision = [{ from_mm = [30, 110, -50], to_mm = [30, 110, 50], depth_mm = 20.0, width_mm = 10.0 }]
@@ -35,6 +36,10 @@ bone_above_hu = 250.0
 end_layers = ["k"]
 [run]
 frames = 2
+[output]
+report = true
+surface = true
+volume = true
 "#;
 
 /// A temporary folder with `scene.toml`, in which the program runs.
