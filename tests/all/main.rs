@@ -11,6 +11,7 @@ mod gpu;
 mod identity;
 mod left_out;
 mod materials;
+mod no_width;
 mod outputs;
 mod paper_form;
 mod patch;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::cells::CellMasks;
 use crate::select::HalfSpace;
-use crate::{Frame, InactiveTissue, Lattice, MeshError, TissueMask, edges};
+use crate::{Copies, Frame, InactiveTissue, Lattice, MeshError, TissueMask, edges};
 
 /// Marks lattice points without a vertex in [`TetMesh::vertex_of_point`].
 pub const NO_VERTEX: u32 = u32::MAX;
@@ -53,6 +53,9 @@ pub struct TetMesh {
     pub dropped_tets: usize,
     /// The tissue outside the region, if the mesh was built by [`TissueMask::mesh_within`].
     pub inactive: Option<InactiveTissue>,
+    /// The vertices and elements that came with copies of divided tets ([`TetMesh::divide`]). They
+    /// are the last of their arrays, and are not in the order of the lattice.
+    pub copies: Option<Copies>,
 }
 
 impl TetMesh {
@@ -95,12 +98,13 @@ impl TetMesh {
             components: tissue.components(),
             dropped_tets: tissue.dropped_tets(),
             inactive: None,
+            copies: None,
         })
     }
 
     /// The vertex of each lattice point, or [`NO_VERTEX`], by flat lattice index.
     pub fn vertex_of_point(&self) -> Vec<u32> {
-        invert(self.lattice.grid(), &self.lattice_index)
+        invert(self.lattice.grid(), &self.lattice_index[..self.real_vertices()])
     }
 
     /// The lattice point `(i, j, k)` of a vertex.
@@ -108,7 +112,8 @@ impl TetMesh {
         self.lattice.grid().point(self.lattice_index[vertex as usize] as usize)
     }
 
-    /// The tets of the mesh as one bit mask per cell. After a cut it has only the remaining tets.
+    /// The whole tets of the mesh as one bit mask per cell. After a cut it has only the remaining
+    /// tets.
     pub(crate) fn cell_masks(&self) -> CellMasks {
         let mut masks = CellMasks::empty(&self.lattice);
         let [cx, cy, cz] = masks.shape;
@@ -117,12 +122,12 @@ impl TetMesh {
             let lowest = tet.iter().fold(u32::MAX, |low, &vertex| low.min(vertex));
             self.lattice_index[lowest as usize] as usize / layer_points
         };
-        let starts: Vec<usize> =
-            (0..=cz).map(|k| self.tets.partition_point(|tet| layer_of(tet) < k)).collect();
+        let tets = &self.tets[..self.whole_tets()];
+        let starts: Vec<usize> = (0..=cz).map(|k| tets.partition_point(|tet| layer_of(tet) < k)).collect();
         let first = masks.flat([0, 0, 0]);
         let layer_cells = (cx + 2) * (cy + 2);
         masks.bytes.par_chunks_mut(layer_cells).skip(1).take(cz).enumerate().for_each(|(k, layer)| {
-            for tet in &self.tets[starts[k]..starts[k + 1]] {
+            for tet in &tets[starts[k]..starts[k + 1]] {
                 let ([i, j, _], t) = self.cell_of(tet);
                 layer[first - layer_cells + i + (cx + 2) * j] |= 1 << t;
             }

@@ -98,18 +98,19 @@ impl TetMesh {
     ///
     /// The color is 2 · direction + the parity of the first point along the first axis of the
     /// direction. There are 14 colors for `kuhn6` (7 directions) and 18 for `five` (9 directions).
-    /// `edges` are edges of this mesh, before or after a cut.
-    pub fn edge_colors(&self, edges: &[[u32; 2]]) -> Vec<u16> {
+    /// The copies of edges along a cut add as many colors for each number among the copies.
+    pub fn edge_colors(&self) -> Vec<u16> {
         let directions = &self.lattice.stencil().directions;
-        let color = |&[a, b]: &[u32; 2]| {
+        let count = directions.iter().flatten().map(|d| d.number + 1).max().unwrap_or(0);
+        let color = |(n, &[a, b]): (usize, &[u32; 2])| {
             let (p, q) = (self.point(a), self.point(b));
             let step: [i8; 3] = std::array::from_fn(|axis| (q[axis] as isize - p[axis] as isize) as i8);
             let axis = step.iter().position(|&s| s != 0).unwrap_or(0);
             let own = &directions[p.iter().sum::<usize>() & 1];
             let number = own.iter().find(|d| d.step == step).map_or(0, |d| d.number);
-            2 * number + (p[axis] & 1) as u16
+            2 * (number + count * u16::from(self.copy_of_edge(n))) + (p[axis] & 1) as u16
         };
-        edges.par_iter().map(color).collect()
+        self.edges.par_iter().enumerate().map(color).collect()
     }
 
     /// Colors of the vertices in closed form. Two vertices of one color never belong to the same
@@ -134,16 +135,18 @@ impl TetMesh {
     ///
     /// Let `t` be the number of the tet within its cell `(i, j, k)`. For `kuhn6` the color is 4t +
     /// (i + j + k) mod 4: 24 colors. For `five` it is 8t + a number from the parities of i, j and
-    /// k: 40 colors. `tets` are tets of this mesh, before or after a cut.
-    pub fn tet_colors(&self, tets: &[[u32; 4]]) -> Vec<u16> {
-        let color = |tet: &[u32; 4]| {
+    /// k: 40 colors. Copies of divided tets add as many colors for each number among the copies.
+    pub fn tet_colors(&self) -> Vec<u16> {
+        let per_cell = self.lattice.stencil().tets[0].len();
+        let color = |(n, tet): (usize, &[u32; 4])| {
             let ([i, j, k], t) = self.cell_of(tet);
+            let t = t + per_cell * usize::from(self.copy_of_tet(n).0);
             let color = match self.lattice.split() {
                 Split::Kuhn6 => 4 * t + (i + j + k) % 4,
                 Split::Five => 8 * t + (i & 1) + 2 * (j & 1) + 4 * (k & 1),
             };
             color as u16
         };
-        tets.par_iter().map(color).collect()
+        self.tets.par_iter().enumerate().map(color).collect()
     }
 }

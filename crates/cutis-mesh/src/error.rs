@@ -151,6 +151,16 @@ pub enum MeshError {
         /// region.
         coarse: bool,
     },
+    /// Too many cuts of no width meet in one tetrahedron.
+    #[error(
+        "{cuts} cuts meet in one lattice cell at {at_mm:.1?} mm; at most 8 can: use a finer lattice, or keep the cuts apart"
+    )]
+    TooManyCuts {
+        /// Number of cuts.
+        cuts: usize,
+        /// A corner of the cell in mm.
+        at_mm: [f64; 3],
+    },
     /// A region contains no vertex of the body.
     #[error("the region contains none of the {vertices} vertices of the body")]
     RegionEmpty {

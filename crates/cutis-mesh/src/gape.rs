@@ -5,37 +5,47 @@ use std::ops::Range;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::slit::Slit;
+use crate::sever::{Embedded, LipPoint};
+use crate::slit::{Slit, SlitPoint};
 use crate::{MeshError, TetMesh};
 
 /// Largest number of bins along one slit.
 const MOST_BINS: f64 = 1024.0;
 
-/// The vertices and the axis by which the opening of a wound is measured.
+/// The points and the axis by which the opening of a wound is measured.
 ///
-/// The lips are the remaining skin vertices of the skin triangles that the slit opens, between the
-/// start and the end of the segment. The left lip is on the left side of the middle surface of the
-/// slit, the right lip on the other side.
+/// The left lip is on the left side of the middle surface of the slit, the right lip on the other
+/// side. Only points between the start and the end of the segment count. The lips of a cut that
+/// removes tissue are the remaining skin vertices of the skin triangles that the slit opens. The
+/// lips of a cut of no width are the points where it cuts the edges of the skin.
 ///
 /// The segment is divided into equal bins of at least one lattice step. The opening in a bin is the
 /// difference between the mean positions of the two lips, along the lateral axis of the slit at
 /// rest. The opening is also measured in the middle tenth of the segment, or in one lattice step if
 /// that is longer.
 ///
-/// The vertices are chosen at rest, so that openings before and after a run differ only by motion.
-/// At rest the opening is at least the distance between the nearest remaining vertices, that is,
-/// the width rounded up to the lattice.
+/// The points are chosen at rest, so that openings before and after a run differ only by motion. At
+/// rest the opening of a cut of no width is 0. Otherwise it is at least the distance between the
+/// nearest remaining vertices, that is, the width rounded up to the lattice.
 #[derive(Clone, Debug)]
 pub struct Gape {
     lateral: Vector3<f64>,
-    /// The bins in the middle 80 % of the segment that have vertices on both sides.
+    /// The bins in the middle 80 % of the segment that have points on both sides.
     bins: Vec<Sides>,
     middle: Sides,
-    vertices: Vec<u32>,
+    /// Points of the left lip, then of the right lip.
+    points: Vec<Embedded>,
     left: usize,
 }
 
-/// The vertices of both lips in a part of the segment, as ranges of `Gape::vertices`.
+/// A point of a lip at rest.
+struct Placed {
+    point: Embedded,
+    right: bool,
+    at: SlitPoint,
+}
+
+/// The points of both lips in a part of the segment, as ranges of `Gape::points`.
 #[derive(Clone, Debug)]
 struct Sides {
     left: Range<usize>,
@@ -59,27 +69,48 @@ pub struct WoundGape {
 }
 
 impl Gape {
-    pub(crate) fn new(
+    /// The gape of a cut that removes tissue. `lips` are the remaining vertices at its lips.
+    pub(crate) fn of_vertices(
         mesh: &TetMesh,
         incision: usize,
         slit: &Slit,
         lips: &[u32],
         step: f64,
     ) -> Result<Self, MeshError> {
-        let at = |&vertex: &u32| (vertex, slit.coordinates(mesh.positions[vertex as usize].cast()));
-        let mut placed: Vec<_> = lips.iter().map(at).collect();
-        placed.retain(|(_, point)| (0.0..=slit.length).contains(&point.along));
-        placed.sort_by(|(a, p), (b, q)| {
-            (p.lateral >= 0.0).cmp(&(q.lateral >= 0.0)).then(p.along.total_cmp(&q.along)).then(a.cmp(b))
-        });
-        let left = placed.partition_point(|(_, point)| point.lateral < 0.0);
+        let place = |&vertex: &u32| {
+            let at = slit.coordinates(mesh.positions[vertex as usize].cast());
+            Placed { point: Embedded::node(vertex), right: at.lateral >= 0.0, at }
+        };
+        Self::new(incision, slit, lips.iter().map(place).collect(), step)
+    }
+
+    /// The gape of a cut of no width. `rest` are the positions of all nodes.
+    pub(crate) fn of_lips(
+        rest: &[Point3<f32>],
+        incision: usize,
+        slit: &Slit,
+        lips: &[LipPoint],
+        step: f64,
+    ) -> Result<Self, MeshError> {
+        let place = |lip: &LipPoint| {
+            let at = slit.coordinates(lip.at.at(rest).cast());
+            Placed { point: lip.at, right: lip.right, at }
+        };
+        Self::new(incision, slit, lips.iter().map(place).collect(), step)
+    }
+
+    fn new(incision: usize, slit: &Slit, mut placed: Vec<Placed>, step: f64) -> Result<Self, MeshError> {
+        placed.retain(|placed| (0.0..=slit.length).contains(&placed.at.along));
+        // The sort is stable, so that points at one place keep their order.
+        placed.sort_by(|a, b| a.right.cmp(&b.right).then(a.at.along.total_cmp(&b.at.along)));
+        let left = placed.partition_point(|placed| !placed.right);
         let right = placed.len() - left;
         if left == 0 || right == 0 {
             return Err(MeshError::IncisionWithoutLips { incision, left, right });
         }
         let between = |from: f64, to: f64| {
             let find = |part: Range<usize>, limit: f64| {
-                part.start + placed[part].partition_point(|(_, point)| point.along < limit)
+                part.start + placed[part].partition_point(|placed| placed.at.along < limit)
             };
             Sides {
                 left: find(0..left, from)..find(0..left, to),
@@ -92,7 +123,7 @@ impl Gape {
         let bins = (0..count as usize).map(|bin| bin as f64).filter(inner);
         let bins: Vec<Sides> =
             bins.map(|bin| between(bin * width, (bin + 1.0) * width)).filter(Sides::complete).collect();
-        // Widen the middle until it contains a vertex of each lip. The whole segment does.
+        // Widen the middle until it contains a point of each lip. The whole segment does.
         let mut half = (slit.length / 20.0).max(step / 2.0);
         let mut middle = between(slit.length / 2.0 - half, slit.length / 2.0 + half);
         while !middle.complete() {
@@ -100,18 +131,29 @@ impl Gape {
             middle = between(slit.length / 2.0 - half, slit.length / 2.0 + half);
         }
         let bins = if bins.is_empty() { vec![middle.clone()] } else { bins };
-        let vertices = placed.iter().map(|(vertex, _)| *vertex).collect();
-        Ok(Self { lateral: slit.lateral, bins, middle, vertices, left })
+        let points = placed.iter().map(|placed| placed.point).collect();
+        Ok(Self { lateral: slit.lateral, bins, middle, points, left })
     }
 
-    /// Skin vertices of the left lip, from start to end.
-    pub fn left(&self) -> &[u32] {
-        &self.vertices[..self.left]
+    /// Points of the left lip, from start to end.
+    pub fn left(&self) -> &[Embedded] {
+        &self.points[..self.left]
     }
 
-    /// Skin vertices of the right lip, from start to end.
-    pub fn right(&self) -> &[u32] {
-        &self.vertices[self.left..]
+    /// Points of the right lip, from start to end.
+    pub fn right(&self) -> &[Embedded] {
+        &self.points[self.left..]
+    }
+
+    /// The vertices whose positions the opening depends on, in ascending order.
+    pub fn vertices(&self) -> Vec<u32> {
+        let used = self.points.iter().flat_map(|point| {
+            point.nodes.into_iter().zip(point.weights).filter(|(_, weight)| *weight != 0.0)
+        });
+        let mut vertices: Vec<u32> = used.map(|(node, _)| node).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
     }
 
     /// Measures the openings at the given positions: local meters, one per mesh vertex.
@@ -125,9 +167,9 @@ impl Gape {
     /// Measures the openings. `position` returns the position of a mesh vertex in local meters.
     pub fn measure_by(&self, position: &dyn Fn(u32) -> Point3<f64>) -> WoundGape {
         let mean = |part: &Range<usize>| {
-            let sum =
-                self.vertices[part.clone()].iter().fold(Vector3::zeros(), |sum, &v| sum + position(v).coords);
-            sum / part.len() as f64
+            let at = |point: &Embedded| point.at_by(position).coords;
+            self.points[part.clone()].iter().fold(Vector3::zeros(), |sum, point| sum + at(point))
+                / part.len() as f64
         };
         let opening = |sides: &Sides| {
             let apart = (mean(&sides.right) - mean(&sides.left)) * 1000.0;

@@ -20,8 +20,9 @@ pub struct Incision {
     pub to_mm: [f64; 3],
     /// Depth below the local skin in mm.
     pub depth_mm: f64,
-    /// Full width of the slit in mm.
-    pub width_mm: f64,
+    /// Full width of the slit in mm. Without it the cut has no width: it removes nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_mm: Option<f64>,
 }
 
 /// Incisions planned on a mesh.
@@ -32,13 +33,16 @@ pub struct Incision {
 /// Tets, edges and triangles with an edge through the middle surface of a slit are removed as well.
 /// Therefore the lips separate even if the slit is narrower than a lattice step or oblique to the
 /// lattice. Vertices that have no tet after that are also removed.
+///
+/// A slit without a width removes nothing. [`Cut::sever`] cuts along it.
 #[derive(Clone, Debug)]
 pub struct Cut {
     /// One flag per mesh vertex: true if the vertex is removed.
     pub removed: Vec<bool>,
     /// The slits, in the order of the incisions.
     pub slits: Vec<Slit>,
-    /// The gape of each slit, in the same order.
+    /// The gape of each slit, in the same order. Those of slits without a width are missing until
+    /// [`Cut::sever`].
     pub gapes: Vec<Gape>,
     /// One flag per mesh vertex: true if a slit can cut an element with this corner.
     near: Vec<bool>,
@@ -71,7 +75,8 @@ impl Cut {
         // All corners of a cut element are within the diagonal of a cell from the slit.
         let margin = mesh.lattice.grid().affine.spacing_mm().iter().sum::<f64>() / 1000.0;
         check_within(mesh, &slits, margin)?;
-        let near = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.near(p, margin))).collect();
+        let removes = |p| slits.iter().any(|slit| !slit.removes_nothing() && slit.near(p, margin));
+        let near = mesh.positions.iter().map(|&p| removes(p)).collect();
         let removed = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.contains(p))).collect();
         let mut cut = Self { removed, slits, gapes: Vec::new(), near };
         cut.check_each_slit_cuts(mesh)?;
@@ -123,6 +128,12 @@ impl Cut {
 
     /// True if the line between two rest positions passes through the middle surface of a slit.
     pub(crate) fn crosses(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
+        self.slits.iter().any(|slit| !slit.removes_nothing() && slit.crosses(a, b))
+    }
+
+    /// True if the line between two rest positions passes through the middle surface of a slit,
+    /// with or without a width.
+    pub(crate) fn separates(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
         self.slits.iter().any(|slit| slit.crosses(a, b))
     }
 
@@ -141,7 +152,7 @@ impl Cut {
     }
 
     fn check_each_slit_cuts(&self, mesh: &TetMesh) -> Result<(), MeshError> {
-        for (incision, slit) in self.slits.iter().enumerate() {
+        for (incision, slit) in self.removing() {
             let near = |&v: &u32| self.near[v as usize];
             let crosses =
                 |[a, b]: &[u32; 2]| slit.crosses(mesh.positions[*a as usize], mesh.positions[*b as usize]);
@@ -151,6 +162,11 @@ impl Cut {
             }
         }
         Ok(())
+    }
+
+    /// The slits with a width, with their numbers.
+    fn removing(&self) -> impl Iterator<Item = (usize, &Slit)> {
+        self.slits.iter().enumerate().filter(|(_, slit)| !slit.removes_nothing())
     }
 
     /// Removes the vertices whose tets are all cut.
@@ -182,9 +198,9 @@ impl Cut {
             lips.sort_unstable();
             lips.dedup();
             lips.retain(|&v| !self.removed[v as usize]);
-            Gape::new(mesh, incision, slit, &lips, step)
+            Gape::of_vertices(mesh, incision, slit, &lips, step)
         };
-        self.slits.iter().enumerate().map(gape).collect()
+        self.removing().map(gape).collect()
     }
 }
 

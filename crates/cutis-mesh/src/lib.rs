@@ -8,6 +8,7 @@
 mod build;
 mod cells;
 mod component;
+mod copies;
 mod edges;
 mod error;
 mod frame;
@@ -18,6 +19,7 @@ mod lattice;
 mod mass;
 mod neighbors;
 mod select;
+pub mod sever;
 mod shell;
 pub mod skin;
 mod slit;
@@ -28,6 +30,7 @@ mod tissue_tets;
 pub mod vtk;
 
 pub use build::{NO_VERTEX, TetMesh, Tissue};
+pub use copies::Copies;
 pub use error::MeshError;
 pub use frame::Frame;
 pub use gape::{Gape, WoundGape};

@@ -6,9 +6,13 @@ use rayon::prelude::*;
 use crate::TetMesh;
 
 impl TetMesh {
-    /// Rest volume of each tet in m³.
+    /// Rest volume of each tet in m³. A copy of a divided tet has its share.
     pub fn tet_volumes(&self) -> Vec<f32> {
-        self.tets.par_iter().map(|tet| self.volume(tet) as f32).collect()
+        (0..self.tets.len()).into_par_iter().map(|tet| self.held_volume(tet) as f32).collect()
+    }
+
+    fn held_volume(&self, tet: usize) -> f64 {
+        self.volume(&self.tets[tet]) * f64::from(self.copy_of_tet(tet).1)
     }
 
     /// Volume of each edge in m³: one sixth of each tet around it. The sum is the volume of the
@@ -16,10 +20,11 @@ impl TetMesh {
     pub fn edge_volumes(&self) -> Vec<f32> {
         let vertices = self.positions.len();
         let mut starts = vec![0usize; vertices + 1];
-        self.edges.iter().for_each(|edge| starts[edge[0] as usize + 1] += 1);
+        let whole = self.whole_edges();
+        self.edges[..whole].iter().for_each(|edge| starts[edge[0] as usize + 1] += 1);
         (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
-        let mut shares = vec![0f64; self.edges.len()];
-        for tet in &self.tets {
+        let mut shares = vec![0f64; whole];
+        for tet in &self.tets[..self.whole_tets()] {
             let sixth = self.volume(tet) / 6.0;
             for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
                 let (low, high) = (tet[a].min(tet[b]), tet[a].max(tet[b]));
@@ -29,7 +34,8 @@ impl TetMesh {
                 }
             }
         }
-        shares.into_iter().map(|share| share as f32).collect()
+        let copies = self.copies.iter().flat_map(|copies| copies.of_edges.iter().map(|(_, volume)| *volume));
+        shares.into_iter().map(|share| share as f32).chain(copies).collect()
     }
 
     /// Lumped mass of each vertex in kg: one quarter of the mass of each tet around it. The density
@@ -38,15 +44,15 @@ impl TetMesh {
     /// A vertex without tets, as in an incision, has mass 0.
     pub fn masses(&self, density_kg_m3: &dyn Fn(f32) -> f32) -> Vec<f32> {
         let mut masses = vec![0f64; self.positions.len()];
-        for tet in &self.tets {
+        for (number, tet) in self.tets.iter().enumerate() {
             let hu = tet.iter().map(|&v| self.hu[v as usize]).sum::<f32>() / 4.0;
-            let quarter = self.volume(tet) * f64::from(density_kg_m3(hu)) / 4.0;
+            let quarter = self.held_volume(number) * f64::from(density_kg_m3(hu)) / 4.0;
             tet.iter().for_each(|&v| masses[v as usize] += quarter);
         }
         masses.into_iter().map(|mass| mass as f32).collect()
     }
 
-    fn volume(&self, tet: &[u32; 4]) -> f64 {
+    pub(crate) fn volume(&self, tet: &[u32; 4]) -> f64 {
         let [a, b, c, d] = tet.map(|v| self.positions[v as usize]);
         let from_a = |p: Point3<f32>| -> Vector3<f64> { p.coords.cast::<f64>() - a.coords.cast::<f64>() };
         from_a(b).dot(&from_a(c).cross(&from_a(d))) / 6.0

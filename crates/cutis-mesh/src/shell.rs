@@ -9,6 +9,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::cells::CornerBits;
 use crate::neighbors::Neighbors;
+use crate::sever::{DividedShell, Pieces, Severed, divide_shell, longest_edge};
 use crate::{Cut, InactiveTissue, Lattice, MeshError, NO_VERTEX, TetMesh};
 
 /// The tets with one to three air corners and at least one corner in the mesh.
@@ -19,13 +20,17 @@ use crate::{Cut, InactiveTissue, Lattice, MeshError, NO_VERTEX, TetMesh};
 pub struct Shell {
     /// Index of the first extra vertex, equal to the number of mesh vertices.
     pub first_extra: u32,
-    /// Rest positions of the extra vertices in local meters, in lattice order.
+    /// Rest positions of the extra vertices in local meters: those at lattice points in their
+    /// order, then those of divided tets.
     pub positions: Vec<Point3<f32>>,
     /// Tets that follow the mesh, positively oriented at rest.
     pub tets: Vec<[u32; 4]>,
     /// Tets that a slit cuts: those with a removed mesh vertex, with an extra vertex in the slit,
     /// or with an edge through its middle surface.
     pub removed: Vec<[u32; 4]>,
+    /// The parts of the tets that cuts of no width divide. Corners from
+    /// `first_extra + positions.len()` on are points.
+    pub pieces: Pieces<4>,
     /// Extra vertex `n` follows the mesh vertices `neighbors[offsets[n]..offsets[n + 1]]`.
     pub offsets: Vec<u32>,
     /// The followed mesh vertices of all extra vertices.
@@ -37,7 +42,8 @@ pub struct Shell {
 
 impl Shell {
     /// Builds the shell of a mesh. `air` has one flag per lattice point, as in
-    /// [`Tissue`](crate::Tissue). `cut` is the cut of the mesh.
+    /// [`Tissue`](crate::Tissue). `cut` is the cut of the mesh, and `severed` what its slits
+    /// without a width changed.
     ///
     /// An extra vertex follows the mesh vertices to which a lattice edge joins it, except removed
     /// vertices and vertices on the other side of a slit.
@@ -50,7 +56,12 @@ impl Shell {
     /// [`MeshError::Length`] if `air` does not have one value per lattice point, or if `cut`
     /// belongs to another mesh. [`MeshError::LatticeSize`] if there are too many vertices for
     /// 32-bit indices.
-    pub fn new(mesh: &TetMesh, air: &[bool], cut: &Cut) -> Result<Self, MeshError> {
+    pub fn new(
+        mesh: &TetMesh,
+        air: &[bool],
+        cut: &Cut,
+        severed: Option<&Severed>,
+    ) -> Result<Self, MeshError> {
         let (grid, lattice) = (mesh.lattice.grid(), &mesh.lattice);
         if air.len() != grid.len() {
             return Err(MeshError::Length { array: "air", expected: grid.len(), found: air.len() });
@@ -105,8 +116,19 @@ impl Shell {
             tet.iter().any(|&v| is_removed(v))
                 || (0..4).any(|a| (0..a).any(|b| cut.crosses(position(tet[a]), position(tet[b]))))
         });
+        let blades = severed.map(|severed| severed.blades.as_slice()).unwrap_or_default();
+        let count = vertices + positions.len();
+        let DividedShell { whole, followers, pieces } =
+            divide_shell(tets, count, &position, blades, longest_edge(mesh));
+        let mut rows = rows;
+        let mut positions = positions;
+        for follower in followers {
+            rows.follow_corners(vertices, &follower.own_side);
+            positions.push(follower.rest);
+        }
         let Followed { offsets, neighbors, held_by } = rows;
-        Ok(Self { first_extra: vertices as u32, positions, tets, removed, offsets, neighbors, held_by })
+        let first_extra = vertices as u32;
+        Ok(Self { first_extra, positions, tets: whole, removed, pieces, offsets, neighbors, held_by })
     }
 
     /// Deformed positions of the extra vertices. Each moves by the mean displacement of the
@@ -174,6 +196,23 @@ struct Followed {
 }
 
 impl Followed {
+    /// Adds a row that follows some corners: the mesh vertices among them, or else what the others
+    /// follow.
+    fn follow_corners(&mut self, vertices: usize, corners: &[u32]) {
+        let first = self.neighbors.len();
+        self.neighbors.extend(corners.iter().filter(|&&v| (v as usize) < vertices));
+        let mut held_by = 0;
+        if self.neighbors.len() == first {
+            for extra in corners.iter().map(|&v| v as usize - vertices) {
+                let row = self.offsets[extra] as usize..self.offsets[extra + 1] as usize;
+                self.neighbors.extend_from_within(row);
+                held_by += self.held_by[extra];
+            }
+        }
+        self.offsets.push(self.neighbors.len() as u32);
+        self.held_by.push(held_by);
+    }
+
     fn by(mesh: &TetMesh, cut: &Cut, vertex_of: &[u32], points: &[u32], positions: &[Point3<f32>]) -> Self {
         let around = Neighbors::new(&mesh.lattice);
         let is_inactive =
@@ -186,7 +225,7 @@ impl Followed {
                 around.of(point as usize, |neighbor| match vertex_of[neighbor] {
                     NO_VERTEX => held_by += u32::from(is_inactive(neighbor)),
                     vertex if cut.removed[vertex as usize] => {}
-                    vertex if cut.crosses(position, mesh.positions[vertex as usize]) => {}
+                    vertex if cut.separates(position, mesh.positions[vertex as usize]) => {}
                     vertex => rows.neighbors.push(vertex),
                 });
             }

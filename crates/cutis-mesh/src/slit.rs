@@ -24,6 +24,7 @@ pub struct Slit {
     pub(crate) lateral: Vector3<f64>,
     pub(crate) inward: Vector3<f64>,
     pub(crate) length: f64,
+    /// Zero for a cut of no width.
     half_width: f64,
     depth: f64,
     /// Height above the local skin up to which the slit removes elements.
@@ -79,12 +80,13 @@ impl Slit {
         let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - surface.frame.origin_mm) / 1000.0);
         let (start, end) = (local(cut.from_mm), local(cut.to_mm));
         let length = (end - start).norm();
-        let sizes = [("length", length * 1000.0), ("depth_mm", cut.depth_mm), ("width_mm", cut.width_mm)];
-        if let Some(&(key, value)) = sizes.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+        let width = cut.width_mm.map(|width| ("width_mm", width));
+        let sizes = [("length", length * 1000.0), ("depth_mm", cut.depth_mm)].into_iter().chain(width);
+        if let Some((key, value)) = sizes.clone().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
             return Err(MeshError::IncisionSize { incision: number, key, value });
         }
         let along = (end - start) / length;
-        let (depth, half_width) = (cut.depth_mm / 1000.0, cut.width_mm / 2000.0);
+        let (depth, half_width) = (cut.depth_mm / 1000.0, cut.width_mm.unwrap_or(0.0) / 2000.0);
         let (step, facets) = (surface.step, &surface.facets);
         let reach = depth.max(length / 4.0).max(2.0 * step);
 
@@ -171,23 +173,47 @@ impl Slit {
     pub(crate) fn coordinates(&self, position: Point3<f64>) -> SlitPoint {
         let from_start = position - self.start;
         let along = from_start.dot(&self.along);
+        SlitPoint {
+            along,
+            lateral: from_start.dot(&self.lateral),
+            depth: from_start.dot(&self.inward) - self.height(along),
+        }
+    }
+
+    /// Coordinate of the skin along the inward axis at a length along the segment.
+    fn height(&self, along: f64) -> f64 {
         let bin = along / self.length * self.skin.len() as f64 - 0.5;
         let last = self.skin.len() - 1;
         let low = bin.clamp(0.0, last as f64).floor();
         let (low, part) = (low as usize, (bin - low).clamp(0.0, 1.0));
-        let skin = self.skin[low] + part * (self.skin[(low + 1).min(last)] - self.skin[low]);
-        SlitPoint {
-            along,
-            lateral: from_start.dot(&self.lateral),
-            depth: from_start.dot(&self.inward) - skin,
-        }
+        self.skin[low] + part * (self.skin[(low + 1).min(last)] - self.skin[low])
+    }
+
+    /// The point of the skin at a length along the segment, in local meters.
+    pub(crate) fn skin_at(&self, along: f64) -> Point3<f64> {
+        self.start + self.along * along + self.inward * self.height(along)
+    }
+
+    /// True if the slit has no width: it severs tissue and removes none.
+    pub fn removes_nothing(&self) -> bool {
+        self.half_width == 0.0
+    }
+
+    /// Depth below the skin in m.
+    pub(crate) fn depth(&self) -> f64 {
+        self.depth
+    }
+
+    /// Height above the skin in m up to which the slit cuts.
+    pub(crate) fn above(&self) -> f64 {
+        self.above
     }
 
     /// True if a rest position is in the slit: along the segment, within half the width, and not
-    /// below the depth.
+    /// below the depth. A slit without a width contains nothing.
     pub(crate) fn contains(&self, position: Point3<f32>) -> bool {
         let point = self.coordinates(position.cast());
-        point.lateral.abs() <= self.half_width && self.in_middle_surface(point)
+        !self.removes_nothing() && point.lateral.abs() <= self.half_width && self.in_middle_surface(point)
     }
 
     /// True if the slit cuts a simplex with these corners at rest: a corner is in the slit, or an

@@ -79,8 +79,8 @@ impl Beam {
             vertex_volumes: volume(mesh.masses(&|_| 1.0)),
             held: (0..count).map(|v| column(v) == 0).collect(),
             end: (0..count as u32).filter(|&v| column(v as usize) == cells[0]).collect(),
-            edge_groups: Groups::from_colors(&mesh.edge_colors(&mesh.edges))?,
-            tet_groups: Groups::from_colors(&mesh.tet_colors(&mesh.tets))?,
+            edge_groups: Groups::from_colors(&mesh.edge_colors())?,
+            tet_groups: Groups::from_colors(&mesh.tet_colors())?,
             edges: mesh.edges,
             tets: mesh.tets,
         })

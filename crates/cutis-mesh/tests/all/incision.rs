@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use cutis_mesh::sever::Embedded;
 use cutis_mesh::{Cut, Incision, Lattice, MeshError, SkinMode, SkinOptions, Slit, Split, TetMesh, skin};
 use nalgebra::{Point3, Vector3};
 
@@ -28,7 +29,7 @@ fn body(lattice: &Lattice, is_tissue: impl Fn([f64; 3]) -> bool) -> (TetMesh, Ve
 }
 
 fn incision(from_mm: [f64; 3], to_mm: [f64; 3], depth_mm: f64, width_mm: f64) -> Incision {
-    Incision { from_mm, to_mm, depth_mm, width_mm }
+    Incision { from_mm, to_mm, depth_mm, width_mm: Some(width_mm) }
 }
 
 /// Vertices reached from a vertex through tets whose corners all satisfy a condition.
@@ -81,8 +82,8 @@ fn a_cut_removes_the_vertices_in_the_slit() {
         let gape = cut.gapes[0].measure(&mesh.positions);
         assert!((gape.mean_mm - 8.0).abs() < 1e-4 && (gape.mid_mm - 8.0).abs() < 1e-4, "{gape:?}");
         assert!((gape.mean_distance_mm - 8.0).abs() < 0.3, "{gape:?}");
-        let row = |v: &u32| mesh.frame.to_mm(mesh.positions[*v as usize]).y.round() as i32;
-        let sides = |lip: &[u32]| lip.iter().map(row).collect::<BTreeSet<_>>();
+        let row = |v: u32| mesh.frame.to_mm(mesh.positions[v as usize]).y.round() as i32;
+        let sides = |lip: &[Embedded]| lip.iter().map(|p| row(p.nodes[0])).collect::<BTreeSet<_>>();
         assert_eq!(&sides(cut.gapes[0].left()) | &sides(cut.gapes[0].right()), BTreeSet::from([16, 24]));
     }
 }
@@ -107,9 +108,10 @@ fn lips_of_thin_and_oblique_slits_are_separate() {
                 let length = (Point3::from(to) - Point3::from(from)).norm();
                 mm.z > 13.0 && s > 4.0 && s < length - 4.0 && from_start.dot(&lateral).abs() < 7.0
             };
-            let lip = cut.gapes[0].left();
+            let vertices = |lip: &[Embedded]| lip.iter().map(|p| p.nodes[0]).collect::<Vec<u32>>();
+            let lip = vertices(cut.gapes[0].left());
             let start = lip[lip.len() / 2];
-            let other: BTreeSet<u32> = cut.gapes[0].right().iter().copied().collect();
+            let other: BTreeSet<u32> = vertices(cut.gapes[0].right()).into_iter().collect();
             assert!(!reached(&mesh, start, window).is_disjoint(&other));
             cut.apply(&mut opened, &mut skin);
             assert!(reached(&opened, start, window).is_disjoint(&other), "{from:?} {to:?} {width}");
@@ -132,7 +134,7 @@ fn gape_is_the_lateral_opening() {
     let rest = gape.measure(&mesh.positions);
     let side = cut.slits[0].lateral().cast::<f32>();
     let along = Vector3::new(1.0, 0.0, 0.0);
-    let right: BTreeSet<u32> = gape.right().iter().copied().collect();
+    let right: BTreeSet<u32> = gape.right().iter().map(|lip| lip.nodes[0]).collect();
     // The right lip opens by 6 mm in the middle and less towards the ends, and slides along the
     // slit by 2 mm.
     let moved: Vec<Point3<f32>> = mesh

@@ -85,11 +85,11 @@ proptest! {
         let Ok(mesh) = build(&lattice, &vec![0.0; air.len()], &air, false) else { return Ok(()) };
         let (most_edges, most_tets) = if lattice.split() == Split::Kuhn6 { (14, 24) } else { (18, 40) };
         let mut seen = BTreeSet::new();
-        for (edge, color) in mesh.edges.iter().zip(mesh.edge_colors(&mesh.edges)) {
+        for (edge, color) in mesh.edges.iter().zip(mesh.edge_colors()) {
             prop_assert!(color < most_edges && edge.iter().all(|&v| seen.insert((color, v))));
         }
         seen.clear();
-        for (tet, color) in mesh.tets.iter().zip(mesh.tet_colors(&mesh.tets)) {
+        for (tet, color) in mesh.tets.iter().zip(mesh.tet_colors()) {
             prop_assert!(color < most_tets && tet.iter().all(|&v| seen.insert((color, v))));
         }
     }
@@ -224,7 +224,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
                 (skin.triangles, skin.report)
             });
             let figures = [mesh.tet_volumes(), mesh.edge_volumes(), mesh.masses(&|hu| hu)].map(bits);
-            (mesh.boundary(), mesh.edge_colors(&mesh.edges), mesh.tets, mesh.edges, skins, figures)
+            (mesh.boundary(), mesh.edge_colors(), mesh.tets, mesh.edges, skins, figures)
         })
     };
     let one = run(1);

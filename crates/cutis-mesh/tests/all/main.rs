@@ -8,5 +8,6 @@ mod lattice;
 mod oracle;
 mod real_data;
 mod region;
+mod sever;
 mod shell;
 mod skin;

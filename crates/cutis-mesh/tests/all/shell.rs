@@ -30,7 +30,7 @@ fn point(mesh: &TetMesh, shell: &Shell, v: u32) -> usize {
 #[test]
 fn shell_has_all_tets_between_mesh_and_air() {
     let (mesh, triangles, air) = ball();
-    let shell = Shell::new(&mesh, &air, &plan(&mesh, &triangles, &[]).unwrap()).unwrap();
+    let shell = Shell::new(&mesh, &air, &plan(&mesh, &triangles, &[]).unwrap(), None).unwrap();
     let expected: BTreeSet<[usize; 4]> = all_tets(&mesh.lattice)
         .into_iter()
         .filter(|tet| (1..=3).contains(&tet.iter().filter(|&&p| air[p]).count()))
@@ -59,10 +59,10 @@ fn slits_open_the_shell_and_no_vertex_follows_across_them() {
     let (mut mesh, mut triangles, air) = ball();
     let top = mesh.lattice.grid().mm([8, 8, 8]) + Vector3::new(0.0, 0.0, 11.0);
     let (from, to) = (top - Vector3::new(7.0, 0.5, 0.0), top + Vector3::new(7.0, -0.5, 0.0));
-    let slit = Incision { from_mm: from.into(), to_mm: to.into(), depth_mm: 6.0, width_mm: 0.5 };
+    let slit = Incision { from_mm: from.into(), to_mm: to.into(), depth_mm: 6.0, width_mm: Some(0.5) };
     let cut = plan(&mesh, &triangles, &[slit]).unwrap();
     cut.apply(&mut mesh, &mut triangles);
-    let shell = Shell::new(&mesh, &air, &cut).unwrap();
+    let shell = Shell::new(&mesh, &air, &cut, None).unwrap();
     assert!(!shell.removed.is_empty() && !shell.tets.is_empty());
     // Pull the two sides of the slit apart. Each shell vertex moves with its own side.
     let y = |p: &Point3<f32>| mesh.frame.to_mm(*p).y - top.y + 0.5;
@@ -83,5 +83,5 @@ fn slits_open_the_shell_and_no_vertex_follows_across_them() {
     }
     assert!(checked > 10);
     let other = plan(&ball().0, &ball().1, &[]).unwrap();
-    assert!(Shell::new(&mesh, &air[1..], &other).is_err());
+    assert!(Shell::new(&mesh, &air[1..], &other, None).is_err());
 }

@@ -30,17 +30,23 @@ impl Body {
             sections.membrane.map(|section| Membrane::find(file, section, &whole, &hu, &skin)).transpose()?;
         warnings.extend(membrane.iter().flat_map(|membrane| membrane.warnings.iter().cloned()));
         let mut mesh = region::mesh(sections, &whole, &hu, &slits)?;
-        let materials = BodyMaterials::assign(sections, &whole, &hu, &mesh, &skin)?;
+        let mut materials = BodyMaterials::assign(sections, &whole, &hu, &mesh, &skin)?;
         warnings.extend(materials.iter().flat_map(|materials| materials.warnings(&mesh)));
         let (mut skin, inactive_skin) = mesh.divide_skin(&skin);
         let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
         drop(hu);
         warnings.extend(dropped_tets(&mesh));
         let density = tissue.density.table(TableKind::Density, file, "tissue.density")?;
-        let masses = mesh.masses(&|hu| density.at(hu));
+        let density = |hu: f32| density.at(hu);
+        let mut masses = mesh.masses(&density);
         region::check_handles(sections, &mesh)?;
-        let cut = Cut::of_slits(&mesh, &skin, slits).map_err(|e| region::incision_error(sections, e))?;
+        let mut cut = Cut::of_slits(&mesh, &skin, slits).map_err(|e| region::incision_error(sections, e))?;
         let removed = cut.apply(&mut mesh, &mut skin);
+        let severed = cut.sever(&mut mesh, &mut skin).map_err(file.blame("incision"))?;
+        if let Some(severed) = &severed {
+            divide_masses(&mut masses, &mesh, &density);
+            materials.iter_mut().for_each(|materials| materials.add_nodes(&severed.virtual_nodes));
+        }
         let grabbed = handles::grabbed(sections, &mesh, &cut)?;
         warnings.extend(region::warning(&mesh));
         Ok(Self {
@@ -51,6 +57,7 @@ impl Body {
             skin_report,
             cut,
             removed,
+            severed,
             membrane,
             grabbed,
             materials,
@@ -81,6 +88,22 @@ fn find_tissue(
     }
     skin.triangles = on_body;
     Ok((whole, Some(skin)))
+}
+
+/// Divides the masses of vertices along cuts of no width among the nodes of the copies.
+fn divide_masses(masses: &mut Vec<f32>, mesh: &TetMesh, density: &dyn Fn(f32) -> f32) {
+    let copies = &mesh.tets[mesh.whole_tets()..];
+    let mut points: Vec<u32> = copies.iter().flatten().map(|&v| mesh.lattice_index[v as usize]).collect();
+    points.sort_unstable();
+    points.dedup();
+    let divided = mesh.masses(density);
+    masses.resize(divided.len(), 0.0);
+    for (v, mass) in masses.iter_mut().enumerate() {
+        // A vertex that lost all its tissue is removed and needs no mass.
+        if divided[v] > 0.0 && points.binary_search(&mesh.lattice_index[v]).is_ok() {
+            *mass = divided[v];
+        }
+    }
 }
 
 /// Warning about tissue that is not connected with the largest part.

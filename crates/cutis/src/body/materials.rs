@@ -49,6 +49,12 @@ impl BodyMaterials {
         Ok(Some(Self { rows, row_of_vertex: found.into_iter().flatten().collect() }))
     }
 
+    /// Adds the virtual nodes of cuts, each with the material of the vertex at its place.
+    pub(super) fn add_nodes(&mut self, twins: &[u32]) {
+        let rows: Vec<u8> = twins.iter().map(|&vertex| self.row_of_vertex[vertex as usize]).collect();
+        self.row_of_vertex.extend(rows);
+    }
+
     /// The rows with the number of vertices of each, and of tetrahedra that lie wholly in it.
     pub(crate) fn report(&self, mesh: &TetMesh) -> Vec<MaterialRow> {
         let (mut vertices, mut tets) = (vec![0; self.rows.len()], vec![0; self.rows.len()]);

@@ -10,6 +10,7 @@ mod membrane;
 mod region;
 mod sections;
 
+use cutis_mesh::sever::{Embedded, Severed};
 use cutis_mesh::{Cut, InactiveSkin, Removed, SkinReport, TetMesh};
 use nalgebra::Point3;
 
@@ -33,7 +34,7 @@ fn air(hu: &[f32], air_below_hu: f32) -> Vec<bool> {
 }
 
 /// The cut body at rest. Vertices keep their numbers through the cut. `mesh` and `skin` hold the
-/// elements that the incisions left.
+/// elements that the incisions left, and copies along cuts of no width.
 pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
     /// Skin triangles in mesh vertices, oriented outward; empty if the scene does not need the
@@ -47,6 +48,8 @@ pub(crate) struct Body {
     pub(crate) cut: Cut,
     /// The elements that the incisions removed.
     pub(crate) removed: Removed,
+    /// What cuts of no width changed; none if the scene has none.
+    pub(crate) severed: Option<Severed>,
     /// Normals and directions of the whole skin before the incisions; none if the scene has no
     /// constraint that needs them.
     pub(crate) membrane: Option<Membrane>,
@@ -54,7 +57,7 @@ pub(crate) struct Body {
     pub(crate) grabbed: Vec<Vec<u32>>,
     /// The material of each vertex; none if the scene has no table of materials.
     pub(crate) materials: Option<BodyMaterials>,
-    /// Lumped masses before the cut, kg.
+    /// Lumped masses, kg. Incisions that remove tissue do not change them.
     masses: Vec<f32>,
     /// Per lattice point: whether it is air.
     pub(crate) air: Vec<bool>,
@@ -65,6 +68,30 @@ impl Body {
     /// Whether an incision removed the vertex from all constraints.
     pub(crate) fn is_removed(&self, vertex: u32) -> bool {
         self.cut.removed[vertex as usize]
+    }
+
+    /// HU at the positions of [`Body::whole_skin`].
+    pub(crate) fn whole_skin_hu(&self) -> Vec<f32> {
+        let edges = self.severed.as_ref().map(|severed| self.hu_at(&severed.skin_pieces.points));
+        [self.mesh.hu.as_slice(), &self.inactive_hu, &edges.unwrap_or_default()].concat()
+    }
+
+    /// HU at the positions of [`Body::whole_tissue`].
+    pub(crate) fn whole_tissue_hu(&self) -> Vec<f32> {
+        let walls = self.severed.as_ref().map(|severed| self.hu_at(&severed.tet_pieces.points));
+        [self.mesh.hu.as_slice(), &walls.unwrap_or_default()].concat()
+    }
+
+    fn hu_at(&self, points: &[Embedded]) -> Vec<f32> {
+        let hu = |point: &Embedded| {
+            point
+                .nodes
+                .iter()
+                .zip(point.weights)
+                .map(|(&node, weight)| self.mesh.hu[node as usize] * weight)
+                .sum()
+        };
+        points.iter().map(hu).collect()
     }
 
     /// Number of vertices that the incisions removed from all constraints.
@@ -82,11 +109,52 @@ impl Body {
         Some(self.mesh.tets.iter().filter(at_border).flatten().map(moved).fold(0.0, f64::max))
     }
 
-    /// The skin of the whole body: the given positions of the mesh's vertices, then the positions
-    /// of the inactive skin; and all triangles.
+    /// Share of its area that a triangle of the cut skin holds: 1 but for a copy along a cut of no
+    /// width.
+    pub(crate) fn skin_share(&self, triangle: usize) -> f64 {
+        let Some(severed) = &self.severed else { return 1.0 };
+        let whole = self.skin.len() - severed.copies.len();
+        triangle.checked_sub(whole).map_or(1.0, |copy| f64::from(severed.copies[copy].share))
+    }
+
+    /// The skin of the whole body as it looks: the given positions of the mesh's vertices, then
+    /// those of the inactive skin and of the edges of cuts; and all triangles.
     pub(crate) fn whole_skin(&self, positions: &[Point3<f32>]) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
         let inactive = &self.inactive_skin;
-        ([positions, &inactive.positions].concat(), [self.skin.as_slice(), &inactive.triangles].concat())
+        let Some(severed) = &self.severed else {
+            let triangles = [self.skin.as_slice(), &inactive.triangles].concat();
+            return ([positions, &inactive.positions].concat(), triangles);
+        };
+        let vertices = self.mesh.positions.len() as u32;
+        let behind = inactive.positions.len() as u32;
+        let corner = |v: u32| if v < vertices { v } else { v + behind };
+        let pieces = severed.skin_pieces.simplices.iter().map(|piece| piece.map(corner));
+        let triangles = self.whole_triangles().iter().chain(&inactive.triangles).copied().chain(pieces);
+        let edges = embedded(&severed.skin_pieces.points, positions);
+        ([positions, &inactive.positions, &edges].concat(), triangles.collect())
+    }
+
+    /// The skin triangle in the scan of which each triangle of [`Body::whole_skin`] is a part.
+    pub(crate) fn skin_in_scan(&self) -> Vec<[u32; 3]> {
+        let pieces = self.severed.iter().flat_map(|severed| {
+            let copies = severed.skin_pieces.copies.iter().map(|&copy| &severed.copies[copy as usize]);
+            copies.map(|copy| severed.triangles[copy.triangle as usize])
+        });
+        self.whole_triangles().iter().chain(&self.inactive_skin.triangles).copied().chain(pieces).collect()
+    }
+
+    /// The skin triangles that are no copies.
+    fn whole_triangles(&self) -> &[[u32; 3]] {
+        &self.skin[..self.skin.len() - self.severed.as_ref().map_or(0, |severed| severed.copies.len())]
+    }
+
+    /// The tissue as it looks: the given positions of the mesh's vertices, then those of points on
+    /// the walls of cuts; and all tetrahedra.
+    pub(crate) fn whole_tissue(&self, positions: &[Point3<f32>]) -> (Vec<Point3<f32>>, Vec<[u32; 4]>) {
+        let Some(severed) = &self.severed else { return (positions.to_vec(), self.mesh.tets.clone()) };
+        let whole = &self.mesh.tets[..self.mesh.whole_tets()];
+        let walls = embedded(&severed.tet_pieces.points, positions);
+        ([positions, &walls].concat(), [whole, &severed.tet_pieces.simplices].concat())
     }
 
     /// The share of the tetrahedra that a region of interest of `around` mm would hold.
@@ -99,4 +167,9 @@ impl Body {
         let held = mesh.tets.iter().filter(|tet| tet.iter().any(|&vertex| inside[vertex as usize]));
         held.count() as f64 / mesh.tets.len().max(1) as f64
     }
+}
+
+/// Positions of points that move with vertices. None without positions of the vertices.
+fn embedded(points: &[Embedded], positions: &[Point3<f32>]) -> Vec<Point3<f32>> {
+    if positions.is_empty() { Vec::new() } else { points.iter().map(|point| point.at(positions)).collect() }
 }

@@ -131,11 +131,11 @@ fn idle_adapter(scene: &Scene, backend: &Chosen) -> Option<String> {
 fn narrow_incisions(incisions: &[IncisionSection], body: &Body) -> Vec<String> {
     let step = body.mesh.lattice.longest_step_mm();
     let all = incisions.iter().enumerate();
-    let narrow = all.filter(|(_, incision)| incision.width_mm < 0.95 * step).map(|(n, incision)| {
+    let width = |(n, incision): (usize, &IncisionSection)| Some((n, incision.width_mm?));
+    let narrow = all.filter_map(width).filter(|(_, width)| *width < 0.95 * step).map(|(n, width)| {
         format!(
-            "incision[{n}].width_mm = {} is less than the lattice step of {step:.2} mm: the lips begin about \
-             one to two steps apart",
-            incision.width_mm
+            "incision[{n}].width_mm = {width} is less than the lattice step of {step:.2} mm: the lips begin \
+             about one to two steps apart; without width_mm they begin closed"
         )
     });
     narrow.collect()

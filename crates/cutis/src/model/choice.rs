@@ -30,6 +30,14 @@ impl ModelChoice {
             Self::Chainmail => true,
         }
     }
+
+    /// Whether an incision may leave out its width, so that it removes nothing.
+    pub(crate) fn cuts_without_width(self) -> bool {
+        match self {
+            Self::Pbd => true,
+            Self::Chainmail => false,
+        }
+    }
 }
 
 /// Builds the model that the scene names.

@@ -100,16 +100,18 @@ fn write_skin(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
     let body = deformed.body;
     let (now, triangles) = body.whole_skin(deformed.positions);
     let (rest, _) = body.whole_skin(&body.mesh.positions);
-    let hu = [body.mesh.hu.as_slice(), &body.inactive_hu].concat();
-    let lines = SkinLines::of(body, deformed.scene, &triangles);
+    let hu = body.whole_skin_hu();
+    let lines = SkinLines::of(body, deformed.scene);
     let cell_data = lines.as_ref().map(SkinLines::arrays).unwrap_or_default();
     write_mesh(path, body, [&rest, &now], &hu, Cells::Triangles(&triangles), &cell_data)
 }
 
 /// Writes the tetrahedra of the body.
 fn write_tissue(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
-    let (body, mesh) = (deformed.body, &deformed.body.mesh);
-    write_mesh(path, body, [&mesh.positions, deformed.positions], &mesh.hu, Cells::Tets(&mesh.tets), &[])
+    let body = deformed.body;
+    let (now, tets) = body.whole_tissue(deformed.positions);
+    let (rest, _) = body.whole_tissue(&body.mesh.positions);
+    write_mesh(path, body, [&rest, &now], &body.whole_tissue_hu(), Cells::Tets(&tets), &[])
 }
 
 /// Writes cells at their present positions, with the displacement from `rest` and the HU of each

@@ -128,7 +128,7 @@ fn add_lines(
     view: &View<'_>,
 ) -> Result<(), Error> {
     let (positions, triangles) = body.whole_skin(&body.mesh.positions);
-    let Some(lines) = SkinLines::of(body, scene, &triangles) else { return Ok(()) };
+    let Some(lines) = SkinLines::of(body, scene) else { return Ok(()) };
     let field = LineField {
         origin_mm: body.mesh.frame.origin_mm,
         positions: &positions,

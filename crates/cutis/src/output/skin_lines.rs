@@ -20,12 +20,14 @@ pub(super) struct SkinLines {
 }
 
 impl SkinLines {
-    /// The fields at triangles of the whole skin ([`Body::whole_skin`]). None without a membrane.
-    pub(super) fn of(body: &Body, scene: &Scene, triangles: &[[u32; 3]]) -> Option<Self> {
+    /// The fields at the triangles of the whole skin ([`Body::whole_skin`]). None without a
+    /// membrane.
+    pub(super) fn of(body: &Body, scene: &Scene) -> Option<Self> {
         let section = scene.constraints.membrane.as_ref()?;
+        let triangles = body.skin_in_scan();
         let mut lines = Self::default();
         let mut tension = [Vec::new(), Vec::new()];
-        for tangent in body.tangents(triangles)? {
+        for tangent in body.tangents(&triangles)? {
             lines.normals.push(tangent.normal.cast::<f32>().into());
             lines.directions.push(tangent.along.cast::<f32>().into());
             lines.weights.push(tangent.weight as f32);

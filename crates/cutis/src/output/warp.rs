@@ -4,6 +4,7 @@
 use std::borrow::Cow;
 
 use cutis_mesh::Shell;
+use cutis_mesh::sever::Pieces;
 use cutis_resample::Warp;
 use cutis_volume::Volume;
 use nalgebra::Point3;
@@ -39,15 +40,34 @@ impl<'a> BodyWarp<'a> {
         stages: &Stages,
     ) -> Result<Self, Error> {
         let mesh = &body.mesh;
-        let shell = Shell::new(mesh, &body.air, &body.cut)?;
-        let followed = shell.follow(&mesh.positions, deformed);
+        let shell = Shell::new(mesh, &body.air, &body.cut, body.severed.as_ref())?;
+        let none = Pieces::default();
+        let walls = body.severed.as_ref().map_or(&none, |severed| &severed.tet_pieces);
+        // Vertices: those of the mesh, those of the shell, and points on walls in both.
+        let shell_count = shell.positions.len() as u32;
+        let (vertices, all) = (mesh.positions.len() as u32, shell.first_extra + shell_count);
+        let behind = |tet: &[u32; 4]| tet.map(|v| if v < vertices { v } else { v + shell_count });
+        let in_shell = |tet: &[u32; 4]| tet.map(|v| if v < all { v } else { v + walls.points.len() as u32 });
+        let body_tets: Vec<[u32; 4]> = mesh.tets[..mesh.whole_tets()]
+            .iter()
+            .copied()
+            .chain(walls.simplices.iter().map(behind))
+            .collect();
+        let around = shell.tets.iter().copied().chain(shell.pieces.simplices.iter().map(in_shell));
+        let extra = |positions: &[Point3<f32>]| {
+            let followed = shell.follow(&mesh.positions, positions);
+            let nodes = [positions, &followed].concat();
+            let points = walls.points.iter().chain(&shell.pieces.points).map(|point| point.at(&nodes));
+            followed.iter().copied().chain(points).collect::<Vec<_>>()
+        };
+        let (at_rest, moved) = (extra(&mesh.positions), extra(deformed));
         Ok(Self {
             body,
-            body_tets: mesh.tets.len(),
-            tets: [mesh.tets.as_slice(), &shell.tets].concat(),
-            rest: [mesh.positions.as_slice(), &shell.positions].concat(),
-            on_device: on_device.and_then(|positions| stages.append(positions, &followed)),
-            deformed: [deformed, &followed].concat(),
+            body_tets: body_tets.len(),
+            tets: body_tets.into_iter().chain(around).collect(),
+            rest: [mesh.positions.as_slice(), &at_rest].concat(),
+            on_device: on_device.and_then(|positions| stages.append(positions, &moved)),
+            deformed: [deformed, &moved].concat(),
             removed: [body.removed.tets.as_slice(), &shell.removed].concat(),
         })
     }

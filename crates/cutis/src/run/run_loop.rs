@@ -137,8 +137,7 @@ struct Lips<'a> {
 
 impl<'a> Lips<'a> {
     fn new(gapes: &'a [Gape]) -> Self {
-        let mut vertices: Vec<u32> =
-            gapes.iter().flat_map(|gape| gape.left().iter().chain(gape.right())).copied().collect();
+        let mut vertices: Vec<u32> = gapes.iter().flat_map(Gape::vertices).collect();
         vertices.sort_unstable();
         vertices.dedup();
         Self { gapes, vertices }

@@ -160,7 +160,14 @@ impl Scene {
             check.point(&key("from_mm"), incision.from_mm)?;
             check.point(&key("to_mm"), incision.to_mm)?;
             check.positive(&key("depth_mm"), incision.depth_mm)?;
-            check.positive(&key("width_mm"), incision.width_mm)?;
+            match incision.width_mm {
+                Some(width_mm) => check.positive(&key("width_mm"), width_mm)?,
+                None => {
+                    let model = serde_json::json!(self.model);
+                    let why = format!("is needed with model = {model}, which cannot cut without a width");
+                    check.require(self.model.cuts_without_width(), &key("width_mm"), "", &why)?;
+                }
+            }
             self.validate_time(check, &key("at_s"), incision.at_s)?;
             let to = format!("{:?}", incision.to_mm);
             let apart = incision.from_mm != incision.to_mm;

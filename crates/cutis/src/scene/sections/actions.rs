@@ -52,8 +52,7 @@ pub struct BoxSection {
     pub max_mm: [f64; 3],
 }
 
-/// An incision as in the paper, with a mid-surface that always separates the lips. It is placed on
-/// the body at rest.
+/// An incision along a straight segment on the skin. It is placed on the body at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IncisionSection {
@@ -63,8 +62,10 @@ pub struct IncisionSection {
     pub to_mm: [f64; 3],
     /// Depth below the skin, mm.
     pub depth_mm: f64,
-    /// Width of the removed strip, mm.
-    pub width_mm: f64,
+    /// Width of the strip of tissue that is removed, mm, as in the paper. Left out: the cut has no
+    /// width and removes nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_mm: Option<f64>,
     /// Time at which the incision is made, s; later than 0 with the model `chainmail` only.
     #[serde(default)]
     pub at_s: f64,

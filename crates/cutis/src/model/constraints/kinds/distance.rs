@@ -51,7 +51,7 @@ impl ConstraintKind for DistanceSection {
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
         let mesh = &parts.body.mesh;
-        let groups = Groups::from_colors(&mesh.edge_colors(&mesh.edges))?;
+        let groups = Groups::from_colors(&mesh.edge_colors())?;
         let stiffness = if parts.compliant() {
             let volumes = mesh.edge_volumes();
             let of_row = |row: &TissueMaterialSection| SPRINGS_OVER_BODY * row.youngs_modulus_pa;

@@ -183,33 +183,61 @@ impl MembraneSection {
         Some(if tangent.holds { tension } else { [0.0; 2] })
     }
 
-    /// The strips of some triangles, two per triangle that holds tension.
+    /// The strips of some triangles, two per triangle that holds tension. `share` is the share of
+    /// its area that a triangle holds.
     ///
     /// # Errors
     /// [`Error`] for a material that a triangle cannot have.
-    fn strips(&self, parts: &BodyParts<'_>, skin: &[[u32; 3]]) -> Result<Vec<Strip>, Error> {
+    fn strips(
+        &self,
+        parts: &BodyParts<'_>,
+        skin: &[[u32; 3]],
+        share: &dyn Fn(usize) -> f64,
+    ) -> Result<Vec<Strip>, Error> {
         let (Some(tangents), Some(values)) = (parts.body.tangents(skin), self.values()) else {
             return Ok(Vec::new());
         };
         let mut strips = Vec::with_capacity(2 * skin.len());
-        for (triangle, tangent) in skin.iter().zip(tangents).filter(|(_, tangent)| tangent.holds) {
+        let numbered = skin.iter().enumerate().zip(tangents);
+        for ((number, triangle), tangent) in numbered.filter(|(_, tangent)| tangent.holds) {
             let Tangent { normal, along, weight, .. } = tangent;
             let directions = [along, normal.cross(&along)];
             let x = triangle.map(|v| parts.position(v));
             for (direction, law) in directions.into_iter().zip(values.blended(weight)) {
                 let material =
                     SkinStripMaterial::new(normal.into(), direction.into(), law).map_err(Error::Material)?;
-                let compliance = material.compliance(&x).map_err(Error::Material)?;
+                let compliance = material.compliance(&x).map_err(Error::Material)? / share(number);
                 strips.push(Strip { triangle: *triangle, material, compliance });
             }
         }
         Ok(strips)
     }
 
+    /// The strips of the cut skin.
+    fn kept_strips(&self, parts: &BodyParts<'_>) -> Result<Vec<Strip>, Error> {
+        self.strips(parts, &parts.body.skin, &|triangle| parts.body.skin_share(triangle))
+    }
+
+    /// Adds the load that strips set free, times a sign.
+    fn add_freed(&self, parts: &BodyParts<'_>, strips: &[Strip], sign: f64, loads: &mut [Vector3<f64>]) {
+        for strip in strips {
+            let x: [Point3<f64>; 3] = strip.triangle.map(|v| parts.position(v));
+            let params = SkinStrip::from_rest(&x, &strip.material);
+            let strength = match parts.compliant() {
+                true => Strength::Compliance(strip.compliance),
+                false => Strength::Pbd(self.stiffness),
+            };
+            let freed = parts.freed_load::<SkinStrip, 3>(&strip.triangle, &params, &strength);
+            for (&v, load) in strip.triangle.iter().zip(freed) {
+                loads[v as usize] += load * sign;
+            }
+        }
+    }
+
     /// Mean over the strips of √(Σ w|∇C|²/α), 1/s: the angular frequency at which a strip alone
     /// would oscillate. Zero without strips.
     fn frequency(&self, parts: &BodyParts<'_>) -> f64 {
-        let strips = self.strips(parts, &parts.body.skin).unwrap_or_default();
+        let strips = self.kept_strips(parts).unwrap_or_default();
         let frequency = |strip: &Strip| {
             let [b1, b2, ..] =
                 SkinStrip::from_rest(&strip.triangle.map(|v| parts.position(v)), &strip.material);
@@ -307,7 +335,7 @@ impl ConstraintKind for MembraneSection {
         builder: SystemBuilder<f32>,
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
-        let strips = self.strips(parts, &parts.body.skin)?;
+        let strips = self.kept_strips(parts)?;
         // Vertex block descent holds the scan by a load on each vertex.
         if !parts.at_rest || parts.solver.formulation == Formulation::Vbd {
             return self.add_type::<SkinStrip>(builder, parts, &strips);
@@ -318,18 +346,13 @@ impl ConstraintKind for MembraneSection {
     }
 
     fn add_loads(&self, parts: &BodyParts<'_>, loads: &mut [Vector3<f64>]) -> Result<(), Error> {
-        for strip in self.strips(parts, &parts.body.removed.triangles)? {
-            let x: [Point3<f64>; 3] = strip.triangle.map(|v| parts.position(v));
-            let params = SkinStrip::from_rest(&x, &strip.material);
-            let strength = match parts.compliant() {
-                true => Strength::Compliance(strip.compliance),
-                false => Strength::Pbd(self.stiffness),
-            };
-            let freed = parts.freed_load::<SkinStrip, 3>(&strip.triangle, &params, &strength);
-            for (&v, load) in strip.triangle.iter().zip(freed) {
-                loads[v as usize] += load;
-            }
-        }
+        self.add_freed(parts, &self.strips(parts, &parts.body.removed.triangles, &|_| 1.0)?, 1.0, loads);
+        let Some(severed) = &parts.body.severed else { return Ok(()) };
+        // A divided triangle pulled on its corners in the scan. Now its copies do.
+        self.add_freed(parts, &self.strips(parts, &severed.triangles, &|_| 1.0)?, 1.0, loads);
+        let whole = parts.body.skin.len() - severed.copies.len();
+        let share = |copy: usize| f64::from(severed.copies[copy].share);
+        self.add_freed(parts, &self.strips(parts, &parts.body.skin[whole..], &share)?, -1.0, loads);
         Ok(())
     }
 

@@ -170,7 +170,7 @@ impl StcSection {
             .collect();
         let stiffness = if parts.compliant() {
             compliances(skin, |n, _| {
-                let modulus = self.area_modulus_n_per_m * materials[n].factor;
+                let modulus = self.area_modulus_n_per_m * materials[n].factor * parts.body.skin_share(n);
                 cutis_constraints::skin_compliance(f64::from(params[n][0]), modulus)
             })?
         } else {
@@ -287,13 +287,22 @@ impl ConstraintKind for StcSection {
     }
 
     fn add_loads(&self, parts: &BodyParts<'_>, loads: &mut [Vector3<f64>]) -> Result<(), Error> {
-        let cut = &parts.body.removed.triangles;
-        for (triangle, material) in cut.iter().zip(self.materials(parts, cut)?) {
-            for (&v, load) in triangle.iter().zip(self.freed_load(parts, triangle, &material)?) {
-                loads[v as usize] += load;
+        let mut add = |triangles: &[[u32; 3]], share: &dyn Fn(usize) -> f64| -> Result<(), Error> {
+            for (n, (triangle, material)) in
+                triangles.iter().zip(self.materials(parts, triangles)?).enumerate()
+            {
+                for (&v, load) in triangle.iter().zip(self.freed_load(parts, triangle, &material)?) {
+                    loads[v as usize] += load * share(n);
+                }
             }
-        }
-        Ok(())
+            Ok(())
+        };
+        add(&parts.body.removed.triangles, &|_| 1.0)?;
+        let Some(severed) = &parts.body.severed else { return Ok(()) };
+        // A divided triangle pulled on its corners in the scan. Now its copies do.
+        add(&severed.triangles, &|_| 1.0)?;
+        let whole = parts.body.skin.len() - severed.copies.len();
+        add(&parts.body.skin[whole..], &|copy| -f64::from(severed.copies[copy].share))
     }
 
     /// `T s (1 + β s)` with `s = 1/scale − 1`: the derivative of the energy of a triangle by its

@@ -49,7 +49,7 @@ impl ConstraintKind for VolumeConstraintSection {
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
         let mesh = &parts.body.mesh;
-        let groups = Groups::from_colors(&mesh.tet_colors(&mesh.tets))?;
+        let groups = Groups::from_colors(&mesh.tet_colors())?;
         let stiffness = if parts.compliant() {
             let volumes = mesh.tet_volumes();
             let moduli = parts.moduli(MODULUS_KEY, self.bulk_modulus_pa, |row| row.bulk_modulus_pa)?;

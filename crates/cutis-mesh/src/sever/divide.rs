@@ -1,0 +1,152 @@
+//! Which tets blades divide, and into which parts.
+
+use rayon::prelude::*;
+
+use super::components::{EDGES, count, parts_of};
+use super::severing::Severing;
+use super::walls::Walls;
+use super::wound::{SplitTet, TetCopy, TooManyBlades, Wound};
+use crate::TetMesh;
+
+/// A part with a smaller share of its tet gets no copy. It holds no voxel, and the other parts take
+/// its volume.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// A tet is divided if this share of its section along a blade is cut, and not held together by
+/// less than this share.
+const LEAST_CUT: f64 = 0.01;
+
+/// A divided tet while its nodes are not known.
+pub(super) struct Divided {
+    pub cell: [usize; 3],
+    pub number: usize,
+    pub tet: u32,
+    pub parts: [u8; 4],
+    kept: u8,
+    /// Share of the section that is cut.
+    cut: f64,
+    volumes: [f64; 4],
+    distances: Vec<[f32; 4]>,
+    blades: Vec<u32>,
+}
+
+/// A tet that blades cut: its cell, its number in the cell, and the share of its section that each
+/// blade has cut.
+struct Touched {
+    tet: u32,
+    cell: [usize; 3],
+    number: usize,
+    cuts: Vec<(u32, f64)>,
+}
+
+impl Severing {
+    /// Finds the divided tets, their copies, and the nodes of the copies.
+    ///
+    /// # Errors
+    /// [`TooManyBlades`].
+    pub fn wound(&self, mesh: &TetMesh) -> Result<Wound, TooManyBlades> {
+        let divided = self.divided(mesh)?;
+        let mut wound = Wound::default();
+        for tet in &divided {
+            let walls = (wound.distances.len() as u32, tet.distances.len() as u8);
+            wound.distances.extend(&tet.distances);
+            wound.blades.extend(&tet.blades);
+            let Divided { tet: number, parts, kept, cut, .. } = *tet;
+            let first_copy = wound.copies.len() as u32;
+            wound.split.push(SplitTet { tet: number, parts, kept, first_copy, cut, walls });
+            let copy = |of_tet: u8, nodes, share: f64, whole| TetCopy {
+                tet: number,
+                number: of_tet,
+                nodes,
+                share: share as f32,
+                whole,
+            };
+            for (of_tet, part) in (0..).zip((0..4).filter(|part| kept >> part & 1 == 1)) {
+                wound.copies.push(copy(of_tet, [0; 4], tet.cut * tet.volumes[part], false));
+            }
+            if tet.cut < 1.0 {
+                let corners = mesh.tets[number as usize];
+                wound.copies.push(copy(kept.count_ones() as u8, corners, 1.0 - tet.cut, true));
+            }
+        }
+        self.join(mesh, &divided, &mut wound);
+        self.edges(mesh, &mut wound);
+        Ok(wound)
+    }
+
+    /// The severed edges of a tet as a mask.
+    fn severed(&self, mesh: &TetMesh, corners: &[u32; 4]) -> u8 {
+        EDGES.iter().enumerate().fold(0, |mask, (n, &(a, b))| {
+            let [low, high] = [corners[a].min(corners[b]), corners[a].max(corners[b])];
+            let bits = self.edges[low as usize];
+            mask | u8::from(bits != 0 && bits >> self.direction(mesh, low, high) & 1 == 1) << n
+        })
+    }
+
+    /// The direction of the edge between two vertices.
+    pub(super) fn direction(&self, mesh: &TetMesh, low: u32, high: u32) -> usize {
+        let (p, q) = (mesh.point(low), mesh.point(high));
+        let step: [i8; 3] = std::array::from_fn(|axis| (q[axis] as isize - p[axis] as isize) as i8);
+        let directions = &self.index.stencil().directions[p.iter().sum::<usize>() & 1];
+        directions.iter().position(|d| d.step == step).expect("corners of a tet are joined by lattice edges")
+    }
+
+    /// The tets that blades have cut, in ascending order.
+    fn touched(&self) -> Vec<Touched> {
+        let mut touched: Vec<Touched> = Vec::new();
+        for (blade, sides) in (0..).zip(&self.blades) {
+            for own in &sides.sections {
+                let cut = own.section.cut(sides.reached, sides.depth);
+                if cut >= LEAST_CUT {
+                    let cut = if cut > 1.0 - LEAST_CUT { 1.0 } else { cut };
+                    let cuts = vec![(blade, cut)];
+                    touched.push(Touched { tet: own.tet, cell: own.cell, number: own.number, cuts });
+                }
+            }
+        }
+        touched.sort_by_key(|touched| touched.tet);
+        touched.dedup_by(|next, first| {
+            let same = next.tet == first.tet;
+            if same {
+                first.cuts.append(&mut next.cuts);
+            }
+            same
+        });
+        touched
+    }
+
+    fn divided(&self, mesh: &TetMesh) -> Result<Vec<Divided>, TooManyBlades> {
+        let divide = |touched: &Touched| self.divide(mesh, touched).transpose();
+        self.touched().par_iter().filter_map(divide).collect()
+    }
+
+    /// Divides a tet. One blade divides it by the sides of the corners, as far as it has cut the
+    /// section. Several blades divide it by the edges that they have severed.
+    fn divide(&self, mesh: &TetMesh, touched: &Touched) -> Result<Option<Divided>, TooManyBlades> {
+        let Touched { tet, cell, number, ref cuts } = *touched;
+        let corners = &mesh.tets[tet as usize];
+        let distances = |blades: &[u32]| -> Vec<[f32; 4]> {
+            let sides = blades.iter().map(|&blade| &self.blades[blade as usize]);
+            sides.map(|sides| corners.map(|v| sides.distance(v).unwrap_or_default())).collect()
+        };
+        let mut blades: Vec<u32> = cuts.iter().map(|(blade, _)| *blade).collect();
+        if blades.len() > Walls::MOST {
+            return Err(TooManyBlades { tet, blades: blades.len() });
+        }
+        let (mut cut, mut parts) = (1.0, parts_of(self.severed(mesh, corners)));
+        if blades.len() == 1 || count(&parts) == 1 {
+            let deepest = cuts.iter().max_by(|(_, a), (_, b)| a.total_cmp(b)).expect("a blade touches it");
+            (blades, cut) = (vec![deepest.0], deepest.1);
+            let [row] = distances(&blades)[..] else { return Ok(None) };
+            let apart =
+                |(n, &(a, b)): (usize, &(usize, usize))| u8::from((row[a] >= 0.0) != (row[b] >= 0.0)) << n;
+            parts = parts_of(EDGES.iter().enumerate().map(apart).fold(0, |mask, bit| mask | bit));
+        }
+        let distances = distances(&blades);
+        let all = Walls { distances: &distances, parts, kept: 15 };
+        let shares = all.volumes();
+        let kept = (0..4).fold(0, |kept, n| kept | u8::from(shares[n] >= LEAST_SHARE) << n);
+        let volumes = Walls { kept, ..all }.volumes();
+        Ok(Some(Divided { cell, number, tet, parts, kept, cut, volumes, distances, blades }))
+    }
+}

@@ -1,0 +1,51 @@
+//! The edges of the copies of divided tets.
+
+use super::components::EDGES;
+use super::severing::Severing;
+use super::wound::{EdgeCopy, Wound};
+use crate::TetMesh;
+
+impl Severing {
+    /// Finds the edges of the copies.
+    pub(super) fn edges(&self, mesh: &TetMesh, wound: &mut Wound) {
+        let mut all: Vec<([u32; 2], [u32; 2], f64)> = Vec::new();
+        for copy in &wound.copies {
+            let corners = &mesh.tets[copy.tet as usize];
+            let sixth = mesh.volume(corners) * f64::from(copy.share) / 6.0;
+            for (a, b) in EDGES {
+                let (a, b) = if corners[a] < corners[b] { (a, b) } else { (b, a) };
+                all.push(([corners[a], corners[b]], [copy.nodes[a], copy.nodes[b]], sixth));
+            }
+        }
+        all.sort_by_key(|&(vertices, nodes, _)| (vertices, nodes));
+        let is_split = |tet: u32| wound.split.binary_search_by_key(&tet, |split| split.tet).is_ok();
+        for edge in all.chunk_by(|a, b| a.0 == b.0) {
+            let [low, high] = edge[0].0;
+            wound.split_edges.push([low, high]);
+            // The whole tets around it.
+            let mut whole = 0.0;
+            self.index.around_edge(mesh.point(low), self.direction(mesh, low, high), |cell, tet| {
+                let tet = self.index.position(cell, tet);
+                if !is_split(tet) {
+                    whole += mesh.volume(&mesh.tets[tet as usize]) / 6.0;
+                }
+            });
+            let mut copies: Vec<([u32; 2], f64)> = edge
+                .chunk_by(|a, b| a.1 == b.1)
+                .map(|same| (same[0].1, same.iter().map(|(.., volume)| volume).sum()))
+                .collect();
+            if whole > 0.0 {
+                match copies.iter_mut().find(|(nodes, _)| *nodes == [low, high]) {
+                    Some((_, volume)) => *volume += whole,
+                    None => copies.insert(0, ([low, high], whole)),
+                }
+            }
+            wound.edges.extend(copies.into_iter().zip(0..).map(|((nodes, volume), number)| EdgeCopy {
+                nodes,
+                vertices: [low, high],
+                number,
+                volume: volume as f32,
+            }));
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! Cuts of no width: severed edges, and the copies of tets along them.
+//!
+//! A [`Blade`] severs the lattice edges that it crosses. [`Severing`] holds the severed edges,
+//! which only grow. [`Severing::wound`] derives all else from them: a tet whose corners fall apart
+//! into parts is replaced by one copy for each part, with virtual nodes in place of the corners of
+//! the other parts (Molino, Bao and Fedkiw 2004, doi:10.1145/1015706.1015734). Tissue is never
+//! removed, and a body that is cut but not moved is the body before the cut.
+
+mod blade;
+mod components;
+mod divide;
+mod edge_copies;
+mod incise;
+mod nodes;
+mod pieces;
+mod section;
+mod severing;
+mod shell;
+mod surface;
+mod tet_index;
+mod walls;
+mod wound;
+
+pub use blade::{Blade, Station};
+pub use incise::Severed;
+pub use pieces::{Embedded, LipPoint, Pieces};
+pub use severing::Severing;
+pub(crate) use severing::longest_edge;
+pub(crate) use shell::{DividedShell, divide_shell};
+pub use walls::{Barycentric, Walls};
+pub use wound::{EdgeCopy, SplitTet, TetCopy, TooManyBlades, TriangleCopy, Wound};

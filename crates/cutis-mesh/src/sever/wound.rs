@@ -1,0 +1,183 @@
+//! The elements of a mesh along severed edges: copies of tets with virtual nodes.
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+
+use super::walls::{Barycentric, Walls};
+use crate::TetMesh;
+
+/// What replaces the tets that severed edges divide.
+///
+/// A *copy* of a tet holds one of its parts. A *node* is a vertex of the mesh or a virtual one: the
+/// corners of a copy that are not in its part are virtual, unless tissue around the end of the cut
+/// connects them. Node `n` is vertex `n` of the mesh, or `virtual_nodes[n − vertices]`.
+///
+/// Where a blade ends within a tet, the tet is divided in part: its copies hold the share of its
+/// section that is cut, and one more copy with the corners of the tet holds the rest. So the
+/// stiffness at the end of a cut does not jump when the blade moves.
+///
+/// It depends only on how far each blade has cut, not on the order of the cuts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wound {
+    /// The divided tets in ascending order.
+    pub split: Vec<SplitTet>,
+    /// The copies, in the order of their tets and parts.
+    pub copies: Vec<TetCopy>,
+    /// The vertex of the mesh at the lattice point of each virtual node, in ascending order.
+    pub virtual_nodes: Vec<u32>,
+    /// Edges of the mesh with a divided tet, in ascending order. `edges` replaces them.
+    pub split_edges: Vec<[u32; 2]>,
+    /// The edges of the copies, and the edges of the mesh that also hold whole tets.
+    pub edges: Vec<EdgeCopy>,
+    /// Distances of the corners to blades, as [`SplitTet::walls`] names them.
+    pub(super) distances: Vec<[f32; 4]>,
+    /// Number of the blade of each row of `distances`.
+    pub(super) blades: Vec<u32>,
+}
+
+/// A tet that severed edges divide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SplitTet {
+    /// Number of the tet in the mesh.
+    pub tet: u32,
+    /// The part of each corner.
+    pub parts: [u8; 4],
+    /// One bit for each part that has a copy.
+    pub kept: u8,
+    /// Number of the first copy.
+    pub first_copy: u32,
+    /// Share of the tet's section that is cut, above 0 and at most 1.
+    pub cut: f64,
+    /// Blades: first row of the distances, and number of rows.
+    pub(super) walls: (u32, u8),
+}
+
+/// A copy of a tet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TetCopy {
+    /// Number of the tet in the mesh.
+    pub tet: u32,
+    /// Number among the copies of the tet, for colors.
+    pub number: u8,
+    /// Nodes, in the order of the tet's corners.
+    pub nodes: [u32; 4],
+    /// Share of the tet's volume, above 0 and at most 1.
+    pub share: f32,
+    /// True if the copy has all of the tet's corners as its nodes: it stands for the share of the
+    /// section that is not cut.
+    pub whole: bool,
+}
+
+/// An edge of copies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeCopy {
+    /// Nodes, in the order of their lattice points.
+    pub nodes: [u32; 2],
+    /// The vertices of the mesh at the two lattice points.
+    pub vertices: [u32; 2],
+    /// Number among the copies of this edge, for colors.
+    pub number: u8,
+    /// Volume in m³: one sixth of the share of each tet around it.
+    pub volume: f32,
+}
+
+/// A copy of a triangle of the skin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangleCopy {
+    /// Number of the triangle in the skin.
+    pub triangle: u32,
+    /// Number of the divided tet behind it in [`Wound::split`].
+    pub split: u32,
+    /// The part of that tet that it bounds. None for the copy that stands for the share of the
+    /// tet's section that is not cut.
+    pub part: Option<u8>,
+    /// Nodes, in the order of the triangle's corners.
+    pub nodes: [u32; 3],
+    /// Share of the triangle's area, above 0 and at most 1.
+    pub share: f32,
+}
+
+/// More blades sever the edges of one tet than its walls can tell apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooManyBlades {
+    /// Number of the tet in the mesh.
+    pub tet: u32,
+    /// Number of blades.
+    pub blades: usize,
+}
+
+impl Wound {
+    /// The walls in a divided tet.
+    pub fn walls(&self, split: &SplitTet) -> Walls<'_> {
+        let (first, count) = (split.walls.0 as usize, usize::from(split.walls.1));
+        Walls { distances: &self.distances[first..first + count], parts: split.parts, kept: split.kept }
+    }
+
+    /// Distances of the corners of a divided tet to a blade. None if they are on one side of it.
+    pub(super) fn distances_to(&self, split: &SplitTet, blade: usize) -> Option<&[f32; 4]> {
+        let first = split.walls.0 as usize;
+        let rows = first..first + usize::from(split.walls.1);
+        rows.into_iter().find(|&row| self.blades[row] as usize == blade).map(|row| &self.distances[row])
+    }
+
+    /// The copy that holds a part of a divided tet, as its number in `copies`.
+    pub fn copy_of(&self, split: &SplitTet, part: u8) -> Option<usize> {
+        let before = (split.kept & ((1 << part) - 1)).count_ones();
+        (split.kept >> part & 1 == 1).then_some((split.first_copy + before) as usize)
+    }
+
+    /// The copy to which a point of a divided tet belongs, as its number in `copies`.
+    pub fn owner(&self, split: &SplitTet, point: &Barycentric) -> Option<usize> {
+        self.copy_of(split, self.walls(split).owner(point))
+    }
+
+    /// The copies of skin triangles of divided tets, in the order of the skin. `triangles` are
+    /// boundary faces of the mesh. A triangle with copies is replaced by them.
+    pub fn skin(&self, mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<TriangleCopy> {
+        let mut faces: HashMap<[u32; 3], (usize, usize)> = HashMap::new();
+        for (n, split) in self.split.iter().enumerate() {
+            let corners = &mesh.tets[split.tet as usize];
+            for opposite in 0..4 {
+                let mut face = [1, 2, 3].map(|step| corners[(opposite + step) % 4]);
+                face.sort_unstable();
+                faces.entry(face).or_insert((n, opposite));
+            }
+        }
+        let mut copies = Vec::new();
+        for (number, triangle) in triangles.iter().enumerate() {
+            let mut face = *triangle;
+            face.sort_unstable();
+            let Some(&(n, opposite)) = faces.get(&face) else { continue };
+            let split = &self.split[n];
+            let corners = &mesh.tets[split.tet as usize];
+            let areas = self.walls(split).areas(opposite);
+            let parts = (0..4).filter(|&part| areas[usize::from(part)] > 0.0);
+            let of_part =
+                parts.filter_map(|part| Some((part, self.copy_of(split, part)?, areas[usize::from(part)])));
+            let copy_of = |nodes, part, share: f64| TriangleCopy {
+                triangle: number as u32,
+                split: n as u32,
+                part,
+                nodes,
+                share: share as f32,
+            };
+            copies.extend(of_part.map(|(part, copy, share)| {
+                let nodes = triangle.map(|v| {
+                    let corner = corners.iter().position(|&corner| corner == v);
+                    self.copies[copy].nodes[corner.expect("the face has the corners of the triangle")]
+                });
+                copy_of(nodes, Some(part), share * split.cut)
+            }));
+            if split.cut < 1.0 {
+                copies.push(copy_of(*triangle, None, 1.0 - split.cut));
+            }
+        }
+        copies
+    }
+
+    /// Rest positions of the virtual nodes in local meters.
+    pub fn positions(&self, mesh: &TetMesh) -> Vec<Point3<f32>> {
+        self.virtual_nodes.iter().map(|&v| mesh.positions[v as usize]).collect()
+    }
+}

@@ -1,0 +1,100 @@
+//! Cuts of no width: nothing is removed, the wound begins closed, and tension opens it.
+
+use cutis::Scene;
+
+use crate::identity::original;
+use crate::scenes::{Run, SMALL, overrides, scene};
+
+const CUT: (&str, &str) =
+    ("incision", "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], depth_mm = 20 }]");
+const TISSUE: &str = "distance = { youngs_modulus_pa = 2e4 }, volume = { bulk_modulus_pa = 1e5 }";
+const REST: [(&str, &str); 2] = [("scan_is_at_rest", "true"), ("run.frames", "3")];
+const FILES: (&str, &str) = ("output", "{ volume = true, surface = true, tissue = true, report = true }");
+
+/// Without tension the cut body is the body of the scan, voxel for voxel, on any lattice. Control:
+/// a cut with a width removes tissue.
+#[test]
+fn a_cut_without_tension_changes_no_voxel() {
+    let constraints = format!("{{ {TISSUE} }}");
+    let cut = |set: &[(&str, &str)]| {
+        let own = [CUT, FILES, ("constraints", constraints.as_str())];
+        Run::of(&scene(SMALL, &[&REST[..], &own, set].concat()))
+    };
+    let zone = "{ min_mm = [-40, 40, -90], max_mm = [100, 200, 90] }";
+    let lattices: [&[(&str, &str)]; 4] = [
+        &[],
+        &[("lattice.split", "five")],
+        &[("lattice.region", zone)],
+        &[("lattice.grading", zone), ("solver.formulation", "vbd")],
+    ];
+    for lattice in lattices {
+        let run = cut(lattice);
+        assert_eq!(run.report.max_displacement_mm, 0.0, "{lattice:?}");
+        assert!(run.deformed().voxels() == original().voxels(), "{lattice:?}");
+        let wound = run.report.wound.clone().unwrap();
+        assert!(wound.initial_mm.abs() < 1e-6 && wound.final_mm == wound.initial_mm, "{wound:?}");
+        assert_eq!(run.report.sizes.removed_vertices, 0);
+    }
+    let width = "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], depth_mm = 20, width_mm = 7 }]";
+    assert!(cut(&[("incision", width)]).deformed().voxels() != original().voxels());
+}
+
+/// Tension opens the cut, with the membrane and with the area form, in each formulation.
+#[test]
+fn tension_opens_a_closed_cut() {
+    let membrane = format!("{{ {TISSUE}, membrane = {{ preset = 'trunk' }} }}");
+    let area = format!(
+        "{{ {TISSUE}, stc = {{ area_modulus_n_per_m = 60, amplification = 0.0, rest_area_scale = 0.85 }} }}"
+    );
+    for constraints in [&membrane, &area] {
+        for formulation in ["xpbd", "vbd"] {
+            let own = [
+                CUT,
+                ("constraints", constraints.as_str()),
+                ("solver.formulation", formulation),
+                ("run.frames", "12"),
+                ("output", "{ report = true }"),
+            ];
+            let wound = Run::of(&scene(SMALL, &[&REST[..], &own].concat())).report.wound.unwrap();
+            assert!(wound.initial_mm.abs() < 1e-6, "{formulation}: {wound:?}");
+            assert!(wound.final_mm > 2.0 && wound.mid_mm > wound.final_mm, "{formulation}: {wound:?}");
+        }
+    }
+}
+
+/// Two cuts that cross are one wound with four corners.
+#[test]
+fn cuts_that_cross_open_together() {
+    let cross = "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], depth_mm = 20 }, \
+                  { from_mm = [0, 112, 2], to_mm = [60, 108, 2], depth_mm = 20 }]";
+    let constraints = format!("{{ {TISSUE}, membrane = {{ preset = 'trunk' }} }}");
+    let set = [
+        ("incision", cross),
+        ("constraints", constraints.as_str()),
+        ("solver.formulation", "vbd"),
+        ("run.frames", "12"),
+        ("output", "{ report = true, volume = true }"),
+    ];
+    let run = Run::of(&scene(SMALL, &[&REST[..], &set].concat()));
+    assert_eq!(run.report.wounds.len(), 2);
+    for wound in &run.report.wounds {
+        assert!(wound.initial_mm.abs() < 1e-6 && wound.final_mm > 1.0, "{wound:?}");
+    }
+}
+
+/// ChainMail has no tetrahedra to divide. A cut that is smaller than a cell cuts nothing.
+#[test]
+fn cuts_that_are_not_possible_are_refused() {
+    let refused = |set: &[(&str, &str)]| {
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = Scene::load(&crate::scenes::folder().join(SMALL), &overrides(set));
+        let run = |loaded| crate::scenes::run_in(folder.path(), &loaded, false);
+        let error = loaded.and_then(run).unwrap_err();
+        assert!(error.is_bad_input(), "{error}");
+        error.to_string()
+    };
+    let chainmail = refused(&[CUT, ("model", "chainmail"), ("constraints", "{}")]);
+    assert!(chainmail.contains("incision[0].width_mm") && chainmail.contains("chainmail"), "{chainmail}");
+    let short = "[{ from_mm = [30.3, 110, 1], to_mm = [30.3, 110, 1.1], depth_mm = 0.1 }]";
+    assert!(refused(&[("incision", short)]).contains("incision 0"), "a cut of 0.1 mm");
+}
