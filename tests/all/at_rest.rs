@@ -1,8 +1,11 @@
 //! The scan is at rest: an uncut body under full tension does not move, for any formulation and
 //! setting, and a cut moves what it sets free.
 
-use cutis::LoadedScene;
+use std::f32::consts::FRAC_1_SQRT_2;
+
+use cutis::{LoadedScene, build_system};
 use cutis_test_kit::gpu::{is_exact, on_each_adapter};
+use nalgebra::Vector3;
 
 use crate::gpu::run_on;
 use crate::identity::original;
@@ -145,6 +148,45 @@ fn a_cut_moves_only_what_it_sets_free() {
     assert!(opening(&at_rest) > 3.0, "{} mm", opening(&at_rest));
     let [still, moved] = [&at_rest, &free].map(|run| far(run, &start));
     assert!(still < 0.3 * moved && moved > 0.5, "{still} mm with the load, {moved} mm without");
+}
+
+/// The facets of the lattice are not parallel to the skin, so their strips pull along its normal as
+/// well. A cut sets only the part in the skin free. Control: the area form has no such plane.
+#[test]
+fn a_cut_sets_no_force_along_the_normal_free() {
+    let normal = Vector3::new(-FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0);
+    // The force in the skin and along its normal that a cut of 100 mm sets free, in N.
+    let freed = |constraints: &str| {
+        let set = [
+            REST,
+            ("volume.phantom", "{ size = [64, 64, 48], seed = 1, turn_deg = [0, 0, 45] }"),
+            ("lattice.split", "five"),
+            ("constraints", constraints),
+            ("fixed", "{ bone_above_hu = 250.0 }"),
+            (
+                "incision",
+                "[{ from_mm = [-56.6, 99, -50], to_mm = [-56.6, 99, 50], depth_mm = 20, width_mm = 7 }]",
+            ),
+            ("solver.formulation", "vbd"),
+        ];
+        let system = build_system(&scene(SMALL, &set)).unwrap().system;
+        let forces = system.constraint_forces().unwrap();
+        let mut sums = [0.0; 2];
+        for (vertex, (force, load)) in system.vertices().iter().zip(forces.iter().zip(system.loads())) {
+            let freed = if vertex.inverse_mass() > 0.0 { force + load } else { Vector3::zeros() };
+            sums[0] += (freed - normal * normal.dot(&freed)).norm();
+            sums[1] += normal.dot(&freed).abs();
+        }
+        sums
+    };
+    let tissue = "distance = { youngs_modulus_pa = 5e3 }, volume = { bulk_modulus_pa = 5e4 }";
+    let membrane = freed(&format!("{{ {tissue}, membrane = {{ preset = 'trunk' }} }}"));
+    let area = freed(&format!(
+        "{{ {tissue}, stc = {{ area_modulus_n_per_m = 100.0, amplification = 2.0, rest_area_scale = 0.8 }} }}"
+    ));
+    eprintln!("{membrane:?} {area:?}");
+    assert!(membrane[0] > 2.0 && membrane[1] < 0.1 * membrane[0], "{membrane:?} N");
+    assert!(area[1] > 0.3 * area[0], "{area:?} N");
 }
 
 /// The template and the demo leave the key out.

@@ -228,8 +228,9 @@ impl MembraneSection {
                 false => Strength::Pbd(self.stiffness),
             };
             let freed = parts.freed_load::<SkinStrip, 3>(&strip.triangle, &params, &strength);
+            let normal = strip.material.normal();
             for (&v, load) in strip.triangle.iter().zip(freed) {
-                loads[v as usize] += load * sign;
+                loads[v as usize] += (load - normal * normal.dot(&load)) * sign;
             }
         }
     }
@@ -345,6 +346,9 @@ impl ConstraintKind for MembraneSection {
         Ok((builder, colors + turn_colors))
     }
 
+    /// Adds only the part of each load in the plane of the skin. The triangles of the lattice are
+    /// not parallel to the skin, so their strips also pull along its normal. This part comes from
+    /// the lattice and not from the skin, so a cut does not set it free.
     fn add_loads(&self, parts: &BodyParts<'_>, loads: &mut [Vector3<f64>]) -> Result<(), Error> {
         self.add_freed(parts, &self.strips(parts, &parts.body.removed.triangles, &|_| 1.0)?, 1.0, loads);
         let Some(severed) = &parts.body.severed else { return Ok(()) };
