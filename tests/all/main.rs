@@ -25,5 +25,6 @@ mod sheet_tension;
 mod skin_counts;
 mod stability;
 mod tune;
+mod turned_patient;
 mod warnings;
 mod wound;

@@ -6,13 +6,15 @@
 //! tension in the plane is the sum `Σ −f_i ⊗ X_i` over the forces of the constraints, divided by
 //! the area of the plane.
 //!
-//! Slits and round holes in a flat sheet of strips open as far as closed forms say.
+//! Slits and round holes in a flat sheet of strips open as far as closed forms say. A cut in a
+//! phantom that is turned in the scanner sets the same load free for every turn.
 
 mod forms;
 mod holed_sheet;
 mod measure;
 mod openings;
 mod skin;
+mod turned;
 
 use std::io::Write;
 
@@ -26,8 +28,10 @@ pub use openings::{
     slit,
 };
 pub use skin::PlaneSkin;
+pub use turned::{Patient, TurnedSkin, TurnedWound};
 
 use openings::Openings;
+use turned::Turned;
 
 use crate::kit::{Checks, Failure, Page, Provenance, Table, results};
 
@@ -38,6 +42,9 @@ pub struct Options {
     /// Number of planes.
     #[arg(long, default_value_t = 50)]
     pub planes: usize,
+    /// Measure the patient who lies turned in the scanner instead. It takes minutes.
+    #[arg(long)]
+    pub turned: bool,
     /// Write the tables of docs/results/tension.md.
     #[arg(long)]
     pub write: bool,
@@ -46,7 +53,19 @@ pub struct Options {
 /// Name of the page.
 pub const PAGE: &str = "tension";
 /// Tables of the page.
-pub const TABLES: [&str; 7] = ["provenance", "staircase", "patch", "slits", "holes", "sheets", "checks"];
+pub const TABLES: [&str; 11] = [
+    "provenance",
+    "staircase",
+    "patch",
+    "slits",
+    "holes",
+    "sheets",
+    "checks",
+    "turned-provenance",
+    "turned",
+    "turns",
+    "turned-checks",
+];
 /// Largest relative error of a tension or modulus of strips.
 pub const TOLERANCE: f64 = 0.01;
 
@@ -56,6 +75,9 @@ pub const TOLERANCE: f64 = 0.01;
 /// There is no plane, a lattice is refused, or the page cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let page = options.write.then(|| Page::open(PAGE, &TABLES)).transpose()?;
+    if options.turned {
+        return turned(page, out);
+    }
     let provenance = Provenance::start(if options.write { "patch --write" } else { "patch" });
     let skins = skins(options.planes)?;
     let measured: Vec<(Form, Measured)> =
@@ -77,6 +99,23 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         page.set("holes", &holes)?;
         page.set("sheets", &sheets)?;
         page.set("checks", &checks.summary())?;
+        page.save(&results())?;
+    }
+    Ok(checks.pass())
+}
+
+/// Measures turned patients. Returns whether all checks hold.
+fn turned(page: Option<Page>, out: &mut dyn Write) -> Result<bool, Failure> {
+    let provenance = Provenance::start("patch --turned --write");
+    let Turned { spread, turns, checks } = Turned::measure()?;
+    let [spread, turns] = [spread, turns].map(|table| table.markdown());
+    writeln!(out, "{spread}\n{turns}")?;
+    checks.print(out)?;
+    if let Some(mut page) = page.filter(|_| checks.pass()) {
+        page.set("turned-provenance", &provenance.markdown())?;
+        page.set("turned", &spread)?;
+        page.set("turns", &turns)?;
+        page.set("turned-checks", &checks.summary())?;
         page.save(&results())?;
     }
     Ok(checks.pass())

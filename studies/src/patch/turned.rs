@@ -1,0 +1,360 @@
+//! The same wound on the phantom, turned in the scanner: the load that the cut sets free, and how
+//! far the wound opens.
+
+use std::path::Path;
+
+use cutis::volume::phantom::Phantom;
+use cutis::{LoadedScene, Scene, SceneSystem, build_system};
+use cutis_newton::{Options, Problem};
+use nalgebra::{Point3, Vector3};
+
+use crate::kit::{Checks, Failure, Table, optional};
+
+/// Tension along and across the lines in N/m. It is a fifth of the trunk's, so that strains are
+/// small.
+const TENSION: [f64; 2] = [3.0, 1.0];
+/// Largest relative error of the load besides the length of the cut.
+const LOAD_TOLERANCE: f64 = 0.01;
+/// Largest load along the normal over the tension.
+const NORMAL_TOLERANCE: f64 = 0.05;
+/// Largest lattice step in mm that gives every turned cut its lips.
+const COARSEST_MM: f64 = 6.0;
+/// Length of the cut in mm.
+const LENGTH_MM: f64 = 80.0;
+/// Middle of the cut along the body in mm.
+const MIDDLE_MM: f64 = -20.0;
+/// Range of distances from the cut in mm, in which displacements of the tissue are averaged.
+const BESIDE_MM: [f64; 2] = [4.0, 14.0];
+/// Depth below the skin in mm to which displacements are averaged.
+const SHALLOW_MM: f64 = 12.0;
+/// Voxels per axis of the phantom. They are 5 mm apart.
+const SIZE: usize = 80;
+/// Relative gradient at which the body is at rest.
+const AT_REST: f64 = 1e-6;
+
+/// The skin of the patient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TurnedSkin {
+    /// A membrane with lines around the trunk, which the cut crosses.
+    Membrane,
+    /// A membrane with almost no modulus besides its tension.
+    Slack,
+    /// A membrane with lines along the trunk: a control.
+    OtherLines,
+    /// The area form, with the larger tension in all directions.
+    Area,
+}
+
+/// A patient in the scanner with a cut along the midline of the belly.
+#[derive(Clone, Copy, Debug)]
+pub struct Patient {
+    /// The skin.
+    pub skin: TurnedSkin,
+    /// Name of the split of lattice cells.
+    pub split: &'static str,
+    /// Lattice step in mm.
+    pub spacing_mm: f64,
+    /// Angles in degrees about x, y and z.
+    pub turn_deg: [f64; 3],
+}
+
+/// A wound of a patient.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnedWound {
+    /// Load that the cut sets free across itself, along the skin, in N/m of its length.
+    pub across: f64,
+    /// Load that the cut sets free along the normal of the skin, in either direction, in N/m of its
+    /// length.
+    pub normal: f64,
+    /// How far the lips move apart, in mm.
+    pub opening_mm: f64,
+    /// How far the tissue on both sides of the cut moves apart, in mm.
+    pub beside_mm: f64,
+}
+
+impl Patient {
+    fn phantom(&self) -> Result<Phantom, Failure> {
+        Ok(Phantom::new([SIZE; 3], 1)?.turned(self.turn_deg)?)
+    }
+
+    /// The scene. Everything in it turns with the patient.
+    fn scene(&self) -> Result<LoadedScene, Failure> {
+        let phantom = self.phantom()?;
+        let axis = phantom.place([0.0, 0.0, 1.0]);
+        let end = |side: f64| {
+            let middle = self.middle(&phantom)? + self.axes(&phantom)[2] * (side * 0.5 * LENGTH_MM);
+            Ok::<[f64; 3], Failure>(middle.into())
+        };
+        let (from, to) = (end(-1.0)?, end(1.0)?);
+        let [along, across] = TENSION;
+        let membrane = |modulus: [f64; 2], lines: &str| {
+            format!(
+                "membrane = {{ tension_along_n_per_m = {along:?}, tension_across_n_per_m = {across:?}, \
+                 modulus_along_n_per_m = {:?}, modulus_across_n_per_m = {:?}, directions = {{ {lines} = \
+                 {axis:?} }} }}",
+                modulus[0], modulus[1]
+            )
+        };
+        let skin = match self.skin {
+            TurnedSkin::Membrane => membrane([60.0, 40.0], "around"),
+            TurnedSkin::Slack => membrane([3.1, 1.1], "around"),
+            TurnedSkin::OtherLines => membrane([60.0, 40.0], "along"),
+            // The tension is T(1 − s)/s.
+            TurnedSkin::Area => {
+                let scale = 60.0 / (60.0 + along);
+                format!(
+                    "stc = {{ area_modulus_n_per_m = 60.0, amplification = 0.0, rest_area_scale = {scale:?} }}"
+                )
+            }
+        };
+        let Self { split, spacing_mm, turn_deg, .. } = self;
+        let text = format!(
+            "scan_is_at_rest = true\nvolume.phantom = {{ size = [{SIZE}, {SIZE}, {SIZE}], seed = 1, turn_deg = \
+             {turn_deg:?} }}\nlattice = {{ spacing_mm = {spacing_mm:?}, split = '{split}', region = {{ \
+             around_mm = 40.0 }} }}\nconstraints = {{ distance = {{ youngs_modulus_pa = 2e4 }}, volume = {{ \
+             bulk_modulus_pa = 2e5 }}, {skin} }}\nincision = [{{ from_mm = {from:?}, to_mm = {to:?}, depth_mm = \
+             20.0, width_mm = {spacing_mm:?} }}]\nsolver.formulation = 'vbd'\n"
+        );
+        Ok(Scene::parse(&text, Path::new("turned.toml"), Path::new(""), &[])?)
+    }
+
+    /// The patient's axes in the scanner: across the cut, outwards, and along the cut.
+    fn axes(&self, phantom: &Phantom) -> [Vector3<f64>; 3] {
+        [0, 1, 2]
+            .map(|axis| Vector3::from(phantom.place(std::array::from_fn(|c| f64::from(u8::from(c == axis))))))
+    }
+
+    /// The middle of the cut in mm.
+    fn middle(&self, phantom: &Phantom) -> Result<Vector3<f64>, Failure> {
+        let ([_, front, _], _) = Phantom::new([SIZE; 3], 1)?.incision_site();
+        Ok(phantom.place([0.0, front, MIDDLE_MM]).into())
+    }
+
+    /// Builds the patient and returns the load that the cut sets free: across it and along the
+    /// normal of the skin, in N/m.
+    ///
+    /// # Errors
+    /// The scene is refused.
+    pub fn load(&self) -> Result<[f64; 2], Failure> {
+        let built = build_system(&self.scene()?)?;
+        self.load_of(&built)
+    }
+
+    /// True if a load across the cut in N/m is the tension along the lines. The cut removes whole
+    /// cells, so it is longer at each end by up to the extent of a cell along it.
+    ///
+    /// # Errors
+    /// The turn is not finite.
+    pub fn has_right_load(&self, across: f64) -> Result<bool, Failure> {
+        let [_, _, along] = self.axes(&self.phantom()?);
+        let longest = 1.0 + 2.0 * self.spacing_mm * along.abs().sum() / LENGTH_MM;
+        Ok((1.0 - LOAD_TOLERANCE..=longest + LOAD_TOLERANCE).contains(&(across / TENSION[0])))
+    }
+
+    fn load_of(&self, built: &SceneSystem) -> Result<[f64; 2], Failure> {
+        let [across, normal, _] = self.axes(&self.phantom()?);
+        let mut sums = [0.0; 2];
+        for (v, force) in freed(built)?.into_iter().enumerate() {
+            if built.system.vertices()[v].inverse_mass() > 0.0 {
+                sums[0] += force.dot(&across).abs();
+                sums[1] += force.dot(&normal).abs();
+            }
+        }
+        // Both lips count.
+        Ok(sums.map(|sum| 0.5 * sum / (LENGTH_MM * 1e-3)))
+    }
+
+    /// Cuts the patient and finds the equilibrium.
+    ///
+    /// # Errors
+    /// The scene is refused, or there is no equilibrium.
+    pub fn wound(&self) -> Result<TurnedWound, Failure> {
+        let built = build_system(&self.scene()?)?;
+        let phantom = self.phantom()?;
+        let axes = self.axes(&phantom);
+        let [across, normal] = self.load_of(&built)?;
+        let problem = Problem::of(&built.system, [0.0; 3])?;
+        let before = problem.positions();
+        let options = Options { tolerance: AT_REST, ..Options::default() };
+        let after = problem.equilibrium(before, &options)?.positions;
+        let gape = |x: &[Point3<f64>]| built.gapes[0].measure_by(&|v| x[v as usize]).mean_mm;
+        let middle = self.middle(&phantom)?;
+        let mut sides = [(0.0, 0.0); 2];
+        for (rest, now) in before.iter().zip(&after) {
+            let [x, y, z] = axes.map(|axis| axis.dot(&(rest.coords * 1e3 - middle)));
+            // Weights fall to zero at the edges of the window.
+            let weight = bump(z, [-0.25 * LENGTH_MM, 0.25 * LENGTH_MM])
+                * bump(x.abs(), BESIDE_MM)
+                * bump(y, [-SHALLOW_MM, SHALLOW_MM]);
+            let side = &mut sides[usize::from(x > 0.0)];
+            side.0 += weight * axes[0].dot(&(now - rest)) * 1e3;
+            side.1 += weight;
+        }
+        let [left, right] = sides.map(|(sum, weight)| sum / weight);
+        let opening_mm = gape(&after) - gape(before);
+        Ok(TurnedWound { across, normal, opening_mm, beside_mm: right - left })
+    }
+}
+
+/// The force on each vertex before it moves, in N: what the cut sets free.
+fn freed(built: &SceneSystem) -> Result<Vec<Vector3<f64>>, Failure> {
+    let mut forces: Vec<Vector3<f64>> = built.system.constraint_forces()?.iter().map(|f| f.cast()).collect();
+    for (force, load) in forces.iter_mut().zip(built.system.loads()) {
+        *force += load.cast::<f64>();
+    }
+    Ok(forces)
+}
+
+/// A parabola that is 1 in the middle of a range and 0 outside it.
+fn bump(value: f64, [low, high]: [f64; 2]) -> f64 {
+    let from_middle = (2.0 * value - low - high) / (high - low);
+    (1.0 - from_middle * from_middle).max(0.0)
+}
+
+/// The turns of the table: none, and four angles about each axis. On a lattice that is its own
+/// mirror image, turns by 45° and −45° about one axis give the same wound.
+fn turns() -> Vec<[f64; 3]> {
+    let about = |axis: usize| {
+        [15.0, 30.0, 45.0, -45.0].map(|angle| std::array::from_fn(|c| if c == axis { angle } else { 0.0 }))
+    };
+    [vec![[0.0; 3]], (0..3).flat_map(about).collect()].concat()
+}
+
+/// Patients: name, skin, split, lattice step in mm, and the name of their column in the table of
+/// turns.
+type Patients = (&'static str, TurnedSkin, &'static str, f64, Option<&'static str>);
+
+const PATIENTS: [Patients; 7] = [
+    ("membrane", TurnedSkin::Membrane, "kuhn6", 8.0, None),
+    ("membrane", TurnedSkin::Membrane, "kuhn6", 6.0, None),
+    ("membrane", TurnedSkin::Membrane, "kuhn6", 4.0, Some("`kuhn6`")),
+    ("membrane", TurnedSkin::Membrane, "five", 4.0, Some("`five`")),
+    ("slack membrane", TurnedSkin::Slack, "five", 4.0, Some("`five`, slack")),
+    ("area", TurnedSkin::Area, "kuhn6", 4.0, None),
+    ("control: lines turned by 90°", TurnedSkin::OtherLines, "kuhn6", 4.0, None),
+];
+
+/// The tables of the page and the checks.
+pub(super) struct Turned {
+    pub(super) spread: Table,
+    pub(super) turns: Table,
+    pub(super) checks: Checks,
+}
+
+impl Turned {
+    /// Measures all patients.
+    ///
+    /// # Errors
+    /// A scene is refused for another reason than its cut, or there is no equilibrium.
+    pub(super) fn measure() -> Result<Self, Failure> {
+        let mut spread = Table::new([
+            "skin",
+            "split",
+            "lattice",
+            "wounds",
+            "load across the cut",
+            "largest load along the normal",
+            "lips move apart",
+            "spread",
+            "tissue moves apart",
+            "spread",
+        ]);
+        let mut checks = Checks::default();
+        let mut columns = vec!["turn about x, y, z".to_owned()];
+        let mut lines: Vec<Vec<String>> =
+            turns().iter().map(|turn| vec![turn.map(|angle| format!("{angle}°")).join(", ")]).collect();
+        for (name, skin, split, spacing_mm, column) in PATIENTS {
+            let mut wounds = Vec::new();
+            let mut right = true;
+            for (turn_deg, line) in turns().into_iter().zip(&mut lines) {
+                let patient = Patient { skin, split, spacing_mm, turn_deg };
+                let wound = unless_refused(patient.wound())?;
+                eprintln!("{name} {split} {spacing_mm} {turn_deg:?}: {wound:?}");
+                if column.is_some() {
+                    line.push(optional(wound, |w| format!("{:.2} mm", w.opening_mm)));
+                }
+                if let Some(wound) = wound {
+                    right &= patient.has_right_load(wound.across)?;
+                    wounds.push(wound);
+                }
+            }
+            columns.extend(column.map(str::to_owned));
+            let of = |value: fn(&TurnedWound) -> f64| Spread::of(wounds.iter().map(value));
+            let (across, opening, beside) = (of(|w| w.across), of(|w| w.opening_mm), of(|w| w.beside_mm));
+            let normal = of(|w| w.normal).high;
+            spread.add([
+                name.to_owned(),
+                format!("`{split}`"),
+                format!("{spacing_mm} mm"),
+                format!("{} of {}", wounds.len(), turns().len()),
+                format!("{:.2} to {:.2} N/m", across.low, across.high),
+                format!("{normal:.2} N/m"),
+                format!("{:.2} mm", opening.mean),
+                opening.shown(),
+                format!("{:.2} mm", beside.mean),
+                beside.shown(),
+            ]);
+            let what = |load: &str| {
+                format!(
+                    "{name}, {split}, {spacing_mm} mm: {:.2} to {:.2} N/m {load}",
+                    across.low, across.high
+                )
+            };
+            match skin {
+                TurnedSkin::Area | TurnedSkin::OtherLines => checks.control(what("across the cut"), !right),
+                _ if spacing_mm > COARSEST_MM => {}
+                _ => {
+                    checks.add(what("across the cut"), right);
+                    checks.add(
+                        format!("{name}, {split}, {spacing_mm} mm: {normal:.2} N/m along the normal"),
+                        normal <= NORMAL_TOLERANCE * TENSION[0],
+                    );
+                }
+            }
+            if skin == TurnedSkin::Area {
+                checks.control(
+                    format!("{name}: {normal:.2} N/m along the normal"),
+                    normal > NORMAL_TOLERANCE * TENSION[0],
+                );
+            }
+        }
+        let mut turns = Table::new(columns);
+        lines.into_iter().for_each(|line| turns.add(line));
+        Ok(Self { spread, turns, checks })
+    }
+}
+
+/// The wound, or `None` if the lattice is too coarse for the cut.
+fn unless_refused(wound: Result<TurnedWound, Failure>) -> Result<Option<TurnedWound>, Failure> {
+    match wound {
+        Err(error) => match error.downcast_ref::<cutis::Error>() {
+            Some(cutis::Error::SceneSection { section, .. }) if section == "incision" => Ok(None),
+            _ => Err(error),
+        },
+        found => found.map(Some),
+    }
+}
+
+/// Mean and ends of some values.
+struct Spread {
+    mean: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Spread {
+    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
+        let count = values.clone().count() as f64;
+        Self {
+            mean: values.clone().sum::<f64>() / count,
+            low: values.clone().fold(f64::INFINITY, f64::min),
+            high: values.fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
+    /// Distance of the ends from the mean.
+    fn shown(&self) -> String {
+        let part = |end: f64| 100.0 * (end / self.mean - 1.0);
+        format!("{:+.0} %, {:+.0} %", part(self.low), part(self.high))
+    }
+}
