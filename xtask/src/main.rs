@@ -41,6 +41,7 @@ usage: cargo xtask COMMAND
       stability       stiff and extreme cases on every backend at three length scales
       parity          the GPU backend and the CPU backend, operation by operation
       patch           skin tension on the staircase of a plane and in a sheet; writes into tension.md
+      at-rest         ways to hold the scan at rest; with --scans, how far the skin of scans moves
       cantilever      a bent beam and scikit-fem; always writes its page
       chainmail       ChainMail on scans, and position-based dynamics
       main-job        the main job on the phantom and on real scans, with and without skin tension

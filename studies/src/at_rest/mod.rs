@@ -1,6 +1,8 @@
-//! The scan at rest: ways to hold the tension of the skin in XPBD, compared by error against time.
+//! The scan at rest: ways to hold the tension of the skin in XPBD, compared by error against time,
+//! and how far from the wound the skin of scans moves.
 
 mod block;
+mod scans;
 mod ways;
 
 use std::io::Write;
@@ -13,21 +15,27 @@ use cutis_solver::{Stiffness, SystemBuilder, Values};
 use nalgebra::{Point3, Vector3};
 
 use block::{Block, Elements};
+use scans::Scans;
 use ways::{Setting, Way};
 
 use crate::kit::{Checks, Failure, Page, Provenance, Table, results};
 
-/// Compares ways to hold a scan at rest in XPBD.
+/// Compares ways to hold a scan at rest in XPBD, or measures scans.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "at-rest", bin_name = "cargo xtask study at-rest")]
 pub struct Options {
-    /// Write the tables of docs/results/at-rest.md.
+    /// Measure how far the skin of scans moves, and openings by the direction of the tension,
+    /// instead. It takes up to an hour.
+    #[arg(long)]
+    pub scans: bool,
+    /// Write the tables of docs/results/at-rest.md. With --scans it needs all scans.
     #[arg(long)]
     pub write: bool,
 }
 
 /// Tables of the page.
-pub const TABLES: [&str; 4] = ["provenance", "uncut", "cut", "checks"];
+pub const TABLES: [&str; 8] =
+    ["provenance", "uncut", "cut", "checks", "scans-provenance", "scans", "directions", "scans-checks"];
 /// Settings of the runs.
 const SETTINGS: [Setting; 8] = [[1, 1], [2, 1], [5, 1], [10, 1], [20, 1], [40, 1], [5, 4], [10, 4]];
 /// Index of the setting with the most substeps.
@@ -42,12 +50,16 @@ const MOVES: f64 = 1e-4;
 const MOST_ERROR: f64 = 0.1;
 /// Largest error of the way that Cutis uses, over the least of the others.
 const MOST_OVER_BEST: f64 = 1.2;
+
 /// Measures all ways. Returns whether all checks hold.
 ///
 /// # Errors
 /// No equilibrium is found, or the page cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let page = options.write.then(|| Page::open("at-rest", &TABLES)).transpose()?;
+    if options.scans {
+        return scans(page, out);
+    }
     let provenance = Provenance::start(if options.write { "at-rest --write" } else { "at-rest" });
     let mut checks = Checks::default();
     let uncut = uncut(&mut checks)?;
@@ -59,6 +71,23 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         page.set("uncut", &uncut.markdown())?;
         page.set("cut", &cut.markdown())?;
         page.set("checks", &checks.summary())?;
+        page.save(&results())?;
+    }
+    Ok(checks.pass())
+}
+
+/// Measures scans. Returns whether all checks hold.
+fn scans(page: Option<Page>, out: &mut dyn Write) -> Result<bool, Failure> {
+    let provenance = Provenance::start("at-rest --scans --write");
+    let Scans { reaches, directions, checks } = Scans::measure(page.is_some())?;
+    let [reaches, directions] = [reaches, directions].map(|table| table.markdown());
+    writeln!(out, "{reaches}\n{directions}")?;
+    checks.print(out)?;
+    if let Some(mut page) = page.filter(|_| checks.pass()) {
+        page.set("scans-provenance", &provenance.markdown())?;
+        page.set("scans", &reaches)?;
+        page.set("directions", &directions)?;
+        page.set("scans-checks", &checks.summary())?;
         page.save(&results())?;
     }
     Ok(checks.pass())

@@ -11,6 +11,7 @@ fn study(arguments: &[&str]) -> Output {
 fn every_study_explains_its_options() {
     for name in [
         "accuracy",
+        "at-rest",
         "cantilever",
         "chainmail",
         "main-job",

@@ -1,7 +1,7 @@
 //! The system of a scene without a run around it, for programs that step, measure or solve it
 //! themselves.
 
-use cutis_mesh::Gape;
+use cutis_mesh::{Frame, Gape};
 use cutis_solver::{Settings, System};
 
 use super::constraints::ConstraintModel;
@@ -19,6 +19,8 @@ pub struct SceneSystem {
     pub settings: Settings,
     /// One per incision of the scene, in the same order; they measure [`System::positions`].
     pub gapes: Vec<Gape>,
+    /// Converts positions between local meters and RAS+ mm.
+    pub frame: Frame,
 }
 
 /// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and adds the
@@ -45,7 +47,7 @@ pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
     let body = Body::build(&BodySections::of(loaded), &source.volume)?;
     let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body: &body };
     let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?;
-    Ok(SceneSystem { system, settings, gapes: body.cut.gapes })
+    Ok(SceneSystem { system, settings, gapes: body.cut.gapes, frame: body.mesh.frame })
 }
 
 /// Refuses a model that has no system of constraints.

@@ -85,7 +85,7 @@ fn from_scene(
             .collect();
         Ok(cutis::build_system(&Scene::load(&scene(file), &overrides)?)?)
     };
-    let SceneSystem { system, settings, gapes } = built("xpbd")?;
+    let SceneSystem { system, settings, gapes, .. } = built("xpbd")?;
     let pbd = built("pbd")?.system;
     let opening = gapes.into_iter().next().map(|gape| -> (Opening, &'static str) {
         let measure = move |x: &[Point3<f64>]| gape.measure_by(&|vertex| x[vertex as usize]).mean_mm;
