@@ -184,7 +184,6 @@ fn a_cut_sets_no_force_along_the_normal_free() {
     let area = freed(&format!(
         "{{ {tissue}, stc = {{ area_modulus_n_per_m = 100.0, amplification = 2.0, rest_area_scale = 0.8 }} }}"
     ));
-    eprintln!("{membrane:?} {area:?}");
     assert!(membrane[0] > 2.0 && membrane[1] < 0.1 * membrane[0], "{membrane:?} N");
     assert!(area[1] > 0.3 * area[0], "{area:?} N");
 }

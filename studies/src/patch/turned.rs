@@ -24,7 +24,7 @@ const LENGTH_MM: f64 = 80.0;
 /// Middle of the cut along the body in mm.
 const MIDDLE_MM: f64 = -20.0;
 /// Range of distances from the cut in mm, in which displacements of the tissue are averaged.
-const BESIDE_MM: [f64; 2] = [4.0, 14.0];
+const TISSUE_MM: [f64; 2] = [4.0, 14.0];
 /// Depth below the skin in mm to which displacements are averaged.
 const SHALLOW_MM: f64 = 12.0;
 /// Voxels per axis of the phantom. They are 5 mm apart.
@@ -69,7 +69,7 @@ pub struct TurnedWound {
     /// How far the lips move apart, in mm.
     pub opening_mm: f64,
     /// How far the tissue on both sides of the cut moves apart, in mm.
-    pub beside_mm: f64,
+    pub tissue_mm: f64,
 }
 
 impl Patient {
@@ -184,7 +184,7 @@ impl Patient {
             let [x, y, z] = axes.map(|axis| axis.dot(&(rest.coords * 1e3 - middle)));
             // Weights fall to zero at the edges of the window.
             let weight = bump(z, [-0.25 * LENGTH_MM, 0.25 * LENGTH_MM])
-                * bump(x.abs(), BESIDE_MM)
+                * bump(x.abs(), TISSUE_MM)
                 * bump(y, [-SHALLOW_MM, SHALLOW_MM]);
             let side = &mut sides[usize::from(x > 0.0)];
             side.0 += weight * axes[0].dot(&(now - rest)) * 1e3;
@@ -192,7 +192,7 @@ impl Patient {
         }
         let [left, right] = sides.map(|(sum, weight)| sum / weight);
         let opening_mm = gape(&after) - gape(before);
-        Ok(TurnedWound { across, normal, opening_mm, beside_mm: right - left })
+        Ok(TurnedWound { across, normal, opening_mm, tissue_mm: right - left })
     }
 }
 
@@ -280,7 +280,7 @@ impl Turned {
             }
             columns.extend(column.map(str::to_owned));
             let of = |value: fn(&TurnedWound) -> f64| Spread::of(wounds.iter().map(value));
-            let (across, opening, beside) = (of(|w| w.across), of(|w| w.opening_mm), of(|w| w.beside_mm));
+            let (across, opening, tissue) = (of(|w| w.across), of(|w| w.opening_mm), of(|w| w.tissue_mm));
             let normal = of(|w| w.normal).high;
             spread.add([
                 name.to_owned(),
@@ -291,8 +291,8 @@ impl Turned {
                 format!("{normal:.2} N/m"),
                 format!("{:.2} mm", opening.mean),
                 opening.shown(),
-                format!("{:.2} mm", beside.mean),
-                beside.shown(),
+                format!("{:.2} mm", tissue.mean),
+                tissue.shown(),
             ]);
             let what = |load: &str| {
                 format!(
