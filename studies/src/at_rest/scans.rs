@@ -17,7 +17,7 @@ const CONTROL: &str = "demo";
 /// Scenes whose incision is parallel to the z axis.
 const ALONG_Z: [&str; 3] = ["demo", "abdomen-incision", "thigh-incision"];
 /// Distances from the incision, in mm.
-const DISTANCES: [f64; 4] = [20.0, 40.0, 60.0, 80.0];
+const DISTANCES: [f64; 4] = [20.0, 40.0, 60.0, 120.0];
 /// Index of 60 mm in [`DISTANCES`].
 const FAR: usize = 2;
 /// A vertex that is displaced farther than this has moved, mm.
@@ -26,6 +26,8 @@ const MOVED_MM: f64 = 0.05;
 const TENSIONS: [f64; 2] = [3.0, 1.0];
 /// Largest relative change of the opening over the last ten frames.
 const MOST_CHANGE: f64 = 0.02;
+/// Largest relative difference of a ratio of openings from that of the tensions.
+const MOST_OFF: f64 = 0.1;
 /// Frames over which the opening must not change.
 const LAST_FRAMES: usize = 10;
 
@@ -51,17 +53,21 @@ impl Scans {
             };
             let held = Reach::of(name, &set, true)?;
             held.settled(&mut checks);
-            let far = held.beyond_mm[FAR];
-            reaches.push(held);
             if name == CONTROL {
                 let free = Reach::of(name, &set, false)?;
-                let far_free = free.beyond_mm[FAR];
-                let what = format!("{name}, not at rest: {far_free:.3} mm beyond 60 mm, at rest {far:.3} mm");
-                checks.control(what, far_free > 2.0 * far);
+                let [at_rest, not] = [&held, &free].map(|reach| percent(reach.moved));
+                let what =
+                    format!("{name}, not at rest: {not} of the skin beyond 60 mm moves, at rest {at_rest}");
+                checks.control(what, free.moved > held.moved);
                 reaches.push(free);
             }
+            reaches.push(held);
             if ALONG_Z.contains(&name) {
-                directions.push(Directed::of(name, &set)?);
+                let directed = Directed::of(name, &set)?;
+                let ratio = directed.ratio();
+                let off = ratio * TENSIONS[1] / TENSIONS[0] - 1.0;
+                checks.add(format!("{name}: the openings have the ratio {ratio:.2}"), off.abs() <= MOST_OFF);
+                directions.push(directed);
             }
         }
         Ok(Self { reaches: Table::of(&reaches), directions: Table::of(&directions), checks })
@@ -183,6 +189,11 @@ impl Directed {
         };
         Ok(Self { scene: name, growth_mm: [growth("around")?, growth("along")?] })
     }
+
+    /// Opening across the lines over opening along them.
+    fn ratio(&self) -> f64 {
+        self.growth_mm[0] / self.growth_mm[1]
+    }
 }
 
 /// Distance of a place from a segment.
@@ -199,7 +210,7 @@ impl Row for Reach {
         "beyond 20 mm",
         "beyond 40 mm",
         "beyond 60 mm",
-        "beyond 80 mm",
+        "beyond 120 mm",
         "moved, beyond 60 mm",
     ];
 
@@ -216,8 +227,7 @@ impl Row for Directed {
         &["scene", "lines across the cut", "lines along the cut", "ratio"];
 
     fn cells(&self) -> Vec<String> {
-        let [across, along] = self.growth_mm;
-        let [shown_across, shown_along] = self.growth_mm.map(|mm| format!("{mm:.3} mm"));
-        vec![self.scene.into(), shown_across, shown_along, format!("{:.2}", across / along)]
+        let [across, along] = self.growth_mm.map(|mm| format!("{mm:.3} mm"));
+        vec![self.scene.into(), across, along, format!("{:.2}", self.ratio())]
     }
 }
