@@ -3,6 +3,7 @@
 use cutis::Scene;
 
 use crate::identity::original;
+use crate::outputs::vtu::Vtu;
 use crate::scenes::{Run, SMALL, overrides, scene};
 
 const CUT: (&str, &str) =
@@ -59,6 +60,24 @@ fn tension_opens_a_closed_cut() {
             assert!(wound.initial_mm.abs() < 1e-6, "{formulation}: {wound:?}");
             assert!(wound.final_mm > 2.0 && wound.mid_mm > wound.final_mm, "{formulation}: {wound:?}");
         }
+    }
+}
+
+/// The skin of a region of interest, with the skin around it, has the lines of the whole body.
+#[test]
+fn a_cut_in_a_region_has_the_skin_of_the_whole_body() {
+    let constraints = format!("{{ {TISSUE}, membrane = {{ preset = 'trunk' }} }}");
+    let skin = |set: &[(&str, &str)]| {
+        let own =
+            [CUT, ("constraints", constraints.as_str()), ("run.frames", "1"), ("output", "{ surface = true }")];
+        Vtu::of_bytes(&Run::of(&scene(SMALL, &[&REST[..], &own, set].concat())).bytes("skin.vtu"))
+    };
+    let [part, whole] = [skin(&[("lattice.region", "{ around_mm = 40.0 }")]), skin(&[])];
+    assert_eq!(part.cells.len(), whole.cells.len());
+    assert_eq!(part.points.len(), whole.points.len());
+    let sum = |mesh: &Vtu, name: &str| mesh.cell_scalars(name).iter().sum::<f64>();
+    for name in ["scan_line_weight", "scan_tension_along_n_per_m"] {
+        assert!((sum(&part, name) / sum(&whole, name) - 1.0).abs() < 1e-6, "{name}");
     }
 }
 

@@ -193,6 +193,15 @@ pub struct InactiveSkin {
     pub lattice_index: Vec<u32>,
 }
 
+impl InactiveSkin {
+    /// Follows a mesh with `vertices` vertices to which `more` were added.
+    pub fn shift(&mut self, vertices: usize, more: usize) {
+        for corner in self.triangles.iter_mut().flatten().filter(|corner| **corner as usize >= vertices) {
+            *corner += more as u32;
+        }
+    }
+}
+
 impl TetMesh {
     /// Divides the skin of the whole body, given in lattice indices by [`TissueMask::skin`], into
     /// triangles that can move and triangles that cannot.

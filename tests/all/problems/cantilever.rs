@@ -57,7 +57,8 @@ fn the_beam_sags_to_the_equilibrium_of_newton() {
 
 #[test]
 fn the_beam_sags_to_the_equilibrium_of_newton_on_the_gpu() {
-    for scale in SCALES {
+    // The largest and the smallest scale are the hard ones in f32, and a software device is slow.
+    for scale in [SCALES[0], SCALES[2]] {
         on_each_adapter(|start| check(start, scale, SOFT, 1.0));
     }
 }

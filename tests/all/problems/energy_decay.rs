@@ -108,7 +108,7 @@ fn energy_never_grows_on_the_cpu() {
 /// Fewer frames than on the CPU, because software devices are slow. They make 10 000 substeps.
 #[test]
 fn energy_never_grows_on_the_gpu() {
-    on_each_adapter(|start| no_growth(start, 1000, 10, 1.0));
+    on_each_adapter(|start| no_growth(start, 500, 10, 1.0));
 }
 
 #[test]

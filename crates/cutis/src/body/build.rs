@@ -32,7 +32,7 @@ impl Body {
         let mut mesh = region::mesh(sections, &whole, &hu, &slits)?;
         let mut materials = BodyMaterials::assign(sections, &whole, &hu, &mesh, &skin)?;
         warnings.extend(materials.iter().flat_map(|materials| materials.warnings(&mesh)));
-        let (mut skin, inactive_skin) = mesh.divide_skin(&skin);
+        let (mut skin, mut inactive_skin) = mesh.divide_skin(&skin);
         let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
         drop(hu);
         warnings.extend(dropped_tets(&mesh));
@@ -46,6 +46,7 @@ impl Body {
         if let Some(severed) = &severed {
             divide_masses(&mut masses, &mesh, &density);
             materials.iter_mut().for_each(|materials| materials.add_nodes(&severed.virtual_nodes));
+            inactive_skin.shift(mesh.real_vertices(), severed.virtual_nodes.len());
         }
         let grabbed = handles::grabbed(sections, &mesh, &cut)?;
         warnings.extend(region::warning(&mesh));
