@@ -68,8 +68,12 @@ fn tension_opens_a_closed_cut() {
 fn a_cut_in_a_region_has_the_skin_of_the_whole_body() {
     let constraints = format!("{{ {TISSUE}, membrane = {{ preset = 'trunk' }} }}");
     let skin = |set: &[(&str, &str)]| {
-        let own =
-            [CUT, ("constraints", constraints.as_str()), ("run.frames", "1"), ("output", "{ surface = true }")];
+        let own = [
+            CUT,
+            ("constraints", constraints.as_str()),
+            ("run.frames", "1"),
+            ("output", "{ surface = true }"),
+        ];
         Vtu::of_bytes(&Run::of(&scene(SMALL, &[&REST[..], &own, set].concat())).bytes("skin.vtu"))
     };
     let [part, whole] = [skin(&[("lattice.region", "{ around_mm = 40.0 }")]), skin(&[])];
@@ -99,6 +103,28 @@ fn cuts_that_cross_open_together() {
     for wound in &run.report.wounds {
         assert!(wound.initial_mm.abs() < 1e-6 && wound.final_mm > 1.0, "{wound:?}");
     }
+}
+
+/// The opening does not depend on where the blade lies within its cells of 4 mm. At 30.4 mm it
+/// comes close to lattice points, so that parts of tetrahedra are thin. Control: a cut of half the
+/// depth.
+#[test]
+fn the_opening_does_not_depend_on_the_place_within_a_cell() {
+    let opening = |x: f64, depth_mm: f64| {
+        let cut = format!("[{{ from_mm = [{x}, 110, -30], to_mm = [{x}, 110, 30], depth_mm = {depth_mm} }}]");
+        let set = [
+            ("incision", cut.as_str()),
+            ("lattice.region", "{ around_mm = 30 }"),
+            ("run.frames", "30"),
+            ("output", "{ report = true }"),
+        ];
+        Run::of(&scene("demo.toml", &set)).report.wound.unwrap().final_mm
+    };
+    let openings = [30.0, 30.4, 31.2].map(|x| opening(x, 20.0));
+    let mean = openings.iter().sum::<f64>() / 3.0;
+    assert!(openings.iter().all(|opening| (opening / mean - 1.0).abs() < 0.02), "{openings:?}");
+    let shallow = opening(30.0, 10.0);
+    assert!((shallow / mean - 1.0).abs() > 0.02, "{shallow} and {mean}");
 }
 
 /// ChainMail has no tetrahedra to divide. A cut that is smaller than a cell cuts nothing.

@@ -109,6 +109,17 @@ impl Walls<'_> {
     }
 }
 
+/// Raises the shares of some parts to a least share, at the cost of the largest one. Their sum
+/// stays the same.
+pub(super) fn raise(shares: &mut [f64; 4], parts: u8, least: f64) {
+    let largest = (0..4).fold(0, |best, n| if shares[n] > shares[best] { n } else { best });
+    for part in (0..4).filter(|&n| n != largest && parts >> n & 1 == 1) {
+        let missing = (least - shares[part]).max(0.0);
+        shares[part] += missing;
+        shares[largest] -= missing;
+    }
+}
+
 fn weighted(distances: &[f32; 4], point: &Barycentric) -> f64 {
     distances.iter().zip(point).map(|(d, part)| f64::from(*d) * part).sum()
 }
@@ -182,6 +193,13 @@ mod tests {
             }
         }
         assert!((volumes[0] - inside / all).abs() < 5e-3, "{volumes:?}, {}", inside / all);
+    }
+
+    #[test]
+    fn raised_shares_have_the_same_sum() {
+        let mut shares = [0.0625, 0.875, 0.0625, 0.0];
+        raise(&mut shares, 0b0011, 0.125);
+        assert_eq!(shares, [0.125, 0.8125, 0.0625, 0.0]);
     }
 
     /// Two blades cross in the tet. The second one ends at the first, so that corners 2 and 3 stay

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::walls::{Barycentric, Walls};
+use super::divide::THIN;
+use super::walls::{Barycentric, Walls, raise};
 use crate::TetMesh;
 
 /// What replaces the tets that severed edges divide.
@@ -151,7 +152,9 @@ impl Wound {
             let Some(&(n, opposite)) = faces.get(&face) else { continue };
             let split = &self.split[n];
             let corners = &mesh.tets[split.tet as usize];
-            let areas = self.walls(split).areas(opposite);
+            let mut areas = self.walls(split).areas(opposite);
+            let held = (0..4).fold(0, |held, n| held | u8::from(areas[n] > 0.0) << n);
+            raise(&mut areas, held, THIN);
             let parts = (0..4).filter(|&part| areas[usize::from(part)] > 0.0);
             let of_part =
                 parts.filter_map(|part| Some((part, self.copy_of(split, part)?, areas[usize::from(part)])));
