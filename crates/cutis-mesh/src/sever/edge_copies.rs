@@ -42,7 +42,6 @@ impl Severing {
             }
             wound.edges.extend(copies.into_iter().zip(0..).map(|((nodes, volume), number)| EdgeCopy {
                 nodes,
-                vertices: [low, high],
                 number,
                 volume: volume as f32,
             }));

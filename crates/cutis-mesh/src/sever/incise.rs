@@ -15,8 +15,6 @@ pub struct Severed {
     /// The vertex of the mesh at the place of each virtual node. These nodes are the last vertices
     /// of the divided mesh.
     pub virtual_nodes: Vec<u32>,
-    /// Edges of the mesh before the cut that are severed, the lower vertex first.
-    pub edges: Vec<[u32; 2]>,
     /// The skin triangles that have copies, in the order of the skin.
     pub triangles: Vec<[u32; 3]>,
     /// The copies of these triangles. Their field `triangle` is a number in `triangles`.
@@ -89,7 +87,6 @@ impl Cut {
             self.gapes.insert(incision, gape);
         }
         let tet_pieces = wound.tet_pieces(mesh);
-        let edges = severing.severed_edges(mesh);
         mesh.divide(&wound);
         // A vertex that a blade touches may lose all its tets.
         let mut held = vec![false; mesh.positions.len()];
@@ -108,14 +105,6 @@ impl Cut {
         triangles.extend(copies.iter().map(|copy| copy.nodes));
         let divided = divided.into_iter().map(|(_, triangle)| triangle).collect();
         let virtual_nodes = wound.virtual_nodes;
-        Ok(Some(Severed {
-            virtual_nodes,
-            edges,
-            triangles: divided,
-            copies,
-            blades,
-            tet_pieces,
-            skin_pieces,
-        }))
+        Ok(Some(Severed { virtual_nodes, triangles: divided, copies, blades, tet_pieces, skin_pieces }))
     }
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::divide::Divided;
 use super::severing::Severing;
-use super::wound::{SplitTet, Wound};
+use super::wound::Wound;
 use crate::TetMesh;
 
 impl Severing {
@@ -19,11 +19,7 @@ impl Severing {
         // Real nodes first, so that each class with a real node has it as its root.
         let mut classes = Classes::new(vertices.len() + 4 * wound.copies.len());
         let slot = |copy: usize, corner: usize| vertices.len() + 4 * copy + corner;
-        let copy_of = |n: usize, part: u8| -> Option<usize> {
-            let SplitTet { kept, first_copy, .. } = wound.split[n];
-            let before = (kept & ((1 << part) - 1)).count_ones();
-            (kept >> part & 1 == 1).then_some((first_copy + before) as usize)
-        };
+        let copy_of = |n: usize, part: u8| wound.copy_of(&wound.split[n], part);
         for (copy, own) in wound.copies.iter().enumerate().filter(|(_, copy)| copy.whole) {
             (0..4).for_each(|corner| classes.join(slot(copy, corner), real(own.nodes[corner])));
         }

@@ -181,24 +181,6 @@ impl Severing {
         severed
     }
 
-    /// The severed edges, the lower vertex first, in ascending order of that vertex.
-    pub fn severed_edges(&self, mesh: &TetMesh) -> Vec<[u32; 2]> {
-        let shape = mesh.lattice.grid().shape;
-        let strides = [1, shape[0] as isize, (shape[0] * shape[1]) as isize];
-        let mut edges = Vec::new();
-        for (vertex, &bits) in self.edges.iter().enumerate().filter(|(_, bits)| **bits != 0) {
-            let at = mesh.point(vertex as u32);
-            let directions = &self.index.stencil().directions[at.iter().sum::<usize>() & 1];
-            for (_, direction) in directions.iter().enumerate().filter(|(d, _)| bits >> d & 1 == 1) {
-                let delta: isize =
-                    direction.step.iter().zip(strides).map(|(&s, by)| isize::from(s) * by).sum();
-                let point = mesh.lattice_index[vertex] as usize;
-                edges.push([vertex as u32, self.vertex_of[point.wrapping_add_signed(delta)]]);
-            }
-        }
-        edges
-    }
-
     /// Cuts with all blades to their ends.
     pub fn cut_all(&mut self) {
         for blade in 0..self.blades.len() {

@@ -75,8 +75,6 @@ pub struct TetCopy {
 pub struct EdgeCopy {
     /// Nodes, in the order of their lattice points.
     pub nodes: [u32; 2],
-    /// The vertices of the mesh at the two lattice points.
-    pub vertices: [u32; 2],
     /// Number among the copies of this edge, for colors.
     pub number: u8,
     /// Volume in m³: one sixth of the share of each tet around it.
