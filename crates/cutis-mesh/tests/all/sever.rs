@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use cutis_mesh::sever::{Blade, Severing, SplitTet, Station, TetCopy, Wound};
+use cutis_mesh::sever::{Blade, Severing, SplitTet, Station, TetCopy, TriangleCopy, Wound};
 use cutis_mesh::{Lattice, Split, TetMesh};
 use cutis_volume::{Affine, Grid};
 use nalgebra::{Matrix4, Point3, Vector3, Vector4};
@@ -414,6 +414,24 @@ fn points_belong_to_the_copy_on_their_side() {
     }
 }
 
+/// Sums of the shares of the copies of each triangle.
+fn shares(copies: &[TriangleCopy]) -> BTreeMap<u32, f64> {
+    let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
+    copies.iter().for_each(|copy| *shares.entry(copy.triangle).or_default() += f64::from(copy.share));
+    shares
+}
+
+/// Where a blade ends in the skin, the copies and what is not cut have the area of the skin too.
+#[test]
+fn copies_of_partly_cut_skin_have_its_area() {
+    let mesh = block([6, 5, 4], Split::Kuhn6);
+    let skin = mesh.boundary();
+    let path = [[0.0004, -0.03, -0.03], [0.0004, 0.0021, -0.03]];
+    let copies = cut(&mesh, &[blade(&path, [0.0, 0.0, 1.0], 0.033)]).skin(&mesh, &skin);
+    assert!(copies.iter().any(|copy| copy.part.is_none()));
+    assert!(shares(&copies).values().all(|share| (share - 1.0).abs() < 1e-5));
+}
+
 /// Copies of skin triangles have the area of the skin, and a wall carries none.
 #[test]
 fn copies_of_the_skin_have_its_area() {
@@ -423,9 +441,7 @@ fn copies_of_the_skin_have_its_area() {
         let wound = cut(&mesh, &[plane([0.0003, 0.0011, -0.0007], [0.2, 1.0, 0.3], [0.1, -0.2, 1.0])]);
         let copies = wound.skin(&mesh, &skin);
         assert!(copies.len() > 20);
-        let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
-        copies.iter().for_each(|copy| *shares.entry(copy.triangle).or_default() += f64::from(copy.share));
-        for (triangle, share) in &shares {
+        for (triangle, share) in &shares(&copies) {
             assert!((share - 1.0).abs() < 1e-5, "{triangle}: {share}");
         }
         // A triangle with corners on both sides has two copies without a common node.
