@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::TetMesh;
+use crate::{Split, TetMesh};
 
 impl TetMesh {
     /// Rest volume of each tet in m³. A copy of a divided tet has its share.
@@ -15,8 +15,14 @@ impl TetMesh {
         self.volume(&self.tets[tet]) * f64::from(self.copy_of_tet(tet).1)
     }
 
-    /// Volume of each edge in m³: one sixth of each tet around it. The sum is the volume of the
+    /// Volume of each edge in m³: its share of each tet around it. The sum is the volume of the
     /// mesh.
+    ///
+    /// In `kuhn6` each edge has one sixth of a tet. In `five` each edge of a middle tet has one
+    /// sixth, and in the tets at the corners each diagonal has 7/30 and each edge along an axis
+    /// 1/10. Springs whose stiffness is proportional to these volumes then form an isotropic solid,
+    /// if the cells are cubes: over all edges `Σ V e⊗e⊗e⊗e` is isotropic, because the diagonals of
+    /// one direction have twice the volume of the edges along one axis.
     pub fn edge_volumes(&self) -> Vec<f32> {
         let vertices = self.positions.len();
         let mut starts = vec![0usize; vertices + 1];
@@ -25,17 +31,29 @@ impl TetMesh {
         (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
         let mut shares = vec![0f64; whole];
         for tet in &self.tets[..self.whole_tets()] {
-            let sixth = self.volume(tet) / 6.0;
             for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
                 let (low, high) = (tet[a].min(tet[b]), tet[a].max(tet[b]));
                 let own = starts[low as usize]..starts[low as usize + 1];
                 if let Some(edge) = own.clone().find(|&edge| self.edges[edge][1] == high) {
-                    shares[edge] += sixth;
+                    shares[edge] += self.edge_share(tet, [a, b]);
                 }
             }
         }
         let copies = self.copies.iter().flat_map(|copies| copies.of_edges.iter().map(|(_, volume)| *volume));
         shares.into_iter().map(|share| share as f32).chain(copies).collect()
+    }
+
+    /// The share in m³ of a tet's volume that belongs to the edge between two of its corners.
+    pub(crate) fn edge_share(&self, tet: &[u32; 4], edge: [usize; 2]) -> f64 {
+        let is_odd = |corner: usize| self.point(tet[corner]).iter().sum::<usize>() & 1 == 1;
+        // In `five` only a tet at a corner has an odd point, and its edges along the axes meet
+        // there.
+        let share = match self.lattice.split() {
+            Split::Five if edge.into_iter().any(is_odd) => 1.0 / 10.0,
+            Split::Five if (0..4).any(is_odd) => 7.0 / 30.0,
+            Split::Five | Split::Kuhn6 => 1.0 / 6.0,
+        };
+        self.volume(tet) * share
     }
 
     /// Lumped mass of each vertex in kg: one quarter of the mass of each tet around it. The density

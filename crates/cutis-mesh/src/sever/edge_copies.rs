@@ -11,10 +11,10 @@ impl Severing {
         let mut all: Vec<([u32; 2], [u32; 2], f64)> = Vec::new();
         for copy in &wound.copies {
             let corners = &mesh.tets[copy.tet as usize];
-            let sixth = mesh.volume(corners) * f64::from(copy.share) / 6.0;
             for (a, b) in EDGES {
+                let volume = mesh.edge_share(corners, [a, b]) * f64::from(copy.share);
                 let (a, b) = if corners[a] < corners[b] { (a, b) } else { (b, a) };
-                all.push(([corners[a], corners[b]], [copy.nodes[a], copy.nodes[b]], sixth));
+                all.push(([corners[a], corners[b]], [copy.nodes[a], copy.nodes[b]], volume));
             }
         }
         all.sort_by_key(|&(vertices, nodes, _)| (vertices, nodes));
@@ -27,7 +27,11 @@ impl Severing {
             self.index.around_edge(mesh.point(low), self.direction(mesh, low, high), |cell, tet| {
                 let tet = self.index.position(cell, tet);
                 if !is_split(tet) {
-                    whole += mesh.volume(&mesh.tets[tet as usize]) / 6.0;
+                    let corners = &mesh.tets[tet as usize];
+                    let edge = EDGES.into_iter().find(|&(a, b)| {
+                        [corners[a].min(corners[b]), corners[a].max(corners[b])] == [low, high]
+                    });
+                    whole += edge.map_or(0.0, |(a, b)| mesh.edge_share(corners, [a, b]));
                 }
             });
             let mut copies: Vec<([u32; 2], f64)> = edge

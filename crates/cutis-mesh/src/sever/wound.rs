@@ -77,7 +77,7 @@ pub struct EdgeCopy {
     pub nodes: [u32; 2],
     /// Number among the copies of this edge, for colors.
     pub number: u8,
-    /// Volume in m³: one sixth of the share of each tet around it.
+    /// Volume in m³: its share of each tet around it, as in [`TetMesh::edge_volumes`].
     pub volume: f32,
 }
 

@@ -16,6 +16,41 @@ fn volume(mesh: &TetMesh, tet: &[u32; 4]) -> f64 {
     (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
 }
 
+/// `Σ V e⊗e⊗e⊗e` over the edges of a block of cells, times 15 and divided by its volume: for
+/// springs of an isotropic solid the parts are 3 for `xxxx`, 1 for `xxyy`, and 0 for odd powers.
+/// Returns the largest difference from that.
+fn anisotropy(split: Split) -> f64 {
+    let affine = Affine::from_spacing([2.0; 3], [0.0; 3]).unwrap();
+    let grid = Grid { shape: [7; 3], affine };
+    let lattice = Lattice::new(grid, split).unwrap();
+    let mesh = build(&lattice, &[0.0; 343], &[false; 343], false).unwrap();
+    let total: f64 = mesh.tet_volumes().iter().map(|&v| f64::from(v)).sum();
+    let mut worst = 0.0f64;
+    for [a, b, c] in (0..5usize).flat_map(|a| (0..5 - a).map(move |b| [a, b, 4 - a - b])) {
+        let sum = |(edge, &volume): (&[u32; 2], &f32)| {
+            let [p, q] = edge.map(|v| mesh.positions[v as usize].cast::<f64>());
+            let e = (q - p).normalize();
+            f64::from(volume) * e.x.powi(a as i32) * e.y.powi(b as i32) * e.z.powi(c as i32)
+        };
+        let found = 15.0 / total * mesh.edges.iter().zip(&mesh.edge_volumes()).map(sum).sum::<f64>();
+        let wanted = match [a, b, c] {
+            powers if powers.contains(&4) => 3.0,
+            powers if powers.iter().all(|power| power % 2 == 0) => 1.0,
+            _ => 0.0,
+        };
+        worst = worst.max((found - wanted).abs());
+    }
+    worst
+}
+
+/// Springs of `five` are isotropic, and those of `kuhn6` are not (control).
+#[test]
+fn springs_of_five_are_isotropic() {
+    let (five, kuhn6) = (anisotropy(Split::Five), anisotropy(Split::Kuhn6));
+    assert!(five < 1e-5, "{five}");
+    assert!(kuhn6 > 0.5, "{kuhn6}");
+}
+
 /// Brute-force face-connected components; the largest, first in order among equals.
 fn largest(tets: &[[usize; 4]]) -> (BTreeSet<[usize; 4]>, usize) {
     let mut label: Vec<usize> = (0..tets.len()).collect();

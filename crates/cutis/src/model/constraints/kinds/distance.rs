@@ -6,7 +6,7 @@ use cutis_solver::{Stiffness, SystemBuilder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::moduli::{self, SPRINGS_OVER_BODY};
+use super::moduli::{self, springs_over_body};
 use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
 use crate::Error;
 use crate::scene::validate::Check;
@@ -54,7 +54,8 @@ impl ConstraintKind for DistanceSection {
         let groups = Groups::from_colors(&mesh.edge_colors())?;
         let stiffness = if parts.compliant() {
             let volumes = mesh.edge_volumes();
-            let of_row = |row: &TissueMaterialSection| SPRINGS_OVER_BODY * row.youngs_modulus_pa;
+            let factor = springs_over_body(mesh.lattice.split());
+            let of_row = |row: &TissueMaterialSection| factor * row.youngs_modulus_pa;
             let moduli = parts.moduli(MODULUS_KEY, self.youngs_modulus_pa, of_row)?;
             compliances(&mesh.edges, |n, [a, b]| {
                 let length = nalgebra::distance(&parts.position(a), &parts.position(b));

@@ -1,14 +1,21 @@
 //! The modulus of each element of a constraint kind: one value, or by the materials of its
 //! vertices.
 
+use cutis_mesh::Split;
+
 use super::BodyParts;
 use crate::Error;
 use crate::scene::validate::Check;
 use crate::scene::{Scene, SceneFile, TissueMaterialSection};
 
-/// Modulus of the springs over Young's modulus of the body along the axes of the lattice, if volume
-/// constraints are stiffer than the springs (docs/book/theory.md).
-pub(super) const SPRINGS_OVER_BODY: f64 = 4.0;
+/// Modulus of the springs over Young's modulus of the body, if volume constraints are stiffer than
+/// the springs (docs/book/theory.md). For `kuhn6` it holds along the axes of the lattice.
+pub(super) fn springs_over_body(split: Split) -> f64 {
+    match split {
+        Split::Kuhn6 => 4.0,
+        Split::Five => 5.0,
+    }
+}
 
 /// The modulus of each element of a kind.
 pub(super) enum Moduli<'a> {
