@@ -100,7 +100,7 @@ impl Severing {
         let mut touched: Vec<Touched> = Vec::new();
         for (blade, sides) in (0..).zip(&self.blades) {
             for own in &sides.sections {
-                let cut = own.section.cut(sides.reached, sides.depth);
+                let cut = own.section.cut(&sides.border, sides.reached);
                 if cut >= LEAST_CUT {
                     let cut = if cut > 1.0 - LEAST_CUT { 1.0 } else { cut };
                     let cuts = vec![(blade, cut)];

@@ -136,11 +136,15 @@ impl Wound {
                     let mut weights = [0.0; 4];
                     weights[low] = 1.0 - part;
                     weights[high] = part;
-                    points.push(LipPoint {
-                        edge: [corners[low], corners[high]],
-                        right: distances[held] >= 0.0,
-                        at: Embedded { nodes, weights },
-                    });
+                    let edge = [corners[low], corners[high]];
+                    let right = distances[held] >= 0.0;
+                    points.push(LipPoint { edge, right, at: Embedded { nodes, weights } });
+                    // A blade through lattice points leaves the part behind them without a volume.
+                    // There the lip is the skin of the whole tets, which has the same corner.
+                    if self.copy_of(split, split.parts[other]).is_none() {
+                        let at = Embedded { nodes: *corners, weights };
+                        points.push(LipPoint { edge, right: !right, at });
+                    }
                 }
             }
         }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::blade::{Blade, signed};
 use super::components::EDGES;
-use super::section::Section;
+use super::section::{Border, Section};
 use super::tet_index::TetIndex;
 use crate::{NO_VERTEX, TetMesh};
 
@@ -33,8 +33,8 @@ pub(super) struct Sides {
     pub sections: Vec<TetSection>,
     /// Length of the blade's path in m.
     pub length: f64,
-    /// Depth of the cut in m.
-    pub depth: f64,
+    /// The border of the whole cut.
+    pub border: Border,
     /// Length in m up to which the blade has cut.
     pub reached: f64,
     /// Number of crossings that are severed.
@@ -92,9 +92,10 @@ impl Severing {
             Some((vertex as u32, signed(distance)))
         };
         let near: Vec<(u32, f32)> = mesh.positions.par_iter().enumerate().filter_map(distance).collect();
-        let (length, depth) = (blade.length(), blade.depth());
+        let length = blade.length();
+        let border = Border::new(length, blade.depth(), finest_step(mesh));
         let (crossings, sections) = (Vec::new(), Vec::new());
-        let mut sides = Sides { near, crossings, sections, length, depth, reached: 0.0, cut: 0 };
+        let mut sides = Sides { near, crossings, sections, length, border, reached: 0.0, cut: 0 };
         let of_vertex =
             |&(vertex, distance): &(u32, f32)| self.crossings(mesh, blade, &sides, vertex, distance, reach);
         let mut crossings: Vec<Crossing> = sides.near.par_iter().flat_map_iter(of_vertex).collect();
@@ -158,7 +159,7 @@ impl Severing {
             let places: Option<Vec<[f64; 2]>> =
                 around_section(&distances).into_iter().map(crossing).collect();
             let section = Section::new(&places.filter(|places| places.len() > 2)?);
-            let cut = section.cut(sides.length, sides.depth) > 0.0;
+            let cut = section.cut(&sides.border, sides.length) > 0.0;
             cut.then_some(TetSection { tet, cell, number, section })
         };
         around.par_iter().filter_map(section).collect()
@@ -201,6 +202,11 @@ fn around_section(distances: &[f32; 4]) -> Vec<(usize, usize)> {
         edges.swap(2, opposite);
     }
     edges
+}
+
+/// Smallest step of the lattice in m.
+fn finest_step(mesh: &TetMesh) -> f64 {
+    mesh.lattice.grid().affine.spacing_mm().into_iter().fold(f64::INFINITY, f64::min) / 1000.0
 }
 
 /// Longest edge of the lattice in m. On a graded lattice it is that of the largest cell.

@@ -53,6 +53,24 @@ fn reached(mesh: &TetMesh, start: u32, within: impl Fn(Point3<f64>) -> bool) -> 
     }
 }
 
+/// A cut of no width has lips on both sides, also where its blade runs through lattice points and
+/// one side of it has no copies of tets.
+#[test]
+fn a_cut_through_lattice_points_has_two_lips() {
+    for split in [Split::Kuhn6, Split::Five] {
+        for place in [20.0, 20.7, 21.0] {
+            let (mut mesh, mut triangles) = block(2.0, split);
+            let incision =
+                Incision { width_mm: None, ..incision([10.0, place, 20.0], [50.0, place, 20.0], 8.0, 2.0) };
+            let mut cut = plan(&mesh, &triangles, &[incision]).unwrap();
+            cut.apply(&mut mesh, &mut triangles);
+            cut.sever(&mut mesh, &mut triangles).unwrap().unwrap();
+            let gape = &cut.gapes[0];
+            assert!(!gape.left().is_empty() && !gape.right().is_empty(), "{split:?} {place}");
+        }
+    }
+}
+
 #[test]
 fn a_cut_removes_the_vertices_in_the_slit() {
     for split in [Split::Kuhn6, Split::Five] {

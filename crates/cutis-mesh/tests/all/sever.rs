@@ -132,7 +132,8 @@ fn a_blade_on_lattice_points_cuts_once() {
     }
 }
 
-/// A cut that ends in the body leaves it in one piece. Around the end nothing is divided.
+/// A cut that ends in the body leaves it in one piece. Farther from its end than a cell and the
+/// blur of the border, nothing is divided.
 #[test]
 fn a_blade_that_ends_in_the_body_leaves_one_piece() {
     let mesh = block([8, 8, 8], Split::Kuhn6);
@@ -143,7 +144,7 @@ fn a_blade_that_ends_in_the_body_leaves_one_piece() {
     for copy in &wound.copies {
         for &v in &mesh.tets[copy.tet as usize] {
             let p = mesh.positions[v as usize];
-            assert!(p.y < 0.0021 + 0.004 && p.z < 0.003 + 0.005, "{p}");
+            assert!(p.y < 0.0021 + 0.003 + 0.004 && p.z < 0.003 + 0.003 + 0.005, "{p}");
         }
     }
 }
