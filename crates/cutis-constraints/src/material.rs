@@ -72,15 +72,11 @@ pub enum MaterialError {
         /// The modulus in N/m.
         modulus_n_per_m: f64,
     },
-    /// A triangle does not face the direction of the skin's normal.
-    #[error(
-        "seen along the normal of the skin, a triangle has {share} of its area; it must have {least} or more"
-    )]
-    NotFacing {
-        /// Area seen along the normal over area; negative if the triangle faces inwards.
-        share: f64,
-        /// The least share.
-        least: f64,
+    /// A triangle has no extent across a strip, so it cannot hold it.
+    #[error("a triangle is {width} m wide across a skin strip; it must have an extent there")]
+    NoWidth {
+        /// Extent across the strip in m.
+        width: f64,
     },
     /// The arguments are valid, but so small or large that the compliance is not a finite number.
     #[error(
@@ -151,24 +147,23 @@ pub fn skin_compliance(rest_area: f64, area_modulus_n_per_m: f64) -> Result<f64,
     finite("skin tension", rest_area, rest_area / area_modulus_n_per_m)
 }
 
-/// Returns the compliance of a [`SkinStrip`](crate::SkinStrip) in m/N: `α = ℓ²/(k·A_p)`.
+/// Returns the compliance of a [`SkinStrip`](crate::SkinStrip) in m/N: `α = ℓ²/(T·A_p)`.
 ///
 /// `ℓ` is `length` in m and `A_p` is `projected_area` in m², both from
-/// [`SkinStripMaterial::shape`](crate::SkinStripMaterial::shape). `k` is `stiffness_n_per_m` in
-/// N/m, from [`SkinStripLaw::stiffness_n_per_m`](crate::SkinStripLaw::stiffness_n_per_m). The
-/// energy `C²/(2α)` of a flat triangle is then `½ k ε² A_p` for the strain `ε` along the strip.
+/// [`SkinStripMaterial::shape`](crate::SkinStripMaterial::shape). `T` is `modulus_n_per_m` in N/m.
+/// The energy `C²/(2α)` is then `½ T ε² A_p` for the strain `ε` of the skin along the strip.
 ///
 /// # Errors
 /// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
 pub fn skin_strip_compliance(
     length: f64,
     projected_area: f64,
-    stiffness_n_per_m: f64,
+    modulus_n_per_m: f64,
 ) -> Result<f64, MaterialError> {
     check_positive("length of a skin strip", "m", length)?;
     check_positive("projected area", "m²", projected_area)?;
-    check_modulus("stiffness of a skin strip", "N/m", stiffness_n_per_m)?;
-    finite("skin strip", length, length / stiffness_n_per_m * (length / projected_area))
+    check_modulus("modulus of a skin strip", "N/m", modulus_n_per_m)?;
+    finite("skin strip", length, length / modulus_n_per_m * (length / projected_area))
 }
 
 /// Fails unless `value` is finite and above 0.

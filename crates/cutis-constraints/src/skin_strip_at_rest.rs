@@ -39,7 +39,7 @@ use crate::{Constraint, Eval, Real, SkinStripMaterial};
 /// concave there, and the [reach](Constraint::inverse_reach_squared) keeps a projection from
 /// passing the length in the scan.
 ///
-/// The parameters `[B1, B2, L, L0, β, κ]` and the compliance are those of
+/// The parameters `[B1, B2, L, L0, β, κ, Hx, Hy, Hz]` and the compliance are those of
 /// [`SkinStrip`](crate::SkinStrip).
 #[derive(Clone, Copy, Debug)]
 pub struct SkinStripAtRest;
@@ -47,20 +47,20 @@ pub struct SkinStripAtRest;
 impl Constraint<3> for SkinStripAtRest {
     const NAME: &'static str = "skin_strip_at_rest";
     const WGSL: &'static str = cutis_shaders::constraints::SKIN_STRIP_AT_REST;
-    type Params<T: Real> = [T; 6];
+    type Params<T: Real> = [T; 9];
     type Material = SkinStripMaterial;
 
-    fn from_rest<T: Real>(x: &[Point3<T>; 3], material: &SkinStripMaterial) -> [T; 6] {
+    fn from_rest<T: Real>(x: &[Point3<T>; 3], material: &SkinStripMaterial) -> [T; 9] {
         params(x, material)
     }
 
     #[inline(always)]
     fn eval<T: Real>(
         x: &[Point3<T>; 3],
-        &[b1, b2, rest_length, scan_length, stiffening, compression]: &[T; 6],
+        &[b1, b2, rest_length, scan_length, stiffening, compression, rise @ ..]: &[T; 9],
     ) -> Eval<T, 3> {
         let (zero, one) = (T::zero(), T::one());
-        let image = image(x, [b1, b2]);
+        let image = image(x, [b1, b2], rise.into());
         let length = length(&image);
         let s = length - rest_length;
         let e = length - scan_length;
@@ -83,10 +83,10 @@ impl Constraint<3> for SkinStripAtRest {
     #[inline(always)]
     fn inverse_reach_squared<T: Real>(
         x: &[Point3<T>; 3],
-        &[b1, b2, rest_length, scan_length, _, compression]: &[T; 6],
+        &[b1, b2, rest_length, scan_length, _, compression, rise @ ..]: &[T; 9],
     ) -> Option<T> {
         let zero = T::zero();
-        let length = length(&image(x, [b1, b2]));
+        let length = length(&image(x, [b1, b2], rise.into()));
         let s = length - rest_length;
         let t0 = scan_length - rest_length;
         let beyond = (t0 - s) * slack_square(s, t0, compression);
@@ -95,7 +95,7 @@ impl Constraint<3> for SkinStripAtRest {
         Some(limit.select(passes, zero).simd_max(inverse_reach_squared(length, scan_length)))
     }
 
-    fn rest_size<T: Real>(&[_, _, _, scan_length, ..]: &[T; 6]) -> T {
+    fn rest_size<T: Real>(&[_, _, _, scan_length, ..]: &[T; 9]) -> T {
         scan_length
     }
 }

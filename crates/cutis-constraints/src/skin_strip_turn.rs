@@ -26,31 +26,34 @@ use crate::{Constraint, Eval, Real, SkinStripMaterial};
 /// The load has a fixed direction in space. The gradients sum to zero, but they have a torque: a
 /// turned body is turned back. It holds for rotations of the skin by some tens of degrees.
 ///
-/// The parameters are `[B1, B2, F0x, F0y, F0z, t0]`, in m except for the weights. The compliance is
-/// that of [`SkinStrip`](crate::SkinStrip). Without tension `t0` is 0, and so is `C`. The rest size
-/// is zero, so `SystemBuilder::add_from_rest` refuses this kind. Use `SystemBuilder::add` with
-/// parameters from `from_rest`.
+/// The parameters are `[B1, B2, F0x, F0y, F0z, t0, Hx, Hy, Hz]`, in m except for the weights. The
+/// compliance is that of [`SkinStrip`](crate::SkinStrip). Without tension `t0` is 0, and so is `C`.
+/// The rest size is zero, so `SystemBuilder::add_from_rest` refuses this kind. Use
+/// `SystemBuilder::add` with parameters from `from_rest`.
 #[derive(Clone, Copy, Debug)]
 pub struct SkinStripTurn;
 
 impl Constraint<3> for SkinStripTurn {
     const NAME: &'static str = "skin_strip_turn";
     const WGSL: &'static str = cutis_shaders::constraints::SKIN_STRIP_TURN;
-    type Params<T: Real> = [T; 6];
+    type Params<T: Real> = [T; 9];
     type Material = SkinStripMaterial;
 
-    fn from_rest<T: Real>(x: &[Point3<T>; 3], material: &SkinStripMaterial) -> [T; 6] {
-        let Rest { b: [b1, b2], image, stretch, .. } = Rest::of(x, material);
-        [b1, b2, image.x, image.y, image.z, stretch]
+    fn from_rest<T: Real>(x: &[Point3<T>; 3], material: &SkinStripMaterial) -> [T; 9] {
+        let Rest { b: [b1, b2], rise, image, stretch, .. } = Rest::of(x, material);
+        [b1, b2, image.x, image.y, image.z, stretch, rise.x, rise.y, rise.z]
     }
 
     #[inline(always)]
-    fn eval<T: Real>(x: &[Point3<T>; 3], &[b1, b2, scan_x, scan_y, scan_z, stretch]: &[T; 6]) -> Eval<T, 3> {
+    fn eval<T: Real>(
+        x: &[Point3<T>; 3],
+        &[b1, b2, scan_x, scan_y, scan_z, stretch, rise @ ..]: &[T; 9],
+    ) -> Eval<T, 3> {
         let two = T::constant(2.0);
         let scan = Vector3::new(scan_x, scan_y, scan_z);
         let scan_length = length(&scan);
         let scan_direction = scan * inverse_or_zero(scan_length);
-        let image = image(x, [b1, b2]);
+        let image = image(x, [b1, b2], rise.into());
         let length = length(&image);
         let inverse_length = inverse_or_zero(length);
         let along = scan_direction.dot(&image);
@@ -70,7 +73,7 @@ impl Constraint<3> for SkinStripTurn {
     /// Returns zero: like a spring of length zero, the constraint has no size in the scan. Vertex
     /// block descent then takes `|∇C|²/α` for the curvature across the gradient. It is the
     /// curvature across `F`, and a bound of the energy in every direction.
-    fn rest_size<T: Real>(_: &[T; 6]) -> T {
+    fn rest_size<T: Real>(_: &[T; 9]) -> T {
         T::zero()
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::material::{MaterialError, check_not_negative, check_positive, skin_strip_compliance};
-use crate::strip::{Weights, image, length};
+use crate::strip::Weights;
 
 /// The elastic law of a strip of skin.
 ///
@@ -44,18 +44,6 @@ impl SkinStripLaw {
         }
         Ok(())
     }
-
-    /// Returns the stiffness of the image of a strip, `k = τ + (T − τ)·min(g0, STEEPEST)²` in N/m,
-    /// for the length `g0` of the image of a unit vector in the scan.
-    ///
-    /// With this stiffness a strain in the plane of the skin meets the modulus `T` on a facet of
-    /// any slope: the length of the image grows by `ε/g0`, so the stiffness contributes `k/g0²`,
-    /// and the turning of the image under tension contributes `τ(1 − 1/g0²)`.
-    #[must_use]
-    pub fn stiffness_n_per_m(&self, steepness: f64) -> f64 {
-        let limited = steepness.min(SkinStripMaterial::STEEPEST);
-        self.tension_n_per_m + (self.modulus_n_per_m - self.tension_n_per_m) * limited * limited
-    }
 }
 
 /// The material of a strip on one triangle: the outward normal of the smooth skin, the direction of
@@ -80,25 +68,21 @@ pub struct SkinStripMaterial {
 /// The measures of a strip on a triangle in the scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkinStripShape {
-    /// `A_p`: area of the triangle seen along the normal, in m².
+    /// `A_p`: area of the triangle seen along the normal, in m², and at least
+    /// [`LEAST_FACING`](SkinStripMaterial::LEAST_FACING) times its area.
     pub projected_area: f64,
-    /// `g0`: length of the image of a unit vector along the strip, 1 or more, without unit. It is
-    /// above 1 where the triangle rises or falls along the strip.
-    pub steepness: f64,
-    /// `ℓ`: length in m that turns the image of a unit vector into the image of the constraint.
+    /// `ℓ`: length in m of the strip in the scan.
     pub length: f64,
 }
 
 impl SkinStripMaterial {
-    /// The steepness `g0` above which a facet is no longer stiffened, without unit. The stiffness
-    /// of a strip grows as `g0²`, and a steep facet would slow down every solver. A steeper facet
-    /// keeps its exact tension and has a smaller modulus, which falls from `T` to `τ`.
-    pub const STEEPEST: f64 = 5.0;
-
-    /// The least projected area over area of a triangle that can hold a strip. A facet closer to
-    /// edge-on has a force along the normal of more than 20 times its force in the skin. On the
-    /// staircase of a plane such facets have about a ten-thousandth of the area.
+    /// The least share of a triangle's area that counts as seen along the normal. The stiffness of
+    /// a strip grows as the inverse of the projected area. A facet that is closer to edge-on, or
+    /// that faces inwards, has the stiffness of this share.
     pub const LEAST_FACING: f64 = 0.05;
+
+    /// The least extent across a strip over the root of the triangle's area.
+    const LEAST_WIDTH: f64 = 1e-3;
 
     /// Angle in rad between direction and normal below which the direction counts as the normal.
     const PARALLEL: f64 = 1e-6;
@@ -142,21 +126,17 @@ impl SkinStripMaterial {
     /// Returns the measures of this strip on the triangle `x`, in the scan and in meters.
     ///
     /// # Errors
-    /// [`MaterialError::NotFacing`] if the projected area is below
-    /// [`LEAST_FACING`](Self::LEAST_FACING) times the area: the triangle faces inwards, is seen
-    /// from its edge, or has no area. Such a triangle holds no strip; a caller may omit and count
-    /// it. [`MaterialError::NotPositive`] if the area is zero or not finite.
+    /// [`MaterialError::NoWidth`] if the triangle has no extent across the strip: it is seen from
+    /// its edge, and the edge runs along the strip. Such a strip has no force, and a caller may
+    /// omit it. [`MaterialError::NotPositive`] if the area is zero or not finite.
     pub fn shape(&self, x: &[Point3<f64>; 3]) -> Result<SkinStripShape, MaterialError> {
         let area = 0.5 * (x[1] - x[0]).cross(&(x[2] - x[0])).norm();
         check_positive("area of a skin triangle", "m²", area)?;
-        let Weights { b, width, twice_area } = Weights::of(x, self);
-        let share = 0.5 * twice_area / area;
-        if share < Self::LEAST_FACING {
-            return Err(MaterialError::NotFacing { share, least: Self::LEAST_FACING });
+        let Weights { width, twice_area, .. } = Weights::of(x, self);
+        if width < Self::LEAST_WIDTH * area.sqrt() {
+            return Err(MaterialError::NoWidth { width });
         }
-        let length_m = twice_area / width;
-        let steepness = length(&image(x, b)) / length_m;
-        Ok(SkinStripShape { projected_area: 0.5 * twice_area, steepness, length: length_m })
+        Ok(SkinStripShape { projected_area: 0.5 * twice_area, length: twice_area / width })
     }
 
     /// Returns the compliance in m/N of a strip on the triangle `x`, in the scan and in meters. All
@@ -165,8 +145,8 @@ impl SkinStripMaterial {
     /// # Errors
     /// The errors of [`shape`](Self::shape) and [`skin_strip_compliance`].
     pub fn compliance(&self, x: &[Point3<f64>; 3]) -> Result<f64, MaterialError> {
-        let SkinStripShape { projected_area, steepness, length } = self.shape(x)?;
-        skin_strip_compliance(length, projected_area, self.law.stiffness_n_per_m(steepness))
+        let SkinStripShape { projected_area, length } = self.shape(x)?;
+        skin_strip_compliance(length, projected_area, self.law.modulus_n_per_m)
     }
 }
 

@@ -13,9 +13,9 @@ const KINDS: [(&str, usize, u32, &str); 7] = [
     ("volume", 4, 1, VOLUME),
     ("stc", 3, 2, SKIN_TENSION),
     ("stc_paper", 3, 3, SKIN_TENSION_PAPER),
-    ("skin_strip", 3, 6, SKIN_STRIP),
-    ("skin_strip_at_rest", 3, 6, SKIN_STRIP_AT_REST),
-    ("skin_strip_turn", 3, 6, SKIN_STRIP_TURN),
+    ("skin_strip", 3, 9, SKIN_STRIP),
+    ("skin_strip_at_rest", 3, 9, SKIN_STRIP_AT_REST),
+    ("skin_strip_turn", 3, 9, SKIN_STRIP_TURN),
 ];
 
 #[test]

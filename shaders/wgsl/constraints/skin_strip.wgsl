@@ -1,6 +1,6 @@
 // Skin strip: tension along a direction of the skin. The same operations as `SkinStrip::eval`.
 fn eval(x: array<vec3f, N>, p: Params) -> Eval {
-    let image = strip_image(x, p.b1, p.b2);
+    let image = strip_image(x, p.b1, p.b2, vec3f(p.rise_x, p.rise_y, p.rise_z));
     let length = sqrt(dot(image, image));
     inverse_reach_squared = strip_reach(length, p.scan_length);
     let s = length - p.rest_length;

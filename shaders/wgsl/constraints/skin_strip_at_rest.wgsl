@@ -1,6 +1,6 @@
 // Skin strip of a body at rest in the scan. The same operations as `SkinStripAtRest::eval`.
 fn eval(x: array<vec3f, N>, p: Params) -> Eval {
-    let image = strip_image(x, p.b1, p.b2);
+    let image = strip_image(x, p.b1, p.b2, vec3f(p.rise_x, p.rise_y, p.rise_z));
     let length = sqrt(dot(image, image));
     let s = length - p.rest_length;
     let e = length - p.scan_length;

@@ -6,13 +6,16 @@ struct Params {
     scan_y: f32,
     scan_z: f32,
     stretch: f32,
+    rise_x: f32,
+    rise_y: f32,
+    rise_z: f32,
 }
 
 fn eval(x: array<vec3f, N>, p: Params) -> Eval {
     let scan = vec3f(p.scan_x, p.scan_y, p.scan_z);
     let scan_length = sqrt(dot(scan, scan));
     let scan_direction = scan * inverse_or_zero(scan_length);
-    let image = strip_image(x, p.b1, p.b2);
+    let image = strip_image(x, p.b1, p.b2, vec3f(p.rise_x, p.rise_y, p.rise_z));
     let length = sqrt(dot(image, image));
     let along = dot(scan_direction, image);
     let moved = select(image, image - scan, 2.0 * length > scan_length);

@@ -1,7 +1,7 @@
 // The image of a direction in a triangle, used by the three kinds of skin strips. The same
 // operations as in `strip.rs`.
-fn strip_image(x: array<vec3f, N>, b1: f32, b2: f32) -> vec3f {
-    return (x[0] - x[2]) * b1 + (x[1] - x[2]) * b2;
+fn strip_image(x: array<vec3f, N>, b1: f32, b2: f32, rise: vec3f) -> vec3f {
+    return exact3((x[0] - x[2]) * b1) + exact3((x[1] - x[2]) * b2) - rise;
 }
 
 fn inverse_or_zero(x: f32) -> f32 {

@@ -6,4 +6,7 @@ struct Params {
     scan_length: f32,
     stiffening: f32,
     compression: f32,
+    rise_x: f32,
+    rise_y: f32,
+    rise_z: f32,
 }

@@ -33,8 +33,8 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     examine(bench, &Subject::<SkinTension, 3>::new(shares().map(tension)))?;
     examine(bench, &Subject::<SkinTensionPaper, 3>::new(shares().map(paper)).direction_only())?;
     let strips = || shares().map(strip).collect::<Result<Vec<_>, _>>();
-    examine(bench, &Subject::<SkinStrip, 3>::new(strips()?))?;
-    examine(bench, &Subject::<SkinStripAtRest, 3>::new(strips()?))?;
+    examine(bench, &Subject::<SkinStrip, 3>::new(strips()?).oriented())?;
+    examine(bench, &Subject::<SkinStripAtRest, 3>::new(strips()?).oriented())?;
     examine(bench, &Subject::<SkinStripTurn, 3>::new(strips()?).oriented())
 }
 

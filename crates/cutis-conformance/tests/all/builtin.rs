@@ -39,8 +39,8 @@ fn strips() -> Vec<SkinStripMaterial> {
     ]
 }
 
-conformance!(mod skin_strip: SkinStrip, 3, Subject::new(strips()));
+conformance!(mod skin_strip: SkinStrip, 3, Subject::new(strips()).oriented());
 
-conformance!(mod skin_strip_at_rest: SkinStripAtRest, 3, Subject::new(strips()));
+conformance!(mod skin_strip_at_rest: SkinStripAtRest, 3, Subject::new(strips()).oriented());
 
 conformance!(mod skin_strip_turn: SkinStripTurn, 3, Subject::new(strips()).oriented());

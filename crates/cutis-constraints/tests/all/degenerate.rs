@@ -92,9 +92,10 @@ fn strips<T: Scalar>() {
     let mirrored = [A, B, C].map(|p| p.map(|v| -v));
     for scale in SCALES {
         for (rest, stiffening, compression) in [(0.7, 0.0, 1.0), (1.0, 1e6, 0.0), (0.01, 5.0, 0.5)] {
-            let params = [b1, b2, rest * length * scale, length * scale, stiffening, compression];
+            let params =
+                [b1, b2, rest * length * scale, length * scale, stiffening, compression, 0.0, 0.0, 0.0];
             let [fx, fy, fz] = image.map(|v| v * scale);
-            let turn = [b1, b2, fx, fy, fz, (1.0 - rest) * length * scale];
+            let turn = [b1, b2, fx, fy, fz, (1.0 - rest) * length * scale, 0.0, 0.0, 0.0];
             // Without extent there is no image.
             assert!(is_zero(&eval::<3, SkinStrip, T>([A, A, A], scale, &params)));
             assert!(is_zero(&eval::<3, SkinStripAtRest, T>([A, A, A], scale, &params)));
@@ -107,9 +108,9 @@ fn strips<T: Scalar>() {
             assert!(!is_zero(&flat) || compression == 0.0, "a flat triangle has an image");
         }
         for x in [[A, B, C], [A, A, A]] {
-            eval::<3, SkinStrip, T>(x, scale, &[0.0; 6]);
-            eval::<3, SkinStripAtRest, T>(x, scale, &[0.0; 6]);
-            eval::<3, SkinStripTurn, T>(x, scale, &[0.0; 6]);
+            eval::<3, SkinStrip, T>(x, scale, &[0.0; 9]);
+            eval::<3, SkinStripAtRest, T>(x, scale, &[0.0; 9]);
+            eval::<3, SkinStripTurn, T>(x, scale, &[0.0; 9]);
         }
     }
 }

@@ -56,9 +56,19 @@ fn check<const N: usize>(eval: &impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shap
     assert!(torque_error(&couple, shape) > 1e-6);
 }
 
+/// Checks the gradient and the momentum of a strip, not its torque.
+fn check_forces(eval: &dyn Fn(&[Point3<f64>; 3]) -> Eval<f64, 3>, shape: &Shape<3>) {
+    let grad = eval(&shape.x).grad;
+    let error = gradient_error(eval, shape);
+    assert!(error < EXACT, "gradient is off by {error}");
+    assert!(momentum_error(&grad) < ROUNDING);
+    let longer = |x: &[Point3<f64>; 3]| Eval { c: eval(x).c, grad: grad.map(|g| g * 1.001) };
+    assert!(gradient_error(longer, shape) > 0.9e-3);
+}
+
 /// True where a strip has a kink or a wide enough image for finite differences.
 fn is_smooth(case: &StripCase) -> bool {
-    let [_, _, rest, scan, _, compression] = case.params();
+    let [_, _, rest, scan, _, compression, ..] = case.params();
     let length = case.image(&case.x.x).norm();
     let far = |from: f64| (length - from).abs() > 0.01 * case.x.scale;
     // Below the rest length and without compression there is no gradient to compare.
@@ -88,28 +98,39 @@ proptest! {
         check(&with::<3, SkinTension>([ratio * area(&shape.x), beta]), &shape);
     }
 
+    /// The slope of a triangle along the strip has a direction in space, so its torque is not zero.
     #[test]
     fn skin_strip_gradient(case in strip_case(100.0)) {
         prop_assume!(is_smooth(&case));
-        check(&with::<3, SkinStrip>(case.params()), &case.x);
-        check(&with::<3, SkinStripAtRest>(case.params()), &case.x);
+        check_forces(&with::<3, SkinStrip>(case.params()), &case.x);
+        check_forces(&with::<3, SkinStripAtRest>(case.params()), &case.x);
     }
 
-    /// The load has a direction in space, so its torque is not zero.
+    /// The load has a direction in space, too.
     #[test]
     fn skin_strip_turn_gradient(case in strip_case(100.0)) {
         let turn = with::<3, SkinStripTurn>(case.turn_params());
-        let grad = turn(&case.x.x).grad;
-        prop_assume!(is_smooth(&case) && gradient_size(&grad) > 0.05);
-        let error = gradient_error(&turn, &case.x);
-        prop_assert!(error < EXACT, "gradient is off by {error}");
-        prop_assert!(momentum_error(&grad) < ROUNDING);
-        let longer = |x: &[Point3<f64>; 3]| Eval { c: turn(x).c, grad: grad.map(|g| g * 1.001) };
-        prop_assert!(gradient_error(longer, &case.x) > 0.9e-3);
+        prop_assume!(is_smooth(&case) && gradient_size(&turn(&case.x.x).grad) > 0.05);
+        check_forces(&turn, &case.x);
+    }
+
+    /// Only a triangle that is parallel to the skin has strips without a torque.
+    #[test]
+    fn a_flat_strip_has_no_torque(case in strip_case(100.0)) {
+        let [b1, b2, rest, scan, stiffening, compression, rise @ ..] = case.params();
+        let flat = [b1, b2, rest, scan, stiffening, compression, 0.0, 0.0, 0.0];
+        for eval in [SkinStrip::eval, SkinStripAtRest::eval] {
+            let grad = eval(&case.x.x, &flat).grad;
+            prop_assert!(gradient_size(&grad) == 0.0 || torque_error(&grad, &case.x) < ROUNDING);
+        }
+        let [image, rise] = [case.image(&case.x.x), Vector3::from(rise)];
+        let Eval { c, grad } = SkinStrip::eval(&case.x.x, &case.params());
+        prop_assume!(c > 0.0 && rise.cross(&image).norm() > 0.1 * scan * image.norm());
+        prop_assert!(torque_error(&grad, &case.x) > 1e-4);
     }
 
     #[test]
-    fn only_the_turn_has_a_torque(case in strip_case(100.0)) {
+    fn the_turn_has_a_torque(case in strip_case(100.0)) {
         let turn = SkinStripTurn::eval(&case.x.x, &case.turn_params());
         let [scan, image] = [&case.scan.x, &case.x.x].map(|x| case.image(x));
         prop_assume!(scan.cross(&image).norm() > 0.1 * scan.norm() * image.norm() && turn.c > 0.0);

@@ -106,8 +106,11 @@ fn lanes_equal_scalars_bit_for_bit() {
     check_types::<4, Volume>(3, |rest| vec![rest]);
     check_types::<3, SkinTension>(2, |rest| vec![rest, 5.0]);
     check_types::<3, SkinTensionPaper>(2, |rest| vec![rest, 5.0, 3.0]);
-    let strip = |rest: f64| vec![1.0, -0.4, 0.7 * rest, rest, 3.0, 0.25];
+    let strip =
+        |rest: f64| vec![1.0, -0.4, 0.7 * rest, rest, 3.0, 0.25, 0.1 * rest, -0.2 * rest, 0.15 * rest];
     check_types::<3, SkinStrip>(1, strip);
     check_types::<3, SkinStripAtRest>(1, strip);
-    check_types::<3, SkinStripTurn>(1, |rest| vec![1.0, -0.4, rest, 0.2 * rest, -0.3 * rest, 0.3 * rest]);
+    let turn =
+        |rest: f64| [1.0, -0.4, rest, 0.2 * rest, -0.3 * rest, 0.3 * rest, 0.1 * rest, 0.0, 0.15 * rest];
+    check_types::<3, SkinStripTurn>(1, |rest| turn(rest).to_vec());
 }

@@ -10,7 +10,7 @@ use crate::strips::{StripCase, strip_case};
 
 /// `α U` of the strip with the image `image`, in m².
 fn energy(case: &StripCase, image: &Vector3<f64>) -> f64 {
-    let [_, _, rest, scan, stiffening, compression] = case.params();
+    let [_, _, rest, scan, stiffening, compression, ..] = case.params();
     let s = image.norm() - rest;
     let e = (image.norm() - scan).max(0.0);
     let spring = 0.5 * s * s * if s < 0.0 { compression } else { 1.0 };
@@ -105,17 +105,17 @@ proptest! {
     /// weighted points.
     #[test]
     fn a_plain_strip_is_a_distance(case in strip_case(1e6)) {
-        let [b1, b2, rest, scan, ..] = case.params();
+        let [b1, b2, rest, scan, _, _, hx, hy, hz] = case.params();
         for image in images(&case) {
             let x = triangle(&case, &image);
-            let strip = SkinStrip::eval(&x, &[b1, b2, rest, scan, 0.0, 1.0]);
+            let strip = SkinStrip::eval(&x, &[b1, b2, rest, scan, 0.0, 1.0, hx, hy, hz]);
             let ends = [Point3::from(case.image(&x)), Point3::origin()];
             let distance = Distance::eval(&ends, &[rest]);
             prop_assert_eq!(strip.c, distance.c);
             for (grad, b) in strip.grad.iter().zip([b1, b2, -b1 - b2]) {
                 prop_assert!((grad - distance.grad[0] * b).norm() < 1e-14);
             }
-            let at_rest = SkinStripAtRest::eval(&x, &[b1, b2, rest, scan, 0.0, 1.0]);
+            let at_rest = SkinStripAtRest::eval(&x, &[b1, b2, rest, scan, 0.0, 1.0, hx, hy, hz]);
             let distance = Distance::eval(&ends, &[scan]);
             prop_assert!((at_rest.c - distance.c).abs() < 1e-12 * scan.max(distance.c));
         }
@@ -151,7 +151,7 @@ proptest! {
 /// Control: without the reach, a slack strip with little tension overshoots.
 #[test]
 fn without_the_reach_a_slack_strip_overshoots() {
-    let params = [1.0, 0.0, 0.99, 1.0, 100.0, 0.0];
+    let params = [1.0, 0.0, 0.99, 1.0, 100.0, 0.0, 0.0, 0.0, 0.0];
     let x = [0.4, 0.0, 0.0].map(|x| Point3::new(x, 0.0, 0.0));
     let before = SkinStripAtRest::eval(&x, &params);
     let overshot = SkinStripAtRest::eval(&project(&x, &[1.0; 3], &before), &params);

@@ -22,13 +22,13 @@ fn with_origin(end: &Point3<f64>) -> [Point3<f64>; 3] {
 
 fn along(end: &Point3<f64>) -> (f64, Vector3<f64>) {
     let Eval { c, grad } =
-        SkinStripAtRest::eval(&with_origin(end), &[1.0, 0.0, 1.0 - STRETCH, 1.0, 0.0, 1.0]);
+        SkinStripAtRest::eval(&with_origin(end), &[1.0, 0.0, 1.0 - STRETCH, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     (c, grad[0])
 }
 
 fn turn(end: &Point3<f64>) -> (f64, Vector3<f64>) {
     let Eval { c, grad } =
-        SkinStripTurn::eval(&with_origin(end), &[1.0, 0.0, SCAN.x, SCAN.y, SCAN.z, STRETCH]);
+        SkinStripTurn::eval(&with_origin(end), &[1.0, 0.0, SCAN.x, SCAN.y, SCAN.z, STRETCH, 0.0, 0.0, 0.0]);
     (c, grad[0])
 }
 

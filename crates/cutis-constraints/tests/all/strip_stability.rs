@@ -14,8 +14,8 @@ const COMPLIANCES: [f64; 4] = [0.0, 1e-3, 0.1, 10.0];
 
 /// A strip with its parameters, the deformed triangle and the inverse masses of its vertices.
 struct Case {
-    along: [f64; 6],
-    turn: [f64; 6],
+    along: [f64; 9],
+    turn: [f64; 9],
     x: [Point3<f64>; 3],
     inverse_mass: [f64; 3],
 }
@@ -49,7 +49,7 @@ fn cases() -> impl Iterator<Item = Case> {
 /// A projection of a constraint in a solver, with or without its reach.
 fn project<C: Constraint<3>, T: Scalar>(
     x: &mut [Point3<T>; 3],
-    params: &[f64; 6],
+    params: &[f64; 9],
     (w, compliance, reach): (&[T; 3], T, bool),
     lambda: &mut T,
 ) {

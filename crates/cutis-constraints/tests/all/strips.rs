@@ -15,20 +15,27 @@ pub struct StripCase {
 }
 
 impl StripCase {
-    /// `[B1, B2, L, L0, β, κ]`
-    pub fn params(&self) -> [f64; 6] {
+    /// `[B1, B2, L, L0, β, κ, Hx, Hy, Hz]`
+    pub fn params(&self) -> [f64; 9] {
         SkinStrip::from_rest(&self.scan.x, &self.material)
     }
 
-    /// `[B1, B2, F0x, F0y, F0z, t0]`
-    pub fn turn_params(&self) -> [f64; 6] {
+    /// `[B1, B2, F0x, F0y, F0z, t0, Hx, Hy, Hz]`
+    pub fn turn_params(&self) -> [f64; 9] {
         SkinStripTurn::from_rest(&self.scan.x, &self.material)
+    }
+
+    /// The area of the scan's triangle seen along the normal, negative if it faces inwards, over
+    /// its area.
+    pub fn facing(&self) -> f64 {
+        let [x1, x2, x3] = self.scan.x;
+        (x2 - x1).cross(&(x3 - x1)).normalize().dot(self.material.normal())
     }
 
     /// The image of the direction in a shape.
     pub fn image(&self, x: &[Point3<f64>; 3]) -> Vector3<f64> {
-        let [b1, b2, ..] = self.params();
-        (x[0] - x[2]) * b1 + (x[1] - x[2]) * b2
+        let [b1, b2, _, _, _, _, rise @ ..] = self.params();
+        (x[0] - x[2]) * b1 + (x[1] - x[2]) * b2 - Vector3::from(rise)
     }
 }
 
@@ -42,11 +49,11 @@ fn law(stiffest: f64) -> impl Strategy<Value = SkinStripLaw> {
     })
 }
 
-/// Strips on triangles that face the normal of the skin.
+/// Strips on triangles that face the normal of the skin, are seen from their edge, or from behind.
 pub fn strip_case(stiffest: f64) -> impl Strategy<Value = StripCase> {
     let vector = || proptest::array::uniform3(-1.0..1.0f64);
     (shape::<3>(), shape::<3>(), vector(), vector(), law(stiffest)).prop_filter_map(
-        "a triangle that faces the normal",
+        "a triangle with an extent across the strip",
         |(scan, other, tilt, direction, law)| {
             let [x1, x2, x3] = scan.x;
             let facet = (x2 - x1).cross(&(x3 - x1)).normalize();

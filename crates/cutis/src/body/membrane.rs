@@ -2,10 +2,9 @@
 
 use std::collections::HashMap;
 
-use cutis_mesh::{Frame, TissueMask};
+use cutis_mesh::TissueMask;
 use cutis_skin::{BodySkin, Directions, SkinField};
-use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
+use nalgebra::Vector3;
 
 use super::Body;
 use crate::Error;
@@ -18,9 +17,6 @@ const MANY_FACET_NORMALS: f64 = 0.01;
 /// Normals and directions at the triangles of the whole uncut skin.
 pub(crate) struct Membrane {
     field: SkinField,
-    /// For each triangle whether it holds tension. A triangle that faces away from the smooth skin
-    /// does not.
-    holds: Vec<bool>,
     /// Position in the field of each skin triangle, by its lattice points.
     position: HashMap<[u32; 3], u32>,
     /// Whether the scene gives directions. Without them all weights are 0.
@@ -38,8 +34,6 @@ pub(crate) struct Tangent {
     pub(crate) along: Vector3<f64>,
     /// How much the direction counts, from 0 (isotropic) to 1.
     pub(crate) weight: f64,
-    /// Whether the triangle holds tension.
-    pub(crate) holds: bool,
 }
 
 impl Membrane {
@@ -66,24 +60,16 @@ impl Membrane {
             field.weights.fill(0.0);
             field.coverage = 0.0;
         }
-        let (lattice, frame) = (whole.lattice(), Frame::center_of(whole.lattice().grid()));
-        let position =
-            |point: u32| frame.to_local(lattice.mm(lattice.grid().point(point as usize))).map(f64::from);
-        let holds = skin.par_iter().enumerate().map(|(n, triangle)| {
-            let x: [Point3<f64>; 3] = triangle.map(position);
-            section.holds(&field.normals[n], &field.directions[n], &x).map_err(file.blame(key))
-        });
-        let holds = holds.collect::<Result<_, Error>>()?;
         let mut warnings = stroke_warnings(&directions);
         warnings.extend(facet_normals(&field));
-        Ok(Self { field, holds, position: skin.iter().copied().zip(0..).collect(), has_lines, warnings })
+        Ok(Self { field, position: skin.iter().copied().zip(0..).collect(), has_lines, warnings })
     }
 
     /// Normal and direction at a skin triangle in lattice points.
     fn at(&self, points: &[u32; 3]) -> Tangent {
         let n = self.position[points] as usize;
         let SkinField { normals, directions, weights, .. } = &self.field;
-        Tangent { normal: normals[n], along: directions[n], weight: weights[n], holds: self.holds[n] }
+        Tangent { normal: normals[n], along: directions[n], weight: weights[n] }
     }
 
     /// Whether the scene gives directions, so that there are lines to show.
@@ -94,9 +80,8 @@ impl Membrane {
     /// Figures about the field.
     pub(crate) fn report(&self) -> MembraneReport {
         MembraneReport {
-            triangles: self.holds.len(),
+            triangles: self.field.normals.len(),
             coverage: self.has_lines.then_some(self.field.coverage),
-            facing_away: self.holds.iter().filter(|holds| !**holds).count(),
             normals_from_facets: self.field.normals_from_facets,
         }
     }

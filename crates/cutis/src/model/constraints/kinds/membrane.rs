@@ -155,35 +155,14 @@ impl MembraneSection {
         })
     }
 
-    /// Whether a triangle `x` (m, in the scan) holds tension. One that faces away from the smooth
-    /// skin does not.
-    ///
-    /// # Errors
-    /// [`MaterialError`] for a triangle without area.
-    pub(crate) fn holds(
-        &self,
-        normal: &Vector3<f64>,
-        along: &Vector3<f64>,
-        x: &[Point3<f64>; 3],
-    ) -> Result<bool, MaterialError> {
-        let Some(values) = self.values() else { return Ok(false) };
-        let [law, _] = values.laws;
-        match SkinStripMaterial::new((*normal).into(), (*along).into(), law)?.shape(x) {
-            Ok(_) => Ok(true),
-            Err(MaterialError::NotFacing { .. }) => Ok(false),
-            Err(error) => Err(error),
-        }
-    }
-
     /// Tension in the scan along and across the lines at a place of the skin, N/m. None if the
     /// formulation knows no forces.
     pub(crate) fn tension_at(&self, tangent: &Tangent, formulation: Formulation) -> Option<[f64; 2]> {
         let values = self.values().filter(|_| formulation != Formulation::Pbd)?;
-        let tension = values.blended(tangent.weight).map(|law| law.tension_n_per_m);
-        Some(if tangent.holds { tension } else { [0.0; 2] })
+        Some(values.blended(tangent.weight).map(|law| law.tension_n_per_m))
     }
 
-    /// The strips of some triangles, two per triangle that holds tension. `share` is the share of
+    /// The strips of some triangles, two per triangle. `share` is the share of
     /// its area that a triangle holds.
     ///
     /// # Errors
@@ -199,15 +178,21 @@ impl MembraneSection {
         };
         let mut strips = Vec::with_capacity(2 * skin.len());
         let numbered = skin.iter().enumerate().zip(tangents);
-        for ((number, triangle), tangent) in numbered.filter(|(_, tangent)| tangent.holds) {
-            let Tangent { normal, along, weight, .. } = tangent;
+        for ((number, triangle), Tangent { normal, along, weight }) in numbered {
             let directions = [along, normal.cross(&along)];
             let x = triangle.map(|v| parts.position(v));
             for (direction, law) in directions.into_iter().zip(values.blended(weight)) {
                 let material =
                     SkinStripMaterial::new(normal.into(), direction.into(), law).map_err(Error::Material)?;
-                let compliance = material.compliance(&x).map_err(Error::Material)? / share(number);
-                strips.push(Strip { triangle: *triangle, material, compliance });
+                match material.compliance(&x) {
+                    Ok(whole) => {
+                        let compliance = whole / share(number);
+                        strips.push(Strip { triangle: *triangle, material, compliance });
+                    }
+                    // A strip without a width has no force.
+                    Err(MaterialError::NoWidth { .. }) => {}
+                    Err(error) => return Err(Error::Material(error)),
+                }
             }
         }
         Ok(strips)
@@ -228,9 +213,8 @@ impl MembraneSection {
                 false => Strength::Pbd(self.stiffness),
             };
             let freed = parts.freed_load::<SkinStrip, 3>(&strip.triangle, &params, &strength);
-            let normal = strip.material.normal();
             for (&v, load) in strip.triangle.iter().zip(freed) {
-                loads[v as usize] += (load - normal * normal.dot(&load)) * sign;
+                loads[v as usize] += load * sign;
             }
         }
     }
@@ -346,9 +330,6 @@ impl ConstraintKind for MembraneSection {
         Ok((builder, colors + turn_colors))
     }
 
-    /// Adds only the part of each load in the plane of the skin. The triangles of the lattice are
-    /// not parallel to the skin, so their strips also pull along its normal. This part comes from
-    /// the lattice and not from the skin, so a cut does not set it free.
     fn add_loads(&self, parts: &BodyParts<'_>, loads: &mut [Vector3<f64>]) -> Result<(), Error> {
         self.add_freed(parts, &self.strips(parts, &parts.body.removed.triangles, &|_| 1.0)?, 1.0, loads);
         let Some(severed) = &parts.body.severed else { return Ok(()) };
