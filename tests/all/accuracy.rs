@@ -6,10 +6,17 @@ use cutis_studies::accuracy::{self, Options};
 #[test]
 fn the_quick_checks_hold() {
     for problem in ["sheet", "hanging"] {
-        let options =
-            Options { quick: true, problem: Some(problem.into()), no_gpu: true, ..Options::default() };
-        let mut table = Vec::new();
-        let holds = accuracy::run(&options, &mut table).unwrap();
-        assert!(holds, "{}", String::from_utf8_lossy(&table));
+        holds(Options { problem: Some(problem.into()), ..Options::default() });
     }
+}
+
+#[test]
+fn the_quick_checks_hold_for_a_membrane_at_rest() {
+    holds(Options { membrane: true, ..Options::default() });
+}
+
+fn holds(options: Options) {
+    let mut table = Vec::new();
+    let holds = accuracy::run(&Options { quick: true, no_gpu: true, ..options }, &mut table).unwrap();
+    assert!(holds, "{}", String::from_utf8_lossy(&table));
 }

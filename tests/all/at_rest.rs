@@ -126,12 +126,15 @@ fn a_cut_moves_only_what_it_sets_free() {
         let own = [REST, MEMBRANE, ("output", "{ report = true }"), ("run.checkpoint_every", "40")];
         Run::of(&scene(SMALL, &[&own, set].concat()))
     };
-    // Largest displacement of a vertex more than 120 mm from the middle of the cut, in mm.
+    // Median displacement of the vertices more than 120 mm from the middle of the cut, in mm. The
+    // skin around the trunk passes the motion of the lips on, so the largest one is no measure.
     let far = |run: &Run, rest: &Run| {
         let center = nalgebra::Point3::new(0.03, 0.11, 0.0);
         let pairs = rest.positions().into_iter().zip(run.positions());
         let far = pairs.filter(|(rest, _)| (rest - center).norm() > 0.12);
-        far.map(|(rest, now)| (now - rest).norm() * 1e3).fold(0.0_f32, f32::max)
+        let mut moved: Vec<f32> = far.map(|(rest, now)| (now - rest).norm() * 1e3).collect();
+        moved.sort_by(f32::total_cmp);
+        moved[moved.len() / 2]
     };
     let start = run(&[("constraints", "{}"), ("run.checkpoint_every", "1"), ("run.frames", "1")]);
     let firm = [
@@ -147,11 +150,11 @@ fn a_cut_moves_only_what_it_sets_free() {
     };
     assert!(opening(&at_rest) > 3.0, "{} mm", opening(&at_rest));
     let [still, moved] = [&at_rest, &free].map(|run| far(run, &start));
-    assert!(still < 0.3 * moved && moved > 0.5, "{still} mm with the load, {moved} mm without");
+    assert!(still < 0.1 * moved && moved > 0.05, "{still} mm with the load, {moved} mm without");
 }
 
-/// The facets of the lattice are not parallel to the skin, so their strips pull along its normal as
-/// well. A cut sets only the part in the skin free. Control: the area form has no such plane.
+/// Strips pull in the plane of the skin, although the facets of the lattice are not parallel to it.
+/// Control: the area form pulls in the planes of the facets.
 #[test]
 fn a_cut_sets_no_force_along_the_normal_free() {
     let normal = Vector3::new(-FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0);

@@ -35,7 +35,7 @@ fn extreme_cases_end_as_expected_in_double_precision() {
 /// absolute length would cause a failure.
 #[test]
 fn extreme_cases_end_as_they_must_on_a_gpu() {
-    const ON_GPU: [&str; 13] = [
+    const ON_GPU: [&str; 19] = [
         "amplification 1e6, held a hundredfold, XPBD",
         "collapsed to a point, PBD",
         "collapsed to a point, XPBD, compliance 0e0",
@@ -49,6 +49,12 @@ fn extreme_cases_end_as_they_must_on_a_gpu() {
         "steps 1.9 times as long, VBD",
         "collapsed to a plane, VBD",
         "a corner torn off by ten body sizes at once, VBD, compliance 7e-7",
+        "strips at rest, compressed to a tenth, XPBD",
+        "strips at rest, stiffening 1e6, XPBD, compliance 0e0",
+        "strips at rest, not deformed, tension 0.999, stiffening 1e6, PBD",
+        "strips at rest, one triangle compressed to a tenth, tension 0.1, PBD",
+        "strips at rest, turned over, VBD",
+        "strips shrinking, stiffening 1e6, held a hundredfold, VBD",
     ];
     let of_gpu = |case: &Case| ON_GPU.contains(&case.name.as_str());
     let cases: Vec<Case> = cases::all(Effort::Quick).into_iter().filter(of_gpu).collect();

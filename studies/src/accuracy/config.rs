@@ -159,9 +159,10 @@ impl Config {
     /// # Errors
     /// The problem has no PBD stiffness.
     pub fn system<'a>(&self, problem: &'a Problem) -> Result<&'a System<f32>, Failure> {
-        match self.has_material() {
-            true => Ok(&problem.xpbd),
-            false => Ok(problem.pbd.as_ref().context("this problem has no PBD stiffness")?),
+        match (self.has_material(), &problem.vbd) {
+            (true, Some(vbd)) if self.method.formulation == VBD.formulation => Ok(vbd),
+            (true, _) => Ok(&problem.xpbd),
+            (false, _) => Ok(problem.pbd.as_ref().context("this problem has no PBD stiffness")?),
         }
     }
 }

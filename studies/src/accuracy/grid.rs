@@ -25,6 +25,9 @@ const FULL: Limits = Limits {
     raised: &[(1, 512), (2, 128), (5, 64), (10, 64), (20, 16), (40, 8), (80, 4)],
     times: 1,
 };
+const FEW: Limits =
+    Limits { substeps: &[2, 5, 10, 20, 40, 80], sweeps: 20, raised: &[(5, 32), (10, 16)], times: 1 };
+const QUICK_FEW: Limits = Limits { substeps: &[1, 10, 80], sweeps: 20, raised: &[(10, 16)], times: 1 };
 const QUICK: Limits = Limits { substeps: &[1, 10, 40], sweeps: 20, raised: &[(1, 16), (10, 16)], times: 1 };
 /// Limits for the serial reference and a software adapter. They serve for comparison and are not
 /// expected to be fast.
@@ -52,7 +55,12 @@ impl Limits {
 
 /// All configurations of `problem`.
 pub fn configs(problem: &Problem, quick: bool, gpu: Option<&Gpu>) -> Vec<Config> {
-    let limits = if quick { QUICK } else { FULL };
+    let limits = match (quick, problem.few_settings) {
+        (true, false) => QUICK,
+        (true, true) => QUICK_FEW,
+        (false, true) => FEW,
+        (false, false) => FULL,
+    };
     let slow = if quick { QUICK.shared_by(8) } else { SLOW };
     let mut configs = Vec::new();
     let mut add = |backend: Backend, method: Method, limits: Limits, all: bool| {

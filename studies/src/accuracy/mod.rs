@@ -39,16 +39,31 @@ use reference::Reference;
 use tables::Section;
 
 /// Tables of the page.
-pub const TABLES: [&str; 5] = ["provenance", "problems", "choices", "limits", "checks"];
+pub const TABLES: [&str; 10] = [
+    "provenance",
+    "problems",
+    "choices",
+    "limits",
+    "checks",
+    "membrane-provenance",
+    "membrane-problems",
+    "membrane-choices",
+    "membrane-limits",
+    "membrane-checks",
+];
 /// Charts of the page; `--out` writes one for each error.
 const CHARTS: [Measure; 2] = [Measure::E1, Measure::E3];
+
+/// What a page says about the times of a build that is not a release.
+const DEV_BUILD: &str =
+    " Built with the dev profile: its times are longer than those of a release, its errors are not.";
 
 /// Measures, prints to `out`, and writes what the options ask for. Returns whether all checks hold.
 ///
 /// # Errors
 /// A problem cannot be built, a search does not converge, or a file cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
-    if options.write {
+    if options.write && !options.membrane {
         // A page without one of the problems would lose figures.
         problems::scene::abdomen_scan()?;
     }
@@ -64,7 +79,11 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         Some(only) => only == name,
         None => !options.quick || problems::QUICK.contains(name),
     };
-    for name in problems::NAMES.into_iter().filter(wanted) {
+    let names: Vec<&str> = match options.membrane {
+        true => vec![problems::MEMBRANE],
+        false => problems::NAMES.into_iter().filter(wanted).collect(),
+    };
+    for name in names {
         let Some(problem) = problems::named(name, options.quick)? else { continue };
         let (section, held) = measure(&problem, options.quick, gpu.as_ref(), out)?;
         writeln!(out, "\n{}", tables::front_table(&section.rows).markdown())?;
@@ -78,15 +97,22 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         write_json(path, &serde_json::json!({ "provenance": provenance, "rows": rows, "passed": passed }))?;
     }
     if let Some(mut page) = page {
-        page.set("provenance", &provenance.markdown())?;
-        page.set("problems", &Table::of(&sections).markdown())?;
-        page.set("choices", &tables::choices(&sections).markdown())?;
-        page.set("limits", &tables::limits(&sections).markdown())?;
-        page.set("checks", &checks.summary())?;
+        let part = if options.membrane { "membrane-" } else { "" };
+        let build = if cfg!(debug_assertions) { DEV_BUILD } else { "" };
+        for (table, content) in [
+            ("provenance", provenance.markdown() + build),
+            ("problems", Table::of(&sections).markdown()),
+            ("choices", tables::choices(&sections).markdown()),
+            ("limits", tables::limits(&sections).markdown()),
+            ("checks", checks.summary()),
+        ] {
+            page.set(&format!("{part}{table}"), &content)?;
+        }
         let folder = options.out.clone().unwrap_or_else(results);
         let measures = if options.write { &CHARTS[..] } else { &Measure::ALL };
         page.save(&folder)?;
-        fs::write(folder.join("accuracy.csv"), Table::of(rows.iter().copied()).csv())?;
+        let csv = if options.membrane { "accuracy-membrane.csv" } else { "accuracy.csv" };
+        fs::write(folder.join(csv), Table::of(rows.iter().copied()).csv())?;
         write_charts(&sections, measures, &folder)?;
     }
     Ok(checks.pass())

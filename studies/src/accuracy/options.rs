@@ -22,7 +22,12 @@ pub struct Options {
     /// Only this problem.
     #[arg(long, value_name = "P", value_parser = NAMES)]
     pub problem: Option<String>,
-    /// Write the tables and charts of docs/results/accuracy.md. Only for all problems at full size.
+    /// Measure the problem `membrane` instead, which has its own part of the page. It takes
+    /// minutes.
+    #[arg(long, conflicts_with = "problem")]
+    pub membrane: bool,
+    /// Write the tables and charts of docs/results/accuracy.md: the main part, or with --membrane
+    /// its part. Only for problems at full size.
     #[arg(long, conflicts_with_all = ["quick", "problem", "out"])]
     pub write: bool,
     /// Write the page with its tables, all charts and accuracy.csv into this folder.
@@ -41,6 +46,7 @@ impl Options {
     pub fn command(&self) -> String {
         let mut words = vec!["accuracy".to_owned()];
         words.extend(self.quick.then(|| "--quick".to_owned()));
+        words.extend(self.membrane.then(|| "--membrane".to_owned()));
         words.extend(self.problem.iter().map(|name| format!("--problem {name}")));
         words.extend(self.write.then(|| "--write".to_owned()));
         words.extend(self.no_gpu.then(|| "--no-gpu".to_owned()));
@@ -56,9 +62,12 @@ mod tests {
     fn options_are_parsed() {
         let options = Options::try_parse_from(["accuracy", "--quick", "--problem", "sheet"]).unwrap();
         assert_eq!(options.command(), "accuracy --quick --problem sheet");
-        for wrong in
-            [&["--problem", "sheep"][..], &["--quick", "--write"], &["--write", "--problem", "block"]]
-        {
+        for wrong in [
+            &["--problem", "sheep"][..],
+            &["--quick", "--write"],
+            &["--write", "--problem", "block"],
+            &["--membrane", "--problem", "block"],
+        ] {
             let words = std::iter::once("accuracy").chain(wrong.iter().copied());
             assert_eq!(Options::try_parse_from(words).unwrap_err().exit_code(), 2, "{wrong:?}");
         }

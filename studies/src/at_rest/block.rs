@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 use crate::kit::Failure;
 
 /// Vertices along each axis.
-const SIZE: [usize; 3] = [13, 13, 5];
+pub const SIZE: [usize; 3] = [13, 13, 5];
 /// Distance of neighbors in m.
 const STEP: f64 = 0.005;
 /// Height in m by which every second vertex of the skin lies higher.
@@ -35,6 +35,7 @@ pub struct Elements<C: Constraint<N>, const N: usize> {
 
 /// The block after the cut.
 pub struct Block {
+    size: [usize; 3],
     /// Positions in the scan, in m.
     pub scan: Vec<Point3<f64>>,
     /// 1/kg; zero at the bottom, which is fixed.
@@ -56,13 +57,13 @@ pub struct Strips {
 }
 
 impl Block {
-    /// The block with a cut, or without one.
+    /// The block of `size` vertices along each axis with a cut, or without one.
     ///
     /// # Errors
     /// A material is refused.
-    pub fn new(is_cut: bool) -> Result<Self, Failure> {
-        let lattice = Kuhn::new(SIZE, STEP);
-        let top = (SIZE[2] - 1) as f64 * STEP;
+    pub fn new(size: [usize; 3], is_cut: bool) -> Result<Self, Failure> {
+        let lattice = Kuhn::new(size, STEP);
+        let top = (size[2] - 1) as f64 * STEP;
         let is_top = |x: &Point3<f64>| x.z > top - 0.5 * STEP;
         let mut scan = lattice.positions.clone();
         for x in scan.iter_mut().filter(|x| is_top(x)) {
@@ -78,7 +79,7 @@ impl Block {
         }
         let inverse_masses =
             scan.iter().zip(&masses).map(|(x, mass)| if x.z > 0.0 { 1.0 / mass } else { 0.0 }).collect();
-        let inside = top * ((SIZE[0] - 1) * (SIZE[1] - 1)) as f64 * STEP * STEP;
+        let inside = top * ((size[0] - 1) * (size[1] - 1)) as f64 * STEP * STEP;
         let edge_volume = inside / lattice.edges.len() as f64;
         let springs = Elements::new(&scan, lattice.edges, |[a, b], _| {
             Ok(distance_compliance((b - a).norm(), MODULI[0], edge_volume)?)
@@ -89,7 +90,7 @@ impl Block {
             lattice.tets.iter().flat_map(|&[a, b, c, d]| [[b, c, d], [a, d, c], [a, b, d], [a, c, b]]);
         let skin: Vec<[u32; 3]> =
             faces.filter(|face| face.iter().all(|&v| is_top(&lattice.positions[v as usize]))).collect();
-        let middle = (SIZE[0] - 1) as f64 * STEP / 2.0;
+        let middle = (size[0] - 1) as f64 * STEP / 2.0;
         let cut = |triangle: &&[u32; 3]| {
             let center =
                 triangle.iter().map(|&v| lattice.positions[v as usize].coords).sum::<Vector3<f64>>() / 3.0;
@@ -97,7 +98,17 @@ impl Block {
         };
         let (removed, kept): (Vec<&[u32; 3]>, Vec<_>) = skin.iter().partition(cut);
         let strips = [Strips::new(&scan, &kept)?, Strips::new(&scan, &removed)?];
-        Ok(Self { scan, inverse_masses, springs, volumes, strips })
+        Ok(Self { size, scan, inverse_masses, springs, volumes, strips })
+    }
+
+    /// The vertices of the skin on both sides of the middle of the cut.
+    pub fn lips(&self) -> [Vec<u32>; 2] {
+        let [columns, rows, layers] = self.size;
+        let lip = |column: usize| {
+            let near = rows / 2 - 1..=rows / 2 + 1;
+            near.map(|row| (column + columns * (row + rows * (layers - 1))) as u32).collect()
+        };
+        [lip(columns / 2), lip(columns / 2 + 1)]
     }
 
     /// The load of the kept strips and of the removed strips on each vertex, N: the negative of

@@ -1,7 +1,7 @@
 //! The scan at rest: ways to hold the tension of the skin in XPBD, compared by error against time,
 //! and how far from the wound the skin of scans moves.
 
-mod block;
+pub(crate) mod block;
 mod scans;
 mod ways;
 
@@ -14,7 +14,7 @@ use cutis_newton::{Options as Newton, Problem, relative_rms};
 use cutis_solver::{Stiffness, SystemBuilder, Values};
 use nalgebra::{Point3, Vector3};
 
-use block::{Block, Elements};
+use block::{Block, Elements, SIZE};
 use scans::Scans;
 use ways::{Setting, Way};
 
@@ -95,7 +95,7 @@ fn scans(page: Option<Page>, out: &mut dyn Write) -> Result<bool, Failure> {
 
 /// Largest displacement of the uncut block.
 fn uncut(checks: &mut Checks) -> Result<Table, Failure> {
-    let block = Block::new(false)?;
+    let block = Block::new(SIZE, false)?;
     let mut table = Table::new(["substeps", "iterations"].into_iter().chain(Way::ALL.map(Way::name)));
     let mut all = Vec::new();
     for setting in SETTINGS {
@@ -121,7 +121,7 @@ fn uncut(checks: &mut Checks) -> Result<Table, Failure> {
 
 /// Relative error of the displacements after the cut, and wall time.
 fn cut(checks: &mut Checks) -> Result<Table, Failure> {
-    let block = Block::new(true)?;
+    let block = Block::new(SIZE, true)?;
     let [wanted, contained] = [equilibrium(&block, false)?, equilibrium(&block, true)?];
     let difference = relative_rms(&contained, &wanted, &block.scan);
     let what = format!("cut: both energies have one equilibrium ({difference:.1e})");

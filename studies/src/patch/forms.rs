@@ -25,8 +25,8 @@ pub enum Form {
     ProjectedArea,
     /// Strips along and across.
     Strips,
-    /// Strips with the stiffness `T g0²`, which ignores that their images turn under tension.
-    StripsTooStiff,
+    /// Strips that measure the image of the sloped triangle: a control.
+    StripsSloped,
     /// Strips with normals that are tilted by 10° in random directions.
     StripsTilted,
     /// Strips along and across exchanged: a control.
@@ -49,7 +49,7 @@ impl Form {
         Self::AreaByMean,
         Self::ProjectedArea,
         Self::Strips,
-        Self::StripsTooStiff,
+        Self::StripsSloped,
         Self::StripsTilted,
         Self::StripsExchanged,
     ];
@@ -62,7 +62,7 @@ impl Form {
             Self::AreaByMean => "area, weighted by `2c/(1 + c²)`",
             Self::ProjectedArea => "area of the projection",
             Self::Strips => "strips",
-            Self::StripsTooStiff => "strips with `k = T g₀²`",
+            Self::StripsSloped => "control: strips with the slope",
             Self::StripsTilted => "strips, normals off by 10°",
             Self::StripsExchanged => "control: strips exchanged",
         }
@@ -95,7 +95,7 @@ impl Form {
                 Self::AreaByMean => vec![area(x, 2.0 * c / (1.0 + c * c))],
                 Self::ProjectedArea => vec![projected(facing, skin.normal)],
                 Self::Strips => strips(x, skin.normal, [skin.along, skin.across()], false),
-                Self::StripsTooStiff => strips(x, skin.normal, [skin.along, skin.across()], true),
+                Self::StripsSloped => strips(x, skin.normal, [skin.along, skin.across()], true),
                 Self::StripsTilted => {
                     let tilted =
                         skin.normal + direction(&mut random).cross(&skin.normal).normalize() * TILT.tan();
@@ -120,15 +120,10 @@ pub struct Piece {
 enum Kind {
     Area { params: [f64; 2], compliance: f64 },
     ProjectedArea { rest_area: f64, normal: Vector3<f64>, compliance: f64 },
-    Strip { params: [f64; 6], compliance: f64 },
+    Strip { params: [f64; 9], compliance: f64 },
 }
 
 impl Piece {
-    /// True if no constraint acts on the triangle.
-    pub fn is_omitted(&self) -> bool {
-        self.kinds.is_empty()
-    }
-
     /// `Σ −f_i·a X_i·b` in N·m after the map `x → x + strain·u (u·x)`, times the weight: the share
     /// of the triangle in the nominal tension.
     pub fn virial(&self, a: &Vector3<f64>, b: &Vector3<f64>, u: &Vector3<f64>, strain: f64) -> f64 {
@@ -176,8 +171,8 @@ fn projected(facing: f64, normal: Vector3<f64>) -> Kind {
     Kind::ProjectedArea { rest_area, normal, compliance: facing / MODULUS[0] }
 }
 
-/// Two strips, or none if the triangle does not face the normal.
-fn strips(x: &Triangle, normal: Vector3<f64>, directions: [Vector3<f64>; 2], too_stiff: bool) -> Vec<Kind> {
+/// Two strips, less those across which the triangle has no extent.
+fn strips(x: &Triangle, normal: Vector3<f64>, directions: [Vector3<f64>; 2], sloped: bool) -> Vec<Kind> {
     let strip = |k: usize| {
         let law = SkinStripLaw {
             tension_n_per_m: TENSION[k],
@@ -186,15 +181,15 @@ fn strips(x: &Triangle, normal: Vector3<f64>, directions: [Vector3<f64>; 2], too
             compression: 1.0,
         };
         let material = SkinStripMaterial::new(normal.into(), directions[k].into(), law).ok()?;
-        let shape = material.shape(x).ok()?;
-        let mut params: [f64; 6] = SkinStrip::from_rest(x, &material);
-        let mut compliance = material.compliance(x).ok()?;
-        if too_stiff {
-            let stiffness = MODULUS[k] * shape.steepness.powi(2);
-            compliance *= law.stiffness_n_per_m(shape.steepness) / stiffness;
-            params[2] = params[3] * (1.0 - TENSION[k] / stiffness);
+        let mut params: [f64; 9] = SkinStrip::from_rest(x, &material);
+        let compliance = material.compliance(x).ok()?;
+        if sloped {
+            let [.., x, y, z] = params;
+            let grown = (params[3].powi(2) + x * x + y * y + z * z).sqrt() / params[3];
+            // The rest length and the scan's length grow with the image.
+            params = [params[0], params[1], params[2] * grown, params[3] * grown, 0.0, 1.0, 0.0, 0.0, 0.0];
         }
         Some(Kind::Strip { params, compliance })
     };
-    (0..2).map(strip).collect::<Option<Vec<_>>>().unwrap_or_default()
+    (0..2).filter_map(strip).collect()
 }

@@ -18,8 +18,6 @@ pub struct Patch {
     pub tension: [f64; 2],
     /// The moduli along and across.
     pub modulus: [f64; 2],
-    /// Share of the triangles that hold no constraint.
-    pub omitted: f64,
 }
 
 impl Patch {
@@ -38,12 +36,7 @@ impl Patch {
         let principal = ((relative + relative.transpose()) * 0.5).symmetric_eigenvalues();
         let modulus =
             |a: usize| (tension(a, a, STRAIN) - tension(a, a, -STRAIN)) / (2.0 * STRAIN * form.modulus()[a]);
-        let omitted = pieces.iter().filter(|piece| piece.is_omitted()).count();
-        Self {
-            tension: [principal.min(), principal.max()],
-            modulus: [modulus(0), modulus(1)],
-            omitted: omitted as f64 / pieces.len() as f64,
-        }
+        Self { tension: [principal.min(), principal.max()], modulus: [modulus(0), modulus(1)] }
     }
 
     /// The larger over the smaller principal tension.
@@ -121,8 +114,6 @@ pub struct Measured {
     pub modulus: Spread,
     /// Largest difference of a principal tension from the wanted one.
     pub worst: f64,
-    /// Share of the triangles that hold no constraint, of all planes.
-    pub omitted: f64,
 }
 
 impl Measured {
@@ -136,7 +127,6 @@ impl Measured {
             ratio: Spread::of(patches.iter().map(Patch::ratio))?,
             modulus: Spread::of(patches.iter().flat_map(|patch| patch.modulus))?,
             worst: tensions().map(|t| (t - 1.0).abs()).fold(0.0, f64::max),
-            omitted: patches.iter().map(|patch| patch.omitted).sum::<f64>() / patches.len() as f64,
         })
     }
 }

@@ -13,6 +13,7 @@ use cutis_solver::{Formulation, Handle, Stiffness, System, SystemBuilder, Values
 use nalgebra::{Point3, Vector3};
 
 use super::Failure;
+use super::membrane::Membrane;
 use crate::sheet::Sheet;
 use cutis_test_kit::Kuhn;
 
@@ -127,6 +128,8 @@ pub struct Body {
     pub softening: Vec<f64>,
     /// Amplification of skin tension.
     pub amplification: f64,
+    /// Skin strips on the triangles, in place of skin tension.
+    pub membrane: Option<Membrane>,
     /// Handles that move vertices.
     pub handles: Vec<Handle>,
     /// Offset of the body from the origin.
@@ -158,7 +161,8 @@ impl Body {
         Self::new(sheet.positions, sheet.springs, sheet.triangles, Vec::new(), law)
     }
 
-    fn new(
+    /// A body at rest, without a membrane.
+    pub(super) fn new(
         rest: Vec<Point3<f64>>,
         edges: Vec<[u32; 2]>,
         triangles: Vec<[u32; 3]>,
@@ -177,6 +181,7 @@ impl Body {
             tets,
             law,
             amplification: 2.0,
+            membrane: None,
             handles: Vec::new(),
             offset: Vector3::zeros(),
             without_rest_size: false,
@@ -203,10 +208,11 @@ impl Body {
     /// # Errors
     /// The builder refuses the system.
     pub fn system<T: Scalar>(&self, scale: f64) -> Result<System<T>, Failure> {
+        if let Some(membrane) = &self.membrane {
+            return self.membrane_system(membrane, scale);
+        }
         let count = self.rest.len();
-        let start: Vec<Point3<f64>> = self.start.iter().map(|x| (x + self.offset) * scale).collect();
-        let velocities: Vec<_> = self.velocities.iter().map(|v| v.map(|v| T::constant(v * scale))).collect();
-        let mut builder = SystemBuilder::<T>::new(&start, &self.inverse_masses)?.velocities(&velocities)?;
+        let mut builder = self.builder::<T>(&self.start, scale)?;
         let size = if self.without_rest_size { 0.0 } else { 1.0 };
         if !self.edges.is_empty() {
             let params = |rest: &[_; 2]| Distance::from_rest(rest, &Default::default());
@@ -233,11 +239,31 @@ impl Body {
                 (self.stiffness(&self.triangles, 2, scale), groups(&self.triangles, count)?);
             builder = builder.add::<SkinTension, 3>(&self.triangles, &params, stiffness, &groups)?;
         }
+        Ok(self.with_handles(builder, scale)?.build())
+    }
+
+    /// The vertices at a scale, at `positions` in the units of the body.
+    pub(super) fn builder<T: Scalar>(
+        &self,
+        positions: &[Point3<f64>],
+        scale: f64,
+    ) -> Result<SystemBuilder<T>, Failure> {
+        let positions: Vec<Point3<f64>> = positions.iter().map(|x| (x + self.offset) * scale).collect();
+        let velocities: Vec<_> = self.velocities.iter().map(|v| v.map(|v| T::constant(v * scale))).collect();
+        Ok(SystemBuilder::<T>::new(&positions, &self.inverse_masses)?.velocities(&velocities)?)
+    }
+
+    /// Adds the handles at a scale.
+    pub(super) fn with_handles<T: Scalar>(
+        &self,
+        mut builder: SystemBuilder<T>,
+        scale: f64,
+    ) -> Result<SystemBuilder<T>, Failure> {
         for handle in &self.handles {
             let move_m = handle.move_m.map(|d| d * scale);
             builder = builder.handle(Handle { move_m, ..handle.clone() })?;
         }
-        Ok(builder.build())
+        Ok(builder)
     }
 
     fn params<P, const N: usize>(
@@ -250,7 +276,7 @@ impl Body {
     }
 
     /// Stiffness of a kind whose compliance grows by this power of the scale.
-    fn stiffness<T: Scalar, const N: usize>(
+    pub(super) fn stiffness<T: Scalar, const N: usize>(
         &self,
         elements: &[[u32; N]],
         power: i32,

@@ -6,6 +6,9 @@
 //! Vertex block descent steps implicitly, so there a compliance counts as it is. All sums are in
 //! `f64`, by [`evaluate`](cutis_solver::ConstraintSet::evaluate), from the stored parameters.
 //!
+//! A load that keeps a body at rest has a potential. The body then has no energy in its rest shape,
+//! and more in any other.
+//!
 //! Every projection rounds positions. An error of half a unit in the last place of a position
 //! changes the velocity by this error divided by the substep. These errors are a random walk that
 //! heats a body, and more so with shorter substeps. The energy that rounding can add counts as
@@ -13,7 +16,7 @@
 
 use cutis_constraints::Scalar;
 use cutis_solver::{Formulation, Settings, Stiffness, System};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::kit::larger;
 
@@ -27,13 +30,15 @@ pub const UNRESOLVED: f64 = 10.0;
 
 /// Relative rounding error of a rest size, in units of the machine epsilon of the number type.
 const ROUNDING: f64 = 64.0;
+/// Angle in rad by which a rest shape is turned where a constraint has no gradient at rest.
+const TURN: f64 = 0.01;
 
 /// Kinetic and elastic energy, and the potential of gravity, in J.
 #[derive(Clone, Copy, Debug)]
 pub struct Energy {
     /// `Σ ½m|v|²`.
     pub kinetic: f64,
-    /// `Σ ½C²/α`, with the effective compliance.
+    /// `Σ ½C²/α`, with the effective compliance, and the potential of the loads.
     pub elastic: f64,
     /// `−Σ m g·x`.
     pub gravity: f64,
@@ -45,6 +50,10 @@ pub struct Meter {
     /// Effective compliance of each constraint of each kind. Infinite for a constraint without
     /// effect.
     compliances: Vec<Vec<f64>>,
+    /// The rest shape in m.
+    rest: Vec<Point3<f64>>,
+    /// Elastic energy of the rest shape of a body with loads, in J. Zero without loads.
+    at_rest: f64,
     /// Energy that rounding of positions may add in one substep, in J.
     pub heat: f64,
     /// Energy that rounding of the rest shape may add, in J.
@@ -58,15 +67,22 @@ impl Meter {
         let strain = ROUNDING * T::default_epsilon().to_f64();
         let mut rounding = 0.0;
         let mut compliances = Vec::new();
+        // The turn of a strip has no gradient at rest, and the same one at every other angle.
+        let turn = Rotation3::from_euler_angles(TURN, TURN, TURN);
         for set in system.kinds() {
             let mut of_kind = Vec::with_capacity(set.len());
             for (k, tuple) in set.indices().chunks_exact(set.arity()).enumerate() {
-                let x: Vec<Point3<f64>> = tuple.iter().map(|&v| rest[v as usize]).collect();
                 let mut grad = vec![Vector3::zeros(); tuple.len()];
-                set.evaluate(k, &x, &mut grad);
                 let inverse_mass = |v: u32| system.vertices()[v as usize].inverse_mass().to_f64();
-                let weighted: f64 =
-                    tuple.iter().zip(&grad).map(|(&v, grad)| inverse_mass(v) * grad.norm_squared()).sum();
+                let mut weighted = |shape: &dyn Fn(Point3<f64>) -> Point3<f64>| -> f64 {
+                    let x: Vec<Point3<f64>> = tuple.iter().map(|&v| shape(rest[v as usize])).collect();
+                    set.evaluate(k, &x, &mut grad);
+                    tuple.iter().zip(&grad).map(|(&v, grad)| inverse_mass(v) * grad.norm_squared()).sum()
+                };
+                let weighted = match weighted(&|x| x) {
+                    0.0 => weighted(&|x| turn * x),
+                    weighted => weighted,
+                };
                 let resolved = h * h * weighted;
                 let compliance = match set.stiffness() {
                     _ if weighted == 0.0 => f64::INFINITY,
@@ -82,12 +98,18 @@ impl Meter {
             compliances.push(of_kind);
         }
         let heat = heat(system, settings);
-        Self { gravity: Vector3::from(settings.gravity_m_s2), compliances, heat, rounding }
+        let gravity = Vector3::from(settings.gravity_m_s2);
+        let mut meter = Self { gravity, compliances, rest: rest.to_vec(), at_rest: 0.0, heat, rounding };
+        if !system.loads().is_empty() {
+            meter.at_rest = meter.elastic(system, rest);
+        }
+        meter
     }
 
-    /// Elastic energy with every vertex at `x`.
+    /// Elastic energy and potential of the loads with every vertex at `x`. A body with loads has
+    /// none in its rest shape.
     pub fn elastic<T: Scalar>(&self, system: &System<T>, x: &[Point3<f64>]) -> f64 {
-        let mut sum = 0.0;
+        let mut sum = -self.at_rest - self.work_of_loads(system, x);
         for (set, compliances) in system.kinds().iter().zip(&self.compliances) {
             let mut grad = vec![Vector3::zeros(); set.arity()];
             for (k, tuple) in set.indices().chunks_exact(set.arity()).enumerate() {
@@ -97,6 +119,36 @@ impl Meter {
             }
         }
         sum
+    }
+
+    /// Work of the loads from the rest shape to `x`, without the mean motion. The sum of the loads
+    /// is zero but for rounding.
+    fn work_of_loads<T: Scalar>(&self, system: &System<T>, x: &[Point3<f64>]) -> f64 {
+        let moved = || x.iter().zip(&self.rest).map(|(x, rest)| x - rest);
+        let mean = moved().sum::<Vector3<f64>>() / x.len() as f64;
+        system.loads().iter().zip(moved()).map(|(load, moved)| load.map(T::to_f64).dot(&(moved - mean))).sum()
+    }
+
+    /// The largest value over rest size of any kind of constraint. In a body with loads it is the
+    /// difference to the value at rest, over the rest size and the value at rest.
+    pub fn error<T: Scalar>(&self, system: &System<T>) -> f64 {
+        if system.loads().is_empty() {
+            return system.residuals().iter().map(|residual| residual.max).fold(0.0, f64::max);
+        }
+        let x = positions(system);
+        let mut worst = 0.0f64;
+        for set in system.kinds() {
+            let mut grad = vec![Vector3::zeros(); set.arity()];
+            for (k, tuple) in set.indices().chunks_exact(set.arity()).enumerate() {
+                let mut value = |x: &[Point3<f64>]| {
+                    let corners: Vec<Point3<f64>> = tuple.iter().map(|&v| x[v as usize]).collect();
+                    set.evaluate(k, &corners, &mut grad)
+                };
+                let [now, at_rest] = [value(&x), value(&self.rest)];
+                worst = larger(worst, (now - at_rest).abs() / (set.rest_size(k).to_f64() + at_rest.abs()));
+            }
+        }
+        worst
     }
 
     /// The present energy.

@@ -1,8 +1,10 @@
 //! Input validation: each wrong input is refused by a typed error that names the element, vertex or
 //! key.
 
+use std::fmt::Display;
+
 use cutis_coloring::greedy;
-use cutis_constraints::{Distance, SkinTension, Volume};
+use cutis_constraints::{Distance, MaterialError, SkinStripLaw, SkinStripMaterial, SkinTension, Volume};
 use cutis_solver::{
     Formulation, Handle, Settings, Solver, SolverError, SolverReference, Stiffness, System, SystemBuilder,
 };
@@ -11,9 +13,9 @@ use nalgebra::{Point3, Vector3};
 use super::trial::{Outcome, Trial};
 
 /// A wrong input: its name, the attempt to use it, and the test of the error.
-type WrongInput = (&'static str, fn() -> Option<SolverError>, fn(&SolverError) -> bool);
+type WrongInput<E> = (&'static str, fn() -> Option<E>, fn(&E) -> bool);
 
-const WRONG_INPUTS: &[WrongInput] = &[
+const WRONG_INPUTS: &[WrongInput<SolverError>] = &[
     ("a coordinate that is NaN", || coordinate(f64::NAN), names_vertex),
     ("a coordinate that is infinite", || coordinate(f64::INFINITY), names_vertex),
     ("a coordinate beyond f32", || coordinate(1e39), names_vertex),
@@ -59,12 +61,56 @@ const WRONG_INPUTS: &[WrongInput] = &[
     ("damping that is NaN", || settings(|s| s.damping_per_s = f64::NAN), names_key),
 ];
 
+const WRONG_STRIPS: &[WrongInput<MaterialError>] = &[
+    (
+        "a strip whose tension is its modulus",
+        || strip(UP, ALONG, SkinStripLaw { tension_n_per_m: 60.0, ..LAW }),
+        |error| matches!(error, MaterialError::TensionTooLarge { .. }),
+    ),
+    (
+        "a strip with a tension below zero",
+        || strip(UP, ALONG, SkinStripLaw { tension_n_per_m: -1.0, ..LAW }),
+        |error| matches!(error, MaterialError::Negative { .. }),
+    ),
+    (
+        "a strip with a modulus that is NaN",
+        || strip(UP, ALONG, SkinStripLaw { modulus_n_per_m: f64::NAN, ..LAW }),
+        |error| matches!(error, MaterialError::NotPositive { .. }),
+    ),
+    (
+        "a strip with a stiffening that is infinite",
+        || strip(UP, ALONG, SkinStripLaw { stiffening: f64::INFINITY, ..LAW }),
+        |error| matches!(error, MaterialError::Negative { .. }),
+    ),
+    (
+        "a strip with a compression above 1",
+        || strip(UP, ALONG, SkinStripLaw { compression: 1.5, ..LAW }),
+        |error| matches!(error, MaterialError::CompressionOutOfRange { .. }),
+    ),
+    (
+        "a strip along the normal of the skin",
+        || strip(UP, UP, LAW),
+        |error| matches!(error, MaterialError::AlongNormal { .. }),
+    ),
+    (
+        "a strip with a normal of zero",
+        || strip([0.0; 3], ALONG, LAW),
+        |error| matches!(error, MaterialError::NotADirection { .. }),
+    ),
+    (
+        "a strip along the edge of a triangle that is seen from it",
+        || strip(SIDEWAYS, ALONG, LAW),
+        |error| matches!(error, MaterialError::NoWidth { .. }),
+    ),
+];
+
 /// One trial for each wrong input.
 pub fn all() -> Vec<Trial> {
-    WRONG_INPUTS.iter().map(attempt).collect()
+    let inputs = WRONG_INPUTS.iter().map(attempt);
+    inputs.chain(WRONG_STRIPS.iter().map(attempt)).collect()
 }
 
-fn attempt(&(name, attempt, names): &WrongInput) -> Trial {
+fn attempt<E: Display>(&(name, attempt, names): &WrongInput<E>) -> Trial {
     let mut trial = Trial::new(name, "builder", None);
     trial.outcome = match attempt() {
         None => Outcome::Failed("the input was accepted".into()),
@@ -144,6 +190,18 @@ fn from_rest(points: [[f64; 3]; 4]) -> Option<SolverError> {
         builder.add_from_rest::<Volume, 4>(&[[0, 1, 2, 3]], &Default::default(), soft(), &tets)
     };
     add().err()
+}
+
+const UP: [f64; 3] = [0.0, 0.0, 1.0];
+const SIDEWAYS: [f64; 3] = [0.0, 1.0, 0.0];
+const ALONG: [f64; 3] = [1.0, 0.0, 0.0];
+const LAW: SkinStripLaw =
+    SkinStripLaw { tension_n_per_m: 15.0, modulus_n_per_m: 60.0, stiffening: 0.0, compression: 0.0 };
+
+/// A strip on a triangle that faces up.
+fn strip(normal: [f64; 3], direction: [f64; 3], law: SkinStripLaw) -> Option<MaterialError> {
+    let triangle = [[0.0; 3], ALONG, [0.0, 1.0, 0.0]].map(Point3::from);
+    SkinStripMaterial::new(normal, direction, law).and_then(|material| material.compliance(&triangle)).err()
 }
 
 fn groups_refused(error: &impl ToString) -> SolverError {

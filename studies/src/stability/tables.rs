@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::trial::{Outcome, Trial};
+use super::trial::Trial;
 use crate::kit::{Table, larger, number, optional};
 
 /// The trial as one line of text.
@@ -59,10 +59,11 @@ pub fn formulation(trial: &Trial) -> Option<String> {
 }
 
 /// The cases with the largest energy ratio, one line for each case: its worst backend and scale.
+/// Known failures have their own table.
 pub fn worst(trials: &[Trial], count: usize) -> Table {
     let mut by_case: BTreeMap<&str, &Trial> = BTreeMap::new();
     let ratio = |trial: &Trial| trial.energy_ratio.unwrap_or(0.0);
-    for trial in trials {
+    for trial in trials.iter().filter(|trial| trial.known_failure.is_none()) {
         let entry = by_case.entry(&trial.case).or_insert(trial);
         if ratio(trial) > ratio(entry) {
             *entry = trial;
@@ -102,14 +103,42 @@ pub fn refused(trials: &[Trial]) -> Table {
     table
 }
 
-/// A description of every failed trial, for the end of a run.
+/// Number of trials that failed without a known reason.
 pub fn failures(trials: &[Trial]) -> usize {
-    trials.iter().filter(|trial| matches!(trial.outcome, Outcome::Failed(_))).count()
+    trials.iter().filter(|trial| !trial.outcome.is_good() && trial.known_failure.is_none()).count()
+}
+
+/// The cases that are known to fail, with the trial of the largest energy ratio among those that
+/// failed.
+pub fn known_failures(trials: &[Trial]) -> Table {
+    let mut by_case: BTreeMap<&str, Vec<&Trial>> = BTreeMap::new();
+    for trial in trials.iter().filter(|trial| trial.known_failure.is_some()) {
+        by_case.entry(&trial.case).or_default().push(trial);
+    }
+    let ratio = |trial: &Trial| trial.energy_ratio.unwrap_or(f64::INFINITY);
+    let mut table =
+        Table::new(["case", "trials", "failed", "backend", "scale", "energy ratio", "failure", "reason"]);
+    for (case, trials) in by_case {
+        let failed: Vec<&&Trial> = trials.iter().filter(|trial| !trial.outcome.is_good()).collect();
+        let worst = failed.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+        table.add([
+            case.to_owned(),
+            trials.len().to_string(),
+            failed.len().to_string(),
+            optional(worst, |trial| trial.backend.clone()),
+            optional(worst.and_then(|trial| trial.scale), |scale| format!("{scale:e}")),
+            optional(worst.and_then(|trial| trial.energy_ratio), number),
+            optional(worst, |trial| trial.outcome.note().to_owned()),
+            trials[0].known_failure.unwrap_or_default().to_owned(),
+        ]);
+    }
+    table
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stability::Outcome;
 
     #[test]
     fn a_summary_counts_outcomes_and_keeps_the_worst_ratio() {
@@ -132,6 +161,13 @@ mod tests {
         assert_eq!(failures(&trials), 1);
         let text = worst(&trials[..2], 9).markdown();
         assert!(text.contains("| springs, XPBD | cpu f32 | 1e-3 | FAILED | 2.00 |"), "{text}");
+        let known = Trial { known_failure: Some("too stiff"), ..trials[0].clone() };
+        assert_eq!(failures(std::slice::from_ref(&known)), 0);
+        let text = known_failures(&[known, trials[1].clone()]).markdown();
+        assert!(
+            text.contains("| springs, XPBD | 1 | 1 | cpu f32 | 1e-3 | 2.00 | grew | too stiff |"),
+            "{text}"
+        );
         assert!(refused(&trials).markdown().contains("| a mass, NaN | refused | vertex 1: \"mass\" |"));
     }
 }

@@ -73,6 +73,8 @@ pub struct Trial {
     pub rounding_share: Option<f64>,
     /// Wall time, s.
     pub wall_s: f64,
+    /// Why the case does not meet its requirement, if that is known.
+    pub known_failure: Option<&'static str>,
 }
 
 impl Trial {
@@ -88,6 +90,7 @@ impl Trial {
             error: None,
             rounding_share: None,
             wall_s: 0.0,
+            known_failure: None,
         }
     }
 }

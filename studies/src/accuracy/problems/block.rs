@@ -42,12 +42,14 @@ pub fn pulled(size: [usize; 3]) -> Result<Problem, Failure> {
             100.0 * STRETCH
         ),
         xpbd: system(size, Some(handle))?,
+        vbd: None,
         pbd: None,
         settings: settings(),
         instants: vec![2, 4],
         compared_at: 5,
         most_frames: 60,
         opening: None,
+        few_settings: false,
     })
 }
 

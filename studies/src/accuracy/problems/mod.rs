@@ -1,6 +1,7 @@
 //! The problems: bodies, their motion, and the frames of comparison.
 
 pub mod block;
+pub mod membrane;
 pub mod scene;
 pub mod sheet;
 
@@ -9,6 +10,7 @@ use cutis_solver::{Settings, System};
 use nalgebra::Point3;
 
 use super::Failure;
+use crate::at_rest;
 
 /// A function that measures the opening of a wound.
 pub type Opening = Box<dyn Fn(&[Point3<f64>]) -> f64>;
@@ -19,8 +21,11 @@ pub struct Problem {
     pub name: &'static str,
     /// Description.
     pub what: String,
-    /// The body with compliances.
+    /// The body with compliances, for XPBD and the references.
     pub xpbd: System<f32>,
+    /// The body for vertex block descent, if it needs other constraints. It has the same energy up
+    /// to a constant.
+    pub vbd: Option<System<f32>>,
     /// The body with the stiffness of PBD, if the problem has one.
     pub pbd: Option<System<f32>>,
     /// Time step, outer forces and damping. Substeps and iterations come from the configuration.
@@ -33,10 +38,15 @@ pub struct Problem {
     pub most_frames: u32,
     /// Opening of the wound and its unit.
     pub opening: Option<(Opening, &'static str)>,
+    /// True if only few settings run.
+    pub few_settings: bool,
 }
 
-/// The names of all problems, in order.
+/// The names of the problems of the main part of the page, in order.
 pub const NAMES: [&str; 6] = ["sheet", "incision", "abdomen", "block", "hanging", "drag"];
+
+/// The problem that has its own part of the page.
+pub const MEMBRANE: &str = "membrane";
 
 /// The problems of `--quick`.
 pub const QUICK: [&str; 3] = ["sheet", "incision", "hanging"];
@@ -45,7 +55,7 @@ pub const QUICK: [&str; 3] = ["sheet", "incision", "hanging"];
 /// printed.
 ///
 /// # Errors
-/// The builder refuses the problem, or the name is not in [`NAMES`].
+/// The builder refuses the problem, or there is no problem of this name.
 pub fn named(name: &str, quick: bool) -> Result<Option<Problem>, Failure> {
     let block_size = if quick { [9, 4, 4] } else { [25, 9, 9] };
     match name {
@@ -55,6 +65,7 @@ pub fn named(name: &str, quick: bool) -> Result<Option<Problem>, Failure> {
         "block" => block::pulled(block_size).map(Some),
         "hanging" => block::hanging(block_size).map(Some),
         "drag" => scene::drag(if quick { 25.0 } else { 12.0 }).map(Some),
+        MEMBRANE => membrane::wound(if quick { [9, 9, 4] } else { at_rest::block::SIZE }).map(Some),
         other => bail!("there is no problem `{other}`; choose one of {}", NAMES.join(", ")),
     }
 }

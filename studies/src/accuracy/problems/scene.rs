@@ -95,11 +95,13 @@ fn from_scene(
         name,
         what,
         xpbd: system,
+        vbd: None,
         pbd: Some(pbd),
         settings,
         instants: vec![1, 4],
         compared_at: 5,
         most_frames: 120,
         opening,
+        few_settings: false,
     })
 }

@@ -32,6 +32,7 @@ pub fn wound(nx: i64) -> Result<Problem, Failure> {
              with a slit of half-length {half_length}; it opens"
         ),
         xpbd,
+        vbd: None,
         pbd: Some(pbd),
         settings: Settings {
             formulation: Formulation::Xpbd,
@@ -43,6 +44,7 @@ pub fn wound(nx: i64) -> Result<Problem, Failure> {
         compared_at: 4,
         most_frames: 60,
         opening: Some((Box::new(move |x| sheet.opening(x)), "spacings")),
+        few_settings: false,
     })
 }
 

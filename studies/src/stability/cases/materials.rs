@@ -4,22 +4,11 @@
 use cutis_test_kit::Random;
 use nalgebra::Point3;
 
-use super::deformed;
+use super::{UNDAMPED, deformed};
 use crate::stability::body::{Body, Compliances, Law};
 use crate::stability::case::{Case, End, Run};
 
 const BLOCK: [usize; 3] = [3, 3, 3];
-/// One undamped second.
-const UNDAMPED: Run = Run {
-    h: 1.0 / 240.0,
-    substeps: 4,
-    iterations: 1,
-    samples: 60,
-    frames: 1,
-    gravity: [0.0; 3],
-    damping_per_s: 0.0,
-    relaxation: 1.0,
-};
 
 pub fn cases() -> Vec<Case> {
     let mut cases = compliances();

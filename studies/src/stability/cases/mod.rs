@@ -1,6 +1,7 @@
-//! The cases in groups: materials, collapsed shapes, limits of bodies, time and forces.
+//! The cases in groups: materials, collapsed shapes, limits of bodies, time and forces, membranes.
 
 mod materials;
+mod membranes;
 mod places;
 mod shapes;
 mod time;
@@ -8,8 +9,20 @@ mod time;
 use cutis_test_kit::Random;
 use nalgebra::Point3;
 
-use super::case::Case;
+use super::case::{Case, Run};
 use super::options::Effort;
+
+/// One undamped second.
+const UNDAMPED: Run = Run {
+    h: 1.0 / 240.0,
+    substeps: 4,
+    iterations: 1,
+    samples: 60,
+    frames: 1,
+    gravity: [0.0; 3],
+    damping_per_s: 0.0,
+    relaxation: 1.0,
+};
 
 /// All cases to run at this effort.
 pub fn all(effort: Effort) -> Vec<Case> {
@@ -17,6 +30,7 @@ pub fn all(effort: Effort) -> Vec<Case> {
     cases.extend(shapes::cases());
     cases.extend(places::cases());
     cases.extend(time::cases(effort));
+    cases.extend(membranes::cases());
     cases.retain(|case| case.quick || effort != Effort::Quick);
     cases
 }
