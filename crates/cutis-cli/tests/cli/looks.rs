@@ -50,10 +50,10 @@ fn the_summary_and_the_table_describe_the_lines_of_tension() {
     let printed = call(&desk, &format!("run scene.toml --out run {membrane}")).stdout;
     let report = json(&std::fs::read(desk.path("run/report.json")).unwrap());
     let table = call(&desk, &format!("check scene.toml {membrane}")).stdout;
-    let [coverage, facing_away, triangles] =
-        ["coverage", "facing_away", "triangles"].map(|key| report["membrane"][key].as_f64().unwrap());
+    let [coverage, of_facets, triangles] =
+        ["coverage", "normals_from_facets", "triangles"].map(|key| report["membrane"][key].as_f64().unwrap());
     let expected = format!(
-        "a direction on {:.1} % of the skin; {facing_away} of {triangles} triangles face away",
+        "a direction on {:.1} % of the skin; {of_facets} of {triangles} triangles have the normal",
         100.0 * coverage
     );
     for (text, line) in [(&printed, "lines of tension: "), (&table, "lines of tension ")] {

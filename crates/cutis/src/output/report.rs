@@ -209,25 +209,20 @@ pub struct MembraneReport {
     /// None if the scene gives no directions, so that the skin is isotropic.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
-    /// Triangles that face away from the smooth skin and hold no tension.
-    pub facing_away: usize,
     /// Triangles whose normal is only the mean of the facets around them, because the tissue is
     /// thinner than the blur from which normals follow.
     pub normals_from_facets: usize,
 }
 
 impl MembraneReport {
-    /// One line about the coverage and the triangles without tension.
+    /// One line about the coverage and the normals.
     pub fn summary(&self) -> String {
-        let Self { triangles, coverage, facing_away, normals_from_facets } = self;
+        let Self { triangles, coverage, normals_from_facets } = self;
         let lines = match coverage {
             Some(coverage) => format!("a direction on {:.1} % of the skin", 100.0 * coverage),
             None => "no direction: the skin is isotropic".to_owned(),
         };
-        format!(
-            "{lines}; {facing_away} of {triangles} triangles face away and hold no tension, \
-             {normals_from_facets} have the normal of their facets"
-        )
+        format!("{lines}; {normals_from_facets} of {triangles} triangles have the normal of their facets")
     }
 }
 
