@@ -73,7 +73,7 @@ impl TetMesh {
     }
 
     /// Number of edges that no divided tet has.
-    pub(crate) fn whole_edges(&self) -> usize {
+    pub fn whole_edges(&self) -> usize {
         self.copies.as_ref().map_or(self.edges.len(), |copies| copies.edges)
     }
 

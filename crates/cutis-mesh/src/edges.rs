@@ -100,17 +100,20 @@ impl TetMesh {
     /// direction. There are 14 colors for `kuhn6` (7 directions) and 18 for `five` (9 directions).
     /// The copies of edges along a cut add as many colors for each number among the copies.
     pub fn edge_colors(&self) -> Vec<u16> {
+        let color = |(n, edge): (usize, &[u32; 2])| self.edge_color(*edge, self.copy_of_edge(n));
+        self.edges.par_iter().enumerate().map(color).collect()
+    }
+
+    /// Color of a copy of a lattice edge, from its nodes and its number among the copies.
+    pub fn edge_color(&self, [a, b]: [u32; 2], copy: u8) -> u16 {
         let directions = &self.lattice.stencil().directions;
         let count = directions.iter().flatten().map(|d| d.number + 1).max().unwrap_or(0);
-        let color = |(n, &[a, b]): (usize, &[u32; 2])| {
-            let (p, q) = (self.point(a), self.point(b));
-            let step: [i8; 3] = std::array::from_fn(|axis| (q[axis] as isize - p[axis] as isize) as i8);
-            let axis = step.iter().position(|&s| s != 0).unwrap_or(0);
-            let own = &directions[p.iter().sum::<usize>() & 1];
-            let number = own.iter().find(|d| d.step == step).map_or(0, |d| d.number);
-            2 * (number + count * u16::from(self.copy_of_edge(n))) + (p[axis] & 1) as u16
-        };
-        self.edges.par_iter().enumerate().map(color).collect()
+        let (p, q) = (self.point(a), self.point(b));
+        let step: [i8; 3] = std::array::from_fn(|axis| (q[axis] as isize - p[axis] as isize) as i8);
+        let axis = step.iter().position(|&s| s != 0).unwrap_or(0);
+        let own = &directions[p.iter().sum::<usize>() & 1];
+        let number = own.iter().find(|d| d.step == step).map_or(0, |d| d.number);
+        2 * (number + count * u16::from(copy)) + (p[axis] & 1) as u16
     }
 
     /// Colors of the vertices in closed form. Two vertices of one color never belong to the same
@@ -137,16 +140,19 @@ impl TetMesh {
     /// (i + j + k) mod 4: 24 colors. For `five` it is 8t + a number from the parities of i, j and
     /// k: 40 colors. Copies of divided tets add as many colors for each number among the copies.
     pub fn tet_colors(&self) -> Vec<u16> {
-        let per_cell = self.lattice.stencil().tets[0].len();
-        let color = |(n, tet): (usize, &[u32; 4])| {
-            let ([i, j, k], t) = self.cell_of(tet);
-            let t = t + per_cell * usize::from(self.copy_of_tet(n).0);
-            let color = match self.lattice.split() {
-                Split::Kuhn6 => 4 * t + (i + j + k) % 4,
-                Split::Five => 8 * t + (i & 1) + 2 * (j & 1) + 4 * (k & 1),
-            };
-            color as u16
-        };
+        let color = |(n, tet): (usize, &[u32; 4])| self.tet_color(tet, self.copy_of_tet(n).0);
         self.tets.par_iter().enumerate().map(color).collect()
+    }
+
+    /// Color of a copy of a lattice tet, from its nodes and its number among the copies.
+    pub fn tet_color(&self, nodes: &[u32; 4], copy: u8) -> u16 {
+        let per_cell = self.lattice.stencil().tets[0].len();
+        let ([i, j, k], t) = self.cell_of(nodes);
+        let t = t + per_cell * usize::from(copy);
+        let color = match self.lattice.split() {
+            Split::Kuhn6 => 4 * t + (i + j + k) % 4,
+            Split::Five => 8 * t + (i & 1) + 2 * (j & 1) + 4 * (k & 1),
+        };
+        color as u16
     }
 }

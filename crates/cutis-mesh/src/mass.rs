@@ -1,14 +1,22 @@
 //! Rest volumes of tets and edges, and lumped masses.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
+use crate::sever::TetCopy;
 use crate::{Split, TetMesh};
 
 impl TetMesh {
     /// Rest volume of each tet in m³. A copy of a divided tet has its share.
     pub fn tet_volumes(&self) -> Vec<f32> {
         (0..self.tets.len()).into_par_iter().map(|tet| self.held_volume(tet) as f32).collect()
+    }
+
+    /// Rest volume in m³ that a copy of a divided tet holds.
+    pub fn copy_volume(&self, copy: &TetCopy) -> f64 {
+        self.volume(&copy.nodes) * f64::from(copy.share)
     }
 
     fn held_volume(&self, tet: usize) -> f64 {
@@ -61,13 +69,28 @@ impl TetMesh {
     ///
     /// A vertex without tets, as in an incision, has mass 0.
     pub fn masses(&self, density_kg_m3: &dyn Fn(f32) -> f32) -> Vec<f32> {
+        self.masses_of(0..self.tets.len(), density_kg_m3).into_iter().map(|mass| mass as f32).collect()
+    }
+
+    /// The part of each vertex's mass in kg that it has from some tets of the mesh.
+    pub fn masses_of(&self, tets: Range<usize>, density_kg_m3: &dyn Fn(f32) -> f32) -> Vec<f64> {
         let mut masses = vec![0f64; self.positions.len()];
-        for (number, tet) in self.tets.iter().enumerate() {
-            let hu = tet.iter().map(|&v| self.hu[v as usize]).sum::<f32>() / 4.0;
-            let quarter = self.held_volume(number) * f64::from(density_kg_m3(hu)) / 4.0;
+        for number in tets {
+            let tet = &self.tets[number];
+            let quarter = self.held_volume(number) * self.density(tet, density_kg_m3) / 4.0;
             tet.iter().for_each(|&v| masses[v as usize] += quarter);
         }
-        masses.into_iter().map(|mass| mass as f32).collect()
+        masses
+    }
+
+    /// Mass in kg of a tet of the lattice with these corners.
+    pub fn tet_mass(&self, tet: &[u32; 4], density_kg_m3: &dyn Fn(f32) -> f32) -> f64 {
+        self.volume(tet) * self.density(tet, density_kg_m3)
+    }
+
+    fn density(&self, tet: &[u32; 4], density_kg_m3: &dyn Fn(f32) -> f32) -> f64 {
+        let hu = tet.iter().map(|&v| self.hu[v as usize]).sum::<f32>() / 4.0;
+        f64::from(density_kg_m3(hu))
     }
 
     pub(crate) fn volume(&self, tet: &[u32; 4]) -> f64 {

@@ -1,7 +1,7 @@
 //! The solver of this backend: a simulation and, for more than one thread, a thread pool.
 
 use cutis_constraints::Scalar;
-use cutis_solver::{Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed};
+use cutis_solver::{Change, Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed};
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -87,5 +87,9 @@ impl<T: Scalar> Solver<T> for SolverCpu<T> {
 
     fn restore(&mut self, x: &[Point3<T>], v: &[Vector3<T>], frame: u64) -> Result<(), SolverError> {
         self.simulation.restore(x, v, frame)
+    }
+
+    fn change(&mut self, change: &Change<T>) -> Result<(), SolverError> {
+        self.simulation.change(change)
     }
 }

@@ -132,10 +132,14 @@ impl DeviceBody {
         }
     }
 
-    /// Uploads the host's positions and velocities.
+    /// Uploads the host's positions, masses, velocities and loads.
     pub(crate) fn upload(&self, gpu: &Gpu, simulation: &Simulation<f32>) -> Result<(), GpuError> {
-        gpu.write(&self.vertices, 0, bytemuck::cast_slice(simulation.system().vertices()))?;
-        gpu.write(&self.velocities, 0, &padded(simulation.system().velocities()))
+        let system = simulation.system();
+        gpu.write(&self.vertices, 0, bytemuck::cast_slice(system.vertices()))?;
+        if let Some(loads) = &self.loads {
+            gpu.write(loads, 0, &padded(system.loads()))?;
+        }
+        gpu.write(&self.velocities, 0, &padded(system.velocities()))
     }
 
     /// Resets the status.

@@ -2,7 +2,8 @@
 
 use cutis_gpu::{Buffer, Gpu, GpuError};
 use cutis_solver::{
-    Clock, MemoryPart, Method, Residual, Settings, Simulation, Solver, SolverError, StepProfile, System,
+    Change, Clock, MemoryPart, Method, Residual, Settings, Simulation, Solver, SolverError, StepProfile,
+    System,
 };
 use nalgebra::{Point3, Vector3};
 
@@ -111,6 +112,19 @@ struct Workload {
     threads: usize,
 }
 
+impl Workload {
+    fn of_substep(body: &DeviceBody, constraints: &Constraints, simulation: &Simulation<f32>) -> Self {
+        // Prediction, handles and the check for finite positions.
+        let passes = 3;
+        let iterations = simulation.settings().iterations as usize;
+        let iteration = constraints.workload(simulation);
+        Self {
+            dispatches: passes * body.check.dispatches() + iteration.dispatches.saturating_mul(iterations),
+            threads: passes * body.vertices.len() + iteration.threads.saturating_mul(iterations),
+        }
+    }
+}
+
 /// An error in a step.
 enum StepError {
     Device(GpuError),
@@ -135,14 +149,7 @@ impl SolverGpu {
         let body = DeviceBody::new(gpu, &simulation)?;
         let constraints = Constraints::new(gpu, &body, &simulation)?;
         let handles = Handles::new(gpu, &body, simulation.system(), &settings)?;
-        // Prediction, handles and the check for finite positions.
-        let passes = 3;
-        let iterations = settings.iterations as usize;
-        let iteration = constraints.workload(&simulation);
-        let substep = Workload {
-            dispatches: passes * body.check.dispatches() + iteration.dispatches.saturating_mul(iterations),
-            threads: passes * body.vertices.len() + iteration.threads.saturating_mul(iterations),
-        };
+        let substep = Workload::of_substep(&body, &constraints, &simulation);
         Ok(Self {
             gpu: gpu.clone(),
             read_at: simulation.clock(),
@@ -281,6 +288,37 @@ impl SolverGpu {
         Ok(())
     }
 
+    /// Brings the device up to date after a change of the host's copy. Kinds that did not change stay
+    /// on the device, unless they are stored by vertices.
+    fn rebuild(&mut self, change: &Change<f32>) -> Result<(), GpuError> {
+        let simulation = &self.simulation;
+        if self.body.loads.is_some() == simulation.system().loads().is_empty() {
+            // The kernels with and without loads differ.
+            self.body = DeviceBody::new(&self.gpu, simulation)?;
+            self.constraints = Constraints::new(&self.gpu, &self.body, simulation)?;
+            let (system, settings) = (simulation.system(), simulation.settings());
+            self.handles = Handles::new(&self.gpu, &self.body, system, settings)?;
+        } else {
+            self.body.upload(&self.gpu, simulation)?;
+            match &mut self.constraints {
+                Constraints::Projected(kinds) => {
+                    for (number, kind) in &change.kinds {
+                        kinds[*number] =
+                            DeviceKind::new(&self.gpu, &self.body, &**kind, simulation.settings())?;
+                    }
+                }
+                Constraints::Descent(_) => {
+                    self.constraints = Constraints::new(&self.gpu, &self.body, simulation)?;
+                }
+            }
+        }
+        self.gather = None;
+        self.reductions.clear();
+        self.substep = Workload::of_substep(&self.body, &self.constraints, simulation);
+        self.device_stale = false;
+        Ok(())
+    }
+
     /// Reads vertices and velocities from the device.
     fn read_body(&self) -> Result<[Vec<[f32; 4]>; 2], GpuError> {
         let all = 0..self.body.vertices.len();
@@ -319,6 +357,13 @@ impl Solver<f32> for SolverGpu {
         self.simulation.restore(x, v, frame)?;
         (self.host_current, self.device_stale, self.read_at) = (true, true, self.simulation.clock());
         self.upload_if_stale().map_err(|error| self.step_error(&error))
+    }
+
+    /// Reads the body, changes it on the host, and uploads what changed.
+    fn change(&mut self, change: &Change<f32>) -> Result<(), SolverError> {
+        self.refresh()?;
+        self.simulation.change(change)?;
+        self.rebuild(change).map_err(|error| self.step_error(&error))
     }
 
     fn simulation(&self) -> &Simulation<f32> {

@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::batch::Batch;
 use crate::system::check_finite;
-use crate::{Handle, KinematicHandle, SolverError, Stiffness, System, Vertex};
+use crate::{Handle, Kind, KinematicHandle, SolverError, Stiffness, System, Vertex};
 
 /// Collects vertices, kinds of constraints and handles into a [`System`].
 pub struct SystemBuilder<T: Scalar> {
@@ -194,6 +194,12 @@ impl<T: Scalar> SystemBuilder<T> {
         let handle = KinematicHandle::new(handles.len(), handle, vertices, &mut self.kinematic)?;
         handles.push(handle);
         Ok(self)
+    }
+
+    /// Takes the kinds that were added so far, and leaves none. Use it with
+    /// [`Change`](crate::Change).
+    pub fn take_kinds(&mut self) -> Vec<Kind<T>> {
+        std::mem::take(&mut self.system.kinds)
     }
 
     /// Returns the finished system.

@@ -174,6 +174,22 @@ impl<T: Scalar> Descent<T> {
         incidences.map_err(groups_error)
     }
 
+    /// Replaces the constraints at each vertex of one kind.
+    pub(crate) fn set_incidence(&mut self, kind: usize, incidence: Incidence) {
+        self.incidences[kind] = incidence;
+    }
+
+    /// Replaces the groups by verified ones.
+    pub(crate) fn set_groups(&mut self, groups: Groups) {
+        self.groups = groups;
+    }
+
+    /// Colors the vertices again.
+    pub(crate) fn color_again(&mut self, system: &System<T>) -> Result<(), SolverError> {
+        self.groups = groups_of(system, &tuples_of(system.kinds()), &self.incidences)?;
+        Ok(())
+    }
+
     /// Returns the moving vertices by color. Two vertices of one color never share a constraint.
     pub fn groups(&self) -> &Groups {
         &self.groups
@@ -212,7 +228,7 @@ fn groups_of<T: Scalar>(
     Ok(groups)
 }
 
-fn groups_error(error: ColoringError) -> SolverError {
+pub(crate) fn groups_error(error: ColoringError) -> SolverError {
     SolverError::Groups { kind: "vertices", reason: error.to_string() }
 }
 
@@ -220,7 +236,7 @@ fn tuples_of<T: Scalar>(kinds: &[Kind<T>]) -> Vec<Tuples<'_>> {
     kinds.iter().map(|kind| Tuples { vertices: kind.indices(), arity: kind.arity() }).collect()
 }
 
-fn check_compliances<T: Scalar>(kind: &Kind<T>) -> Result<(), SolverError> {
+pub(crate) fn check_compliances<T: Scalar>(kind: &Kind<T>) -> Result<(), SolverError> {
     use crate::Values;
     let (found, expected) = (kind.stiffness().formulation(), Formulation::Vbd);
     if !accepts(found, expected) {

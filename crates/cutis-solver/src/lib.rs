@@ -49,6 +49,7 @@
 
 mod batch;
 mod builder;
+mod change;
 mod clock;
 mod color;
 mod colored;
@@ -71,6 +72,7 @@ mod system;
 mod vertex;
 
 pub use builder::SystemBuilder;
+pub use change::Change;
 pub use clock::Clock;
 pub use color::{ConstraintColor, VertexColor};
 pub use colored::{Colored, ColoredVertices};
@@ -78,6 +80,7 @@ pub use descent::{Descent, DescentStep, VertexForce};
 pub use error::SolverError;
 pub use handle::{Handle, KinematicHandle};
 pub use kernel::{Pbd, Projection, Rule, Xpbd, project};
+pub use loads::add_forces;
 pub use measures::{Energy, MemoryPart, Momentum, Residual};
 pub use passes::{Integrator, VertexBlock, VertexPass};
 pub use reference::{Serial, SolverReference};

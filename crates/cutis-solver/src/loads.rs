@@ -10,13 +10,14 @@
 //! sag-free initialization, Hsu et al., *A General Two-Stage Initialization for Sag-Free Deformable
 //! Simulations*, ACM Trans. Graph. 41 (2022).
 
+use cutis_coloring::{Incidence, Tuples};
 use cutis_constraints::Scalar;
 use nalgebra::Vector3;
 
 use crate::batch::VertexChunk;
-use crate::descent::{Descent, VertexForce};
+use crate::descent::{VertexForce, check_compliances, groups_error};
 use crate::system::check_finite;
-use crate::{SolverError, System};
+use crate::{Kind, SolverError, System, Vertex};
 
 impl<T: Scalar> System<T> {
     /// Returns the loads in N, one per vertex; empty without loads.
@@ -49,15 +50,43 @@ impl<T: Scalar> System<T> {
     /// Returns the errors of [`Descent::new`] for a kind whose forces are not defined: a PBD
     /// stiffness, or a compliance of zero.
     pub fn constraint_forces(&self) -> Result<Vec<Vector3<T>>, SolverError> {
-        let incidences = Descent::incidences_of(self)?;
         let indices: Vec<u32> = (0..self.vertices.len() as u32).collect();
         let mut forces = vec![VertexForce::none(); indices.len()];
-        for (kind, incidence) in self.kinds.iter().zip(&incidences) {
-            let vertices = self.vertices.as_slice();
-            kind.vertex_forces(VertexChunk { incidence, indices: &indices, vertices, forces: &mut forces });
-        }
+        add_forces(&self.kinds, &self.vertices, &indices, &mut forces)?;
         Ok(forces.iter().map(|force| force.force).collect())
     }
+}
+
+/// Adds the forces of some kinds on some vertices to `forces`, one per entry of `wanted`. The sum
+/// has the operations and the order of vertex block descent.
+///
+/// # Errors
+/// Returns the errors of [`System::constraint_forces`], and [`SolverError::VertexLength`] if the
+/// lengths of `wanted` and `forces` differ, or a kind was built for another number of vertices.
+///
+/// # Panics
+/// Panics if a wanted vertex does not exist.
+pub fn add_forces<T: Scalar>(
+    kinds: &[Kind<T>],
+    vertices: &[Vertex<T>],
+    wanted: &[u32],
+    forces: &mut [VertexForce<T>],
+) -> Result<(), SolverError> {
+    if wanted.len() != forces.len() {
+        let (found, expected) = (forces.len(), wanted.len());
+        return Err(SolverError::VertexLength { what: "forces", found, expected });
+    }
+    for kind in kinds {
+        if kind.vertex_count() != vertices.len() {
+            let (found, expected) = (vertices.len(), kind.vertex_count());
+            return Err(SolverError::VertexLength { what: "vertices of a kind", found, expected });
+        }
+        check_compliances(kind)?;
+        let tuples = Tuples { vertices: kind.indices(), arity: kind.arity() };
+        let incidence = &Incidence::new(tuples, vertices.len()).map_err(groups_error)?;
+        kind.vertex_forces(VertexChunk { incidence, indices: wanted, vertices, forces });
+    }
+    Ok(())
 }
 
 /// The load of vertex `index`; zero if there are no loads.

@@ -4,8 +4,8 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    ConstraintColor, Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed, Vertex,
-    VertexBlock, VertexColor,
+    Change, ConstraintColor, Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed,
+    Vertex, VertexBlock, VertexColor,
 };
 
 /// Runs every pass on the calling thread, in ascending order.
@@ -61,6 +61,10 @@ impl<T: Scalar> Solver<T> for SolverReference<T> {
 
     fn restore(&mut self, x: &[Point3<T>], v: &[Vector3<T>], frame: u64) -> Result<(), SolverError> {
         self.simulation.restore(x, v, frame)
+    }
+
+    fn change(&mut self, change: &Change<T>) -> Result<(), SolverError> {
+        self.simulation.change(change)
     }
 
     fn simulation(&self) -> &Simulation<T> {

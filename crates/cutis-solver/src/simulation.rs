@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 use crate::descent::accepts;
 use crate::passes::Integrator;
 use crate::{
-    Clock, ConstraintColor, ConstraintSet, Descent, Formulation, Schedule, Settings, SolverError, Step,
-    StepProfile, System, Vertex, VertexBlock, VertexColor, VertexPass,
+    Change, Clock, ConstraintColor, ConstraintSet, Descent, Formulation, Schedule, Settings, SolverError,
+    Step, StepProfile, System, Vertex, VertexBlock, VertexColor, VertexPass,
 };
 
 /// Executes the passes of a substep on the host, with one thread or with several.
@@ -217,6 +217,35 @@ impl<T: Scalar> Simulation<T> {
     ) -> Result<(), SolverError> {
         self.system.restore(positions, velocities)?;
         self.clock = Clock { frame, substep: 0 };
+        Ok(())
+    }
+
+    /// Changes parts of the body between two frames. Velocities, clock and all other parts stay.
+    ///
+    /// # Errors
+    /// Returns an error for a kind, a vertex or a value that does not exist or is out of range, and
+    /// the errors of [`Descent::new`]. After an error of the second sort the simulation must not be
+    /// stepped.
+    pub fn change(&mut self, change: &Change<T>) -> Result<(), SolverError> {
+        let moved: Vec<bool> = match &self.method {
+            Method::Project(_) => Vec::new(),
+            Method::Descend(_) => {
+                self.system.vertices.iter().map(|vertex| vertex.inverse_mass() > T::zero()).collect()
+            }
+        };
+        self.system.change(change)?;
+        self.schedule = match &mut self.method {
+            Method::Project(_) => Schedule::new(&self.system.kinds, &self.settings),
+            Method::Descend(descent) => {
+                descent.change(&self.system, change, &moved)?;
+                Schedule::of_vertices(descent.groups(), &self.settings)
+            }
+        };
+        if self.settings.keeps_multipliers() {
+            for (number, kind) in &change.kinds {
+                self.multipliers[*number] = vec![T::zero(); kind.len()];
+            }
+        }
         Ok(())
     }
 

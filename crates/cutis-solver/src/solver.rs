@@ -4,7 +4,8 @@ use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
-    Energy, MemoryPart, Momentum, Residual, Schedule, Settings, Simulation, SolverError, StepProfile, System,
+    Change, Energy, MemoryPart, Momentum, Residual, Schedule, Settings, Simulation, SolverError, StepProfile,
+    System,
 };
 
 /// A backend with a body. The trait is object-safe, and measurements are computed on request.
@@ -46,6 +47,12 @@ pub trait Solver<T: Scalar>: Send {
         velocities: &[Vector3<T>],
         frame: u64,
     ) -> Result<(), SolverError>;
+
+    /// Changes parts of the body between two frames.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Simulation::change`], and [`SolverError::Device`] if a device fails.
+    fn change(&mut self, change: &Change<T>) -> Result<(), SolverError>;
 
     /// Returns the present settings, schedule and clock, and the host's copy of the body. On a CPU
     /// backend this is the present body. Elsewhere it is the body at the last call of

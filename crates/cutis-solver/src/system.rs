@@ -252,7 +252,13 @@ impl<T: Scalar> System<T> {
             + size_of_val(self.previous.as_slice())
             + size_of_val(self.velocities.as_slice());
         let mut parts = vec![MemoryPart { name: "vertices", bytes: vertices }];
-        parts.extend(self.kinds.iter().map(|kind| MemoryPart { name: kind.name(), bytes: kind.bytes() }));
+        // A body may have a kind twice.
+        for kind in &self.kinds {
+            match parts.iter_mut().find(|part| part.name == kind.name()) {
+                Some(part) => part.bytes += kind.bytes(),
+                None => parts.push(MemoryPart { name: kind.name(), bytes: kind.bytes() }),
+            }
+        }
         if !self.loads.is_empty() {
             parts.push(MemoryPart { name: "loads", bytes: size_of_val(self.loads.as_slice()) });
         }

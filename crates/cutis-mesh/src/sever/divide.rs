@@ -18,7 +18,12 @@ pub(super) const THIN: f64 = 0.02;
 
 /// A tet is divided if this share of its section along a blade is cut, and not held together by
 /// less than this share.
-const LEAST_CUT: f64 = 0.01;
+pub(super) const LEAST_CUT: f64 = 0.01;
+
+/// The share that is cut, or 1 if less than the least share holds the tet together.
+pub(super) fn share_of_cut(share: f64) -> f64 {
+    if share > 1.0 - LEAST_CUT { 1.0 } else { share }
+}
 
 /// A divided tet while its nodes are not known.
 pub(super) struct Divided {
@@ -29,9 +34,9 @@ pub(super) struct Divided {
     kept: u8,
     /// Share of the section that is cut.
     cut: f64,
-    volumes: [f64; 4],
-    distances: Vec<[f32; 4]>,
-    blades: Vec<u32>,
+    pub volumes: [f64; 4],
+    pub distances: Vec<[f32; 4]>,
+    pub blades: Vec<u32>,
 }
 
 /// A tet that blades cut: its cell, its number in the cell, and the share of its section that each
@@ -49,9 +54,13 @@ impl Severing {
     /// # Errors
     /// [`TooManyBlades`].
     pub fn wound(&self, mesh: &TetMesh) -> Result<Wound, TooManyBlades> {
-        let divided = self.divided(mesh)?;
+        Ok(self.wound_of(mesh, &self.divided(mesh)?))
+    }
+
+    /// The wound of these divided tets.
+    pub(super) fn wound_of(&self, mesh: &TetMesh, divided: &[Divided]) -> Wound {
         let mut wound = Wound::default();
-        for tet in &divided {
+        for tet in divided {
             let walls = (wound.distances.len() as u32, tet.distances.len() as u8);
             wound.distances.extend(&tet.distances);
             wound.blades.extend(&tet.blades);
@@ -73,9 +82,9 @@ impl Severing {
                 wound.copies.push(copy(kept.count_ones() as u8, corners, 1.0 - tet.cut, true));
             }
         }
-        self.join(mesh, &divided, &mut wound);
+        self.join(mesh, divided, &mut wound);
         self.edges(mesh, &mut wound);
-        Ok(wound)
+        wound
     }
 
     /// The severed edges of a tet as a mask.
@@ -102,8 +111,7 @@ impl Severing {
             for own in &sides.sections {
                 let cut = own.section.cut(&sides.border, sides.reached);
                 if cut >= LEAST_CUT {
-                    let cut = if cut > 1.0 - LEAST_CUT { 1.0 } else { cut };
-                    let cuts = vec![(blade, cut)];
+                    let cuts = vec![(blade, share_of_cut(cut))];
                     touched.push(Touched { tet: own.tet, cell: own.cell, number: own.number, cuts });
                 }
             }
@@ -119,7 +127,7 @@ impl Severing {
         touched
     }
 
-    fn divided(&self, mesh: &TetMesh) -> Result<Vec<Divided>, TooManyBlades> {
+    pub(super) fn divided(&self, mesh: &TetMesh) -> Result<Vec<Divided>, TooManyBlades> {
         let divide = |touched: &Touched| self.divide(mesh, touched).transpose();
         self.touched().par_iter().filter_map(divide).collect()
     }

@@ -18,22 +18,10 @@ impl Severing {
             }
         }
         all.sort_by_key(|&(vertices, nodes, _)| (vertices, nodes));
-        let is_split = |tet: u32| wound.split.binary_search_by_key(&tet, |split| split.tet).is_ok();
         for edge in all.chunk_by(|a, b| a.0 == b.0) {
             let [low, high] = edge[0].0;
             wound.split_edges.push([low, high]);
-            // The whole tets around it.
-            let mut whole = 0.0;
-            self.index.around_edge(mesh.point(low), self.direction(mesh, low, high), |cell, tet| {
-                let tet = self.index.position(cell, tet);
-                if !is_split(tet) {
-                    let corners = &mesh.tets[tet as usize];
-                    let edge = EDGES.into_iter().find(|&(a, b)| {
-                        [corners[a].min(corners[b]), corners[a].max(corners[b])] == [low, high]
-                    });
-                    whole += edge.map_or(0.0, |(a, b)| mesh.edge_share(corners, [a, b]));
-                }
-            });
+            let whole = self.whole_volume(mesh, wound, [low, high]);
             let mut copies: Vec<([u32; 2], f64)> = edge
                 .chunk_by(|a, b| a.1 == b.1)
                 .map(|same| (same[0].1, same.iter().map(|(.., volume)| volume).sum()))
@@ -50,5 +38,22 @@ impl Severing {
                 volume: volume as f32,
             }));
         }
+    }
+
+    /// Volume in m³ that an edge has from the whole tets around it.
+    pub(super) fn whole_volume(&self, mesh: &TetMesh, wound: &Wound, [low, high]: [u32; 2]) -> f64 {
+        let is_split = |tet: u32| wound.split.binary_search_by_key(&tet, |split| split.tet).is_ok();
+        let mut whole = 0.0;
+        self.index.around_edge(mesh.point(low), self.direction(mesh, low, high), |cell, tet| {
+            let tet = self.index.position(cell, tet);
+            if !is_split(tet) {
+                let corners = &mesh.tets[tet as usize];
+                let edge = EDGES
+                    .into_iter()
+                    .find(|&(a, b)| [corners[a].min(corners[b]), corners[a].max(corners[b])] == [low, high]);
+                whole += edge.map_or(0.0, |(a, b)| mesh.edge_share(corners, [a, b]));
+            }
+        });
+        whole
     }
 }

@@ -1,6 +1,7 @@
 //! Incisions of no width on a mesh with its skin.
 
 use super::blade::{Blade, Station};
+use super::growth::Growth;
 use super::pieces::Pieces;
 use super::severing::{Severing, longest_edge};
 use super::wound::TriangleCopy;
@@ -25,6 +26,8 @@ pub struct Severed {
     pub tet_pieces: Pieces<4>,
     /// The shapes of the copies of skin triangles. Their field `copies` is a number in `copies`.
     pub skin_pieces: Pieces<3>,
+    /// What the cuts need to grow, if they do.
+    pub growth: Option<Growth>,
 }
 
 impl Slit {
@@ -46,7 +49,8 @@ impl Slit {
 
 impl Cut {
     /// Cuts the mesh and its skin along the slits without a width, and adds the gapes of these
-    /// slits. Call it after [`Cut::apply`] and once. None if no slit is without a width.
+    /// slits. Call it after [`Cut::apply`] and once. None if no slit is without a width. With
+    /// `grows`, the result can tell the elements of a wound that is not finished.
     ///
     /// # Errors
     /// [`MeshError::IncisionEmpty`] if a slit crosses no edge. [`MeshError::IncisionWithoutLips`]
@@ -55,6 +59,7 @@ impl Cut {
         &mut self,
         mesh: &mut TetMesh,
         triangles: &mut Vec<[u32; 3]>,
+        grows: bool,
     ) -> Result<Option<Severed>, MeshError> {
         let severing_slits: Vec<usize> =
             (0..self.slits.len()).filter(|&n| self.slits[n].removes_nothing()).collect();
@@ -73,8 +78,13 @@ impl Cut {
                 _ => return Err(MeshError::IncisionEmpty { incision, step_mm }),
             }
         }
-        severing.cut_all();
-        let wound = severing.wound(mesh).map_err(|error| MeshError::TooManyCuts {
+        let (wound, growth) = if grows {
+            severing.grow(mesh, triangles).map(|(wound, growth)| (wound, Some(growth)))
+        } else {
+            severing.cut_all();
+            severing.wound(mesh).map(|wound| (wound, None))
+        }
+        .map_err(|error| MeshError::TooManyCuts {
             cuts: error.blades,
             at_mm: mesh.frame.to_mm(mesh.positions[mesh.tets[error.tet as usize][0] as usize]).into(),
         })?;
@@ -88,11 +98,13 @@ impl Cut {
         }
         let tet_pieces = wound.tet_pieces(mesh);
         mesh.divide(&wound);
-        // A vertex that a blade touches may lose all its tets.
-        let mut held = vec![false; mesh.positions.len()];
-        mesh.tets.iter().flatten().for_each(|&v| held[v as usize] = true);
         self.removed.resize(mesh.positions.len(), false);
-        self.removed.iter_mut().zip(held).for_each(|(removed, held)| *removed |= !held);
+        if !grows {
+            // A vertex that a blade touches may lose all its tets.
+            let mut held = vec![false; mesh.positions.len()];
+            mesh.tets.iter().flatten().for_each(|&v| held[v as usize] = true);
+            self.removed.iter_mut().zip(held).for_each(|(removed, held)| *removed |= !held);
+        }
         let mut replaced: Vec<u32> = copies.iter().map(|copy| copy.triangle).collect();
         replaced.dedup();
         for copy in &mut copies {
@@ -105,6 +117,14 @@ impl Cut {
         triangles.extend(copies.iter().map(|copy| copy.nodes));
         let divided = divided.into_iter().map(|(_, triangle)| triangle).collect();
         let virtual_nodes = wound.virtual_nodes;
-        Ok(Some(Severed { virtual_nodes, triangles: divided, copies, blades, tet_pieces, skin_pieces }))
+        Ok(Some(Severed {
+            virtual_nodes,
+            triangles: divided,
+            copies,
+            blades,
+            tet_pieces,
+            skin_pieces,
+            growth,
+        }))
     }
 }

@@ -10,6 +10,7 @@ mod blade;
 mod components;
 mod divide;
 mod edge_copies;
+mod growth;
 mod incise;
 mod nodes;
 mod pieces;
@@ -22,6 +23,7 @@ mod walls;
 mod wound;
 
 pub use blade::{Blade, Station};
+pub use growth::{Growth, Stage};
 pub use incise::Severed;
 pub use pieces::{Embedded, LipPoint, Pieces};
 pub use severing::Severing;

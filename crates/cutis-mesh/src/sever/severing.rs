@@ -66,6 +66,12 @@ impl Sides {
         let found = self.near.binary_search_by_key(&vertex, |(near, _)| *near).ok()?;
         Some(self.near[found].1)
     }
+
+    /// How far along its path the blade severs the edge that starts at a vertex in a direction.
+    pub fn crossing(&self, vertex: u32, direction: u8) -> Option<f64> {
+        let same = |crossing: &&Crossing| crossing.vertex == vertex && crossing.direction == direction;
+        self.crossings.iter().find(same).map(|crossing| crossing.at)
+    }
 }
 
 impl Severing {

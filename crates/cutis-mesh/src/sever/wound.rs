@@ -97,6 +97,19 @@ pub struct TriangleCopy {
     pub share: f32,
 }
 
+/// A skin triangle of a divided tet.
+#[derive(Debug)]
+pub(super) struct DividedTriangle {
+    /// Number in the skin.
+    pub triangle: u32,
+    /// Number of the divided tet behind it in [`Wound::split`].
+    pub split: u32,
+    /// The tet's corners at its own.
+    pub corners: [u8; 3],
+    /// Share of its area of each part.
+    pub areas: [f64; 4],
+}
+
 /// More blades sever the edges of one tet than its walls can tell apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyBlades {
@@ -134,8 +147,29 @@ impl Wound {
     /// The copies of skin triangles of divided tets, in the order of the skin. `triangles` are
     /// boundary faces of the mesh. A triangle with copies is replaced by them.
     pub fn skin(&self, mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<TriangleCopy> {
-        let mut faces: HashMap<[u32; 3], (usize, usize)> = HashMap::new();
-        for (n, split) in self.split.iter().enumerate() {
+        let mut copies = Vec::new();
+        for DividedTriangle { triangle, split, corners, areas } in self.areas(mesh, triangles) {
+            let own = &self.split[split as usize];
+            let copy_of = |nodes: &[u32; 4], part, share: f64| {
+                let nodes = corners.map(|corner| nodes[usize::from(corner)]);
+                TriangleCopy { triangle, split, part, nodes, share: share as f32 }
+            };
+            let parts = (0..4).filter(|&part| areas[usize::from(part)] > 0.0);
+            copies.extend(parts.filter_map(|part| {
+                let copy = self.copy_of(own, part)?;
+                Some(copy_of(&self.copies[copy].nodes, Some(part), areas[usize::from(part)] * own.cut))
+            }));
+            if own.cut < 1.0 {
+                copies.push(copy_of(&mesh.tets[own.tet as usize], None, 1.0 - own.cut));
+            }
+        }
+        copies
+    }
+
+    /// The skin triangles of divided tets, in the order of the skin.
+    pub(super) fn areas(&self, mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<DividedTriangle> {
+        let mut faces: HashMap<[u32; 3], (u32, usize)> = HashMap::new();
+        for (n, split) in (0..).zip(&self.split) {
             let corners = &mesh.tets[split.tet as usize];
             for opposite in 0..4 {
                 let mut face = [1, 2, 3].map(|step| corners[(opposite + step) % 4]);
@@ -143,38 +177,22 @@ impl Wound {
                 faces.entry(face).or_insert((n, opposite));
             }
         }
-        let mut copies = Vec::new();
-        for (number, triangle) in triangles.iter().enumerate() {
+        let divided = |(number, triangle): (u32, &[u32; 3])| {
             let mut face = *triangle;
             face.sort_unstable();
-            let Some(&(n, opposite)) = faces.get(&face) else { continue };
-            let split = &self.split[n];
-            let corners = &mesh.tets[split.tet as usize];
-            let mut areas = self.walls(split).areas(opposite);
+            let &(split, opposite) = faces.get(&face)?;
+            let own = &self.split[split as usize];
+            let tet = &mesh.tets[own.tet as usize];
+            let corners = triangle.map(|v| {
+                let corner = tet.iter().position(|&corner| corner == v);
+                corner.expect("the face has the corners of the triangle") as u8
+            });
+            let mut areas = self.walls(own).areas(opposite);
             let held = (0..4).fold(0, |held, n| held | u8::from(areas[n] > 0.0) << n);
             raise(&mut areas, held, THIN);
-            let parts = (0..4).filter(|&part| areas[usize::from(part)] > 0.0);
-            let of_part =
-                parts.filter_map(|part| Some((part, self.copy_of(split, part)?, areas[usize::from(part)])));
-            let copy_of = |nodes, part, share: f64| TriangleCopy {
-                triangle: number as u32,
-                split: n as u32,
-                part,
-                nodes,
-                share: share as f32,
-            };
-            copies.extend(of_part.map(|(part, copy, share)| {
-                let nodes = triangle.map(|v| {
-                    let corner = corners.iter().position(|&corner| corner == v);
-                    self.copies[copy].nodes[corner.expect("the face has the corners of the triangle")]
-                });
-                copy_of(nodes, Some(part), share * split.cut)
-            }));
-            if split.cut < 1.0 {
-                copies.push(copy_of(*triangle, None, 1.0 - split.cut));
-            }
-        }
-        copies
+            Some(DividedTriangle { triangle: number, split, corners, areas })
+        };
+        (0..).zip(triangles).filter_map(divided).collect()
     }
 
     /// Rest positions of the virtual nodes in local meters.

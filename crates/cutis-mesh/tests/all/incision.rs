@@ -64,7 +64,7 @@ fn a_cut_through_lattice_points_has_two_lips() {
                 Incision { width_mm: None, ..incision([10.0, place, 20.0], [50.0, place, 20.0], 8.0, 2.0) };
             let mut cut = plan(&mesh, &triangles, &[incision]).unwrap();
             cut.apply(&mut mesh, &mut triangles);
-            cut.sever(&mut mesh, &mut triangles).unwrap().unwrap();
+            cut.sever(&mut mesh, &mut triangles, false).unwrap().unwrap();
             let gape = &cut.gapes[0];
             assert!(!gape.left().is_empty() && !gape.right().is_empty(), "{split:?} {place}");
         }

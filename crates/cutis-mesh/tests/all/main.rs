@@ -3,6 +3,7 @@
 
 mod files;
 mod graded;
+mod growth;
 mod incision;
 mod lattice;
 mod oracle;

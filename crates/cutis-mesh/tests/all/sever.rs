@@ -15,14 +15,14 @@ const SPLITS: [Split; 2] = [Split::Kuhn6, Split::Five];
 const MARGIN: f64 = 0.012;
 
 /// A block of tissue with steps of 3, 4 and 5 mm.
-fn block(cells: [usize; 3], split: Split) -> TetMesh {
+pub fn block(cells: [usize; 3], split: Split) -> TetMesh {
     let affine = Affine::from_spacing([3.0, 4.0, 5.0], [0.0; 3]).unwrap();
     let lattice = Lattice::new(Grid { shape: cells.map(|n| n + 1), affine }, split).unwrap();
     mesh(&lattice, &vec![false; lattice.grid().len()])
 }
 
 /// A blade along stations in local meters, all with one inward direction.
-fn blade(path: &[[f64; 3]], inward: [f64; 3], depth: f64) -> Blade {
+pub fn blade(path: &[[f64; 3]], inward: [f64; 3], depth: f64) -> Blade {
     let inward = Vector3::from(inward).normalize();
     let stations: Vec<Station> = path.iter().map(|&p| Station { skin: p.into(), inward }).collect();
     Blade::along(&stations, depth, MARGIN, 2.0 * MARGIN).unwrap()
@@ -168,9 +168,9 @@ fn random_blade() -> impl Strategy<Value = (Vec<[f64; 3]>, [f64; 3], f64)> {
     (path, direction, 0.002..0.03_f64)
 }
 
-type RandomBlades = Vec<(Vec<[f64; 3]>, [f64; 3], f64)>;
+pub type RandomBlades = Vec<(Vec<[f64; 3]>, [f64; 3], f64)>;
 
-fn blades(random: &RandomBlades) -> Vec<Blade> {
+pub fn blades(random: &RandomBlades) -> Vec<Blade> {
     random.iter().map(|(path, inward, depth)| blade(path, *inward, *depth)).collect()
 }
 
@@ -179,7 +179,7 @@ fn air_of(mesh: &TetMesh, seed: &[bool]) -> TetMesh {
 }
 
 /// A block with holes, and blades.
-fn random_cut() -> impl Strategy<Value = (TetMesh, RandomBlades)> {
+pub fn random_cut() -> impl Strategy<Value = (TetMesh, RandomBlades)> {
     let shape = [5, 4, 4];
     let points = 6 * 5 * 5;
     let air = prop::collection::vec(prop::bool::weighted(0.05), points);
@@ -272,7 +272,7 @@ fn same_classes(a: &[[usize; 4]], b: &[TetCopy]) -> bool {
 }
 
 /// No two constraints of one color share a node.
-fn colors_are_valid<const N: usize>(tuples: &[[u32; N]], colors: &[u16]) -> bool {
+pub fn colors_are_valid<const N: usize>(tuples: &[[u32; N]], colors: &[u16]) -> bool {
     let mut seen = BTreeSet::new();
     tuples.iter().zip(colors).all(|(nodes, color)| nodes.iter().all(|&node| seen.insert((*color, node))))
 }

@@ -4,7 +4,7 @@ use cutis_mesh::{Cut, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask
 use cutis_volume::{TableKind, Volume};
 
 use super::lattice::lattice;
-use super::{Body, BodyMaterials, BodySections, Membrane, air, handles, region};
+use super::{Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, region};
 use crate::Error;
 use crate::scene::Keep;
 
@@ -42,7 +42,11 @@ impl Body {
         region::check_handles(sections, &mesh)?;
         let mut cut = Cut::of_slits(&mesh, &skin, slits).map_err(|e| region::incision_error(sections, e))?;
         let removed = cut.apply(&mut mesh, &mut skin);
-        let severed = cut.sever(&mut mesh, &mut skin).map_err(file.blame("incision"))?;
+        let mut severed =
+            cut.sever(&mut mesh, &mut skin, sections.cuts_grow).map_err(file.blame("incision"))?;
+        let growth = severed.as_mut().and_then(|severed| severed.growth.take());
+        let of_blades = sections.incisions.iter().filter(|section| section.width_mm.is_none());
+        let growing = growth.map(|growth| GrowingCuts::new(growth, of_blades, &mesh, &density));
         if let Some(severed) = &severed {
             divide_masses(&mut masses, &mesh, &density);
             materials.iter_mut().for_each(|materials| materials.add_nodes(&severed.virtual_nodes));
@@ -59,6 +63,7 @@ impl Body {
             cut,
             removed,
             severed,
+            growing,
             membrane,
             grabbed,
             materials,

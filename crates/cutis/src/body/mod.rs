@@ -3,6 +3,7 @@
 mod build;
 mod find_skin;
 mod fixed;
+mod growing;
 mod handles;
 mod lattice;
 mod materials;
@@ -17,6 +18,7 @@ use nalgebra::Point3;
 use crate::scene::HandleSection;
 
 pub use find_skin::{SkinRequest, find_skin};
+pub(crate) use growing::GrowingCuts;
 pub(crate) use lattice::even_shape;
 #[cfg(test)]
 pub(crate) use lattice::lattice;
@@ -50,6 +52,8 @@ pub(crate) struct Body {
     pub(crate) removed: Removed,
     /// What cuts of no width changed; none if the scene has none.
     pub(crate) severed: Option<Severed>,
+    /// The cuts that are made while the body moves; none if the scene has none.
+    pub(crate) growing: Option<GrowingCuts>,
     /// Normals and directions of the whole skin before the incisions; none if the scene has no
     /// constraint that needs them.
     pub(crate) membrane: Option<Membrane>,
@@ -144,7 +148,7 @@ impl Body {
     }
 
     /// The skin triangles that are no copies.
-    fn whole_triangles(&self) -> &[[u32; 3]] {
+    pub(crate) fn whole_triangles(&self) -> &[[u32; 3]] {
         &self.skin[..self.skin.len() - self.severed.as_ref().map_or(0, |severed| severed.copies.len())]
     }
 

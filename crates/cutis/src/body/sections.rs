@@ -22,6 +22,8 @@ pub(crate) struct BodySections<'a> {
     /// The table of materials; none if the scene has none or its model does not use it.
     pub(crate) materials: Option<&'a TissueMaterials>,
     pub(crate) incisions: &'a [IncisionSection],
+    /// Whether incisions without a width are made at their times. If not, they exist from the start.
+    pub(crate) cuts_grow: bool,
     pub(crate) handles: &'a [HandleSection],
 }
 
@@ -36,6 +38,7 @@ impl<'a> BodySections<'a> {
             membrane: scene.constraints.membrane.as_ref().filter(|_| scene.model == ModelChoice::Pbd),
             materials: scene.used_materials(),
             incisions: &scene.incision,
+            cuts_grow: scene.model == ModelChoice::Pbd && scene.incision.iter().any(IncisionSection::grows),
             handles: &scene.handle,
         }
     }
@@ -52,7 +55,7 @@ pub(crate) fn needs_skin(scene: &Scene) -> bool {
 
 impl From<&IncisionSection> for Incision {
     fn from(section: &IncisionSection) -> Self {
-        let IncisionSection { from_mm, to_mm, depth_mm, width_mm, at_s: _ } = *section;
+        let IncisionSection { from_mm, to_mm, depth_mm, width_mm, .. } = *section;
         Self { from_mm, to_mm, depth_mm, width_mm }
     }
 }

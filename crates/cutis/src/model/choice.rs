@@ -23,7 +23,7 @@ pub enum ModelChoice {
 }
 
 impl ModelChoice {
-    /// Whether an incision may be made in a body that has begun to move.
+    /// Whether an incision with a width may be made in a body that has begun to move.
     pub(crate) fn cuts_later(self) -> bool {
         match self {
             Self::Pbd => false,

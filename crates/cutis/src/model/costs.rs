@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::backend::Chosen;
-use crate::body::Body;
+use crate::body::{Body, GrowingCuts};
 use crate::output::report::{MemoryPart, Sizes};
 use crate::scene::Scene;
 
@@ -52,6 +52,19 @@ pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> 
             handle.over_s
         )
     })
+}
+
+/// Warnings about cuts that have not reached their end when the last frame begins.
+pub(super) fn unfinished_cuts(scene: &Scene, cuts: &GrowingCuts) -> Vec<String> {
+    let last_s = f64::from(scene.run.frames.saturating_sub(1)) * scene.solver.dt_s;
+    let incisions = scene.incision.iter().enumerate().filter(|(_, section)| section.width_mm.is_none());
+    let blades = incisions.zip(cuts.reached(last_s)).zip(cuts.growth.lengths());
+    let unfinished = blades.filter(|((_, reached), length)| reached < length);
+    let line = |(((n, _), reached), length): (((usize, _), f64), f64)| {
+        let [reached, length] = [reached, length].map(|m| m * 1000.0);
+        format!("incision[{n}] comes {reached:.1} of {length:.1} mm far in the frames of this run")
+    };
+    unfinished.map(line).collect()
 }
 
 /// The lines whose condition is true.

@@ -25,6 +25,7 @@ pub struct SceneSystem {
 
 /// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and adds the
 /// constraints and handles that the scene names. Opens no device, makes no step and writes nothing.
+/// Cuts that a run makes while the body moves exist from the start.
 ///
 /// ```no_run
 /// use cutis::Scene;
@@ -44,7 +45,9 @@ pub struct SceneSystem {
 pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
     needs_system(loaded)?;
     let source = source::load(loaded)?;
-    let body = Body::build(&BodySections::of(loaded), &source.volume)?;
+    // The system is that of the finished cuts.
+    let sections = BodySections { cuts_grow: false, ..BodySections::of(loaded) };
+    let body = Body::build(&sections, &source.volume)?;
     let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body: &body };
     let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?;
     Ok(SceneSystem { system, settings, gapes: body.cut.gapes, frame: body.mesh.frame })

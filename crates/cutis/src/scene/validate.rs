@@ -168,7 +168,13 @@ impl Scene {
                     check.require(self.model.cuts_without_width(), &key("width_mm"), "", &why)?;
                 }
             }
-            self.validate_time(check, &key("at_s"), incision.at_s)?;
+            self.validate_time(check, &key("at_s"), incision)?;
+            if let Some(speed) = incision.speed_mm_s {
+                let key = key("speed_mm_s");
+                check.positive(&key, speed)?;
+                let why = "must be left out next to width_mm: an incision with a width is made at once";
+                check.require(incision.width_mm.is_none(), &key, speed, why)?;
+            }
             let to = format!("{:?}", incision.to_mm);
             let apart = incision.from_mm != incision.to_mm;
             check.require(apart, &key("to_mm"), to, "must differ from from_mm")?;
@@ -176,13 +182,15 @@ impl Scene {
         Ok(())
     }
 
-    /// The time of an incision. Only some models can cut a body that has begun to move, and an
-    /// incision after the last frame would never be made.
-    fn validate_time(&self, check: &Check<'_>, key: &str, at_s: f64) -> Result<(), Error> {
+    /// The time of an incision. Only some models can remove tissue from a body that has begun to
+    /// move, and an incision after the last frame would never be made.
+    fn validate_time(&self, check: &Check<'_>, key: &str, incision: &IncisionSection) -> Result<(), Error> {
+        let at_s = incision.at_s;
         check.not_negative(key, at_s)?;
         let model = serde_json::json!(self.model);
-        let why = format!("must be 0: with model = {model} incisions exist from the start");
-        check.require(at_s == 0.0 || self.model.cuts_later(), key, at_s, &why)?;
+        let why = format!("must be 0: with model = {model} incisions with a width exist from the start");
+        let later = self.model.cuts_later() || incision.width_mm.is_none();
+        check.require(at_s == 0.0 || later, key, at_s, &why)?;
         let last = f64::from(self.run.frames.saturating_sub(1)) * self.solver.dt_s;
         let why = format!("must not lie after the beginning of the last frame, at {last} s (run.frames)");
         check.require(at_s <= last || at_s == 0.0, key, at_s, &why)

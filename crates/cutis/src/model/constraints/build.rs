@@ -1,14 +1,17 @@
 //! Builds the system of a cut body: masses, the constraint kinds of the scene, handles.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use cutis_coloring::Groups;
-use cutis_solver::{Formulation, Handle, Settings, System, SystemBuilder};
+use cutis_solver::{Change, Formulation, Handle, Settings, System, SystemBuilder};
 use nalgebra::Vector3;
 
 use super::ConstraintModel;
+use super::elements::Elements;
 use super::kinds::BodyParts;
+use super::wound::{self, GrowingWound, WholeParts};
 use crate::Error;
+use crate::body::GrowingCuts;
 use crate::model::ModelInput;
 use crate::scene::{Scene, SolverSection};
 
@@ -53,11 +56,13 @@ impl ConstraintModel {
         // The frame's origin is in the middle of the CT, so a region of interest has the same
         // positions as in the whole body.
         let mut builder = SystemBuilder::<f32>::in_place(&body.mesh.positions, &inverse_masses)?;
+        let grows = body.growing.is_some();
         let parts = BodyParts {
             file,
             solver: &scene.solver,
             at_rest: scene.scan_is_at_rest,
             body,
+            elements: if grows { Elements::Whole(body) } else { Elements::All(body) },
             inverse_masses: &inverse_masses,
             nothing_fixed: scene.fixed == Default::default(),
         };
@@ -81,13 +86,48 @@ impl ConstraintModel {
             let handle = Handle { vertices: grabbed.clone(), move_m, over_s: handle.over_s };
             builder = builder.handle(handle).map_err(file.blame(&format!("handle[{n}]")))?;
         }
-        let mut loads: Vec<Vector3<f32>> =
-            loads.iter().map(|load| load.map(|newton| newton as f32)).collect();
         let mut system = builder.build();
+        let rounded = loads.iter().map(|load| load.map(|newton| newton as f32));
+        let mut balanced: Vec<Vector3<f32>> = rounded.collect();
         if scene.scan_is_at_rest && scene.solver.formulation == Formulation::Vbd {
-            hold(&system, &mut loads)?;
+            hold(&system, &mut balanced)?;
         }
-        system.set_loads(&loads)?;
-        Ok(Self { system, settings: settings(scene), colors, warnings })
+        system.set_loads(&balanced)?;
+        let wound = match &body.growing {
+            None => None,
+            Some(cuts) => Some(add_wound(input, cuts, &mut system, &inverse_masses, &loads)?),
+        };
+        Ok(Self { system, settings: settings(scene), colors, warnings, wound })
     }
+}
+
+/// Adds the constraints along growing cuts, as they are at the start.
+fn add_wound(
+    input: &ModelInput<'_>,
+    cuts: &GrowingCuts,
+    system: &mut System<f32>,
+    inverse_masses: &[f32],
+    loads: &[Vector3<f64>],
+) -> Result<GrowingWound, Error> {
+    let ModelInput { file, scene, body } = *input;
+    let fixed = body.fixed(file, &scene.fixed)?;
+    let moved: HashSet<u32> = body.grabbed.iter().flatten().copied().collect();
+    let rest = wound::at_rest(&body.mesh.positions, inverse_masses);
+    let whole = WholeParts {
+        builder: SystemBuilder::in_place(&body.mesh.positions, inverse_masses)?,
+        rest: &rest,
+        kinds: system.kinds(),
+        loads,
+        inverse_masses,
+        held: &|vertex| fixed[vertex as usize] || moved.contains(&vertex),
+    };
+    let (wound, parts) = GrowingWound::new(input, cuts, whole)?;
+    system.add_kinds(parts.kinds)?;
+    let nodes = || cuts.growth.nodes().iter().copied();
+    system.change(&Change {
+        inverse_masses: nodes().zip(parts.inverse_masses).collect(),
+        loads: nodes().zip(parts.loads).collect(),
+        ..Change::default()
+    })?;
+    Ok(wound)
 }

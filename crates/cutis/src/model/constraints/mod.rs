@@ -1,17 +1,19 @@
 //! The model `pbd`: constraints over the lattice, which a solver projects.
 
 mod build;
+mod elements;
 mod estimate;
 pub(crate) mod kinds;
 mod measure;
 mod solver_run;
 mod start;
+mod wound;
 
 use std::collections::BTreeMap;
 
 use cutis_solver::{Formulation, Settings, StepProfile, System};
 
-use super::costs::{lines_that_hold, sizes, unfinished_handles};
+use super::costs::{lines_that_hold, sizes, unfinished_cuts, unfinished_handles};
 use super::{Model, ModelCosts, ModelInput, Started};
 use crate::backend::{Chosen, Request};
 use crate::run::clock::Clock;
@@ -22,6 +24,7 @@ use crate::{CostReport, Error, Progress};
 pub(crate) use estimate::CostEstimate;
 use solver_run::SolverRun;
 pub(crate) use start::{device_memory, start};
+use wound::GrowingWound;
 
 /// A system of constraints and the settings to step it with.
 pub(crate) struct ConstraintModel {
@@ -31,6 +34,8 @@ pub(crate) struct ConstraintModel {
     pub(crate) colors: BTreeMap<String, usize>,
     /// Warnings of the constraint kinds.
     warnings: Vec<String>,
+    /// The cuts that grow; none if the scene has none.
+    wound: Option<GrowingWound>,
 }
 
 /// Checks the sections of the constraint kinds.
@@ -50,13 +55,18 @@ impl Model for ConstraintModel {
             None => self.colors.clone(),
         };
         let motionless = system.vertices().iter().filter(|v| v.inverse_mass() == 0.0).count();
+        let followers = match (&self.wound, &input.body.growing) {
+            (Some(wound), Some(cuts)) => wound.followers(cuts),
+            _ => 0,
+        };
         let mut warnings = scene_warnings(scene);
         warnings.extend(self.warnings.iter().cloned());
         warnings.extend(unfinished_handles(scene));
+        warnings.extend(input.body.growing.iter().flat_map(|cuts| unfinished_cuts(scene, cuts)));
         Ok(ModelCosts {
             device_memory: device_memory(&backend, system, settings),
             backend,
-            sizes: sizes(input.body, motionless - input.body.removed_vertices()),
+            sizes: sizes(input.body, motionless - input.body.removed_vertices() - followers),
             colors,
             memory: estimate.memory,
             projections: work.projections,
@@ -82,14 +92,14 @@ impl Model for ConstraintModel {
         backend: &Chosen,
         clock: &mut Clock<'_>,
     ) -> Result<Started<'a>, Error> {
-        let Self { system, settings, .. } = *self;
+        let Self { system, settings, wound, .. } = *self;
         let (solver, device) = if backend.on_gpu() {
             let start = |_: &dyn Progress| start(backend, system, settings);
             clock.stage_on("gpu", "start the GPU", 0, start).map_err(input.file.blame("solver.backend"))?
         } else {
             start(backend, system, settings).map_err(input.file.blame("solver"))?
         };
-        Ok(Started { simulation: Box::new(SolverRun { solver }), device })
+        Ok(Started { simulation: Box::new(SolverRun { solver, wound, input: *input }), device })
     }
 }
 

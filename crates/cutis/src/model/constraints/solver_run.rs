@@ -1,24 +1,59 @@
 //! A simulation by a solver of constraints.
 
-use cutis_solver::StepProfile;
+use cutis_solver::{StepProfile, System};
 use nalgebra::{Point3, Vector3};
 
 use super::start::StartedSolver;
+use super::wound::GrowingWound;
 use crate::Error;
 use crate::backend::DevicePositions;
-use crate::model::{Simulation, SimulationEnd};
+use crate::body::GrowingCuts;
+use crate::model::{ModelInput, Simulation, SimulationEnd};
 use crate::output::report::KindResidual;
 use crate::run::checkpoint::Checkpoint;
 
 /// Relative error above which a degenerate constraint is reported.
 const COLLAPSED: f64 = 0.01;
 
+/// Name of the work of cuts that grow in a profile.
+const CUT: &str = "cut";
+
 /// A solver with a body in it.
-pub(crate) struct SolverRun {
+pub(crate) struct SolverRun<'a> {
     pub(crate) solver: StartedSolver,
+    /// The cuts that grow; none if the scene has none.
+    pub(crate) wound: Option<GrowingWound>,
+    pub(crate) input: ModelInput<'a>,
 }
 
-impl Simulation for SolverRun {
+impl<'a> SolverRun<'a> {
+    /// The cuts that grow, and their state.
+    fn growing(&self) -> Option<(&'a GrowingCuts, &GrowingWound)> {
+        self.input.body.growing.as_ref().zip(self.wound.as_ref())
+    }
+
+    /// Cuts as far as the cuts are at the present time.
+    fn cut(&mut self) -> Result<(), Error> {
+        let (Some(cuts), Some(wound)) = (&self.input.body.growing, &mut self.wound) else { return Ok(()) };
+        let time_s = self.solver.reader().time_s();
+        if let Some(change) = wound.change(&self.input, cuts, time_s)? {
+            self.solver.solver().change(&change)?;
+        }
+        Ok(())
+    }
+
+    /// Positions of all vertices. Those that a cut has not reached are where the vertices are that
+    /// they follow.
+    fn positions(&mut self) -> Result<Vec<Point3<f32>>, Error> {
+        let mut positions = self.solver.solver().positions()?;
+        if let Some((cuts, wound)) = self.growing() {
+            wound.complete(cuts, &mut positions);
+        }
+        Ok(positions)
+    }
+}
+
+impl Simulation for SolverRun<'_> {
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
         let velocities: Vec<Vector3<f32>> = saved
             .words
@@ -29,10 +64,14 @@ impl Simulation for SolverRun {
     }
 
     fn step(&mut self) -> Result<(), Error> {
+        self.cut()?;
         Ok(self.solver.solver().step(1)?)
     }
 
     fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error> {
+        if self.wound.is_some() {
+            profile.time(CUT, || self.cut())?;
+        }
         Ok(self.solver.solver().step_timed(1, profile)?)
     }
 
@@ -45,30 +84,56 @@ impl Simulation for SolverRun {
     }
 
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error> {
-        Ok(self.solver.solver().positions_of(vertices)?)
+        let Some((cuts, wound)) = self.growing() else {
+            return Ok(self.solver.solver().positions_of(vertices)?);
+        };
+        let leaders: Vec<u32> = vertices.iter().map(|&vertex| wound.leader(cuts, vertex)).collect();
+        Ok(self.solver.solver().positions_of(&leaders)?)
     }
 
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {
-        let solver = self.solver.solver();
-        let positions = solver.positions()?;
-        let words = solver.velocities()?.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits)).collect();
+        let positions = self.positions()?;
+        let mut velocities = self.solver.solver().velocities()?.to_vec();
+        if let Some((cuts, wound)) = self.growing() {
+            wound.complete(cuts, &mut velocities);
+        }
+        let words = velocities.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits)).collect();
         Ok(Checkpoint { frame, positions, words })
     }
 
     /// Reads the whole body once. Residuals are measured on the host, so that they need no GPU
     /// memory, and a full GPU cannot make a finished run fail.
     fn end(&mut self) -> Result<SimulationEnd, Error> {
+        let positions = self.positions()?;
         let system = self.solver.solver().system()?;
         let collapsed = system.check_collapsed(COLLAPSED).err().map(|error| error.to_string());
         Ok(SimulationEnd {
-            positions: system.positions(),
-            residuals: system.residuals().iter().map(KindResidual::from).collect(),
+            positions,
+            residuals: residuals(system),
             warnings: collapsed.into_iter().collect(),
             chainmail: None,
         })
     }
 
     fn positions_on_device(&self) -> Option<DevicePositions> {
-        self.solver.positions_on_device()
+        let complete = self.growing().is_none_or(|(cuts, wound)| wound.followers(cuts) == 0);
+        if complete { self.solver.positions_on_device() } else { None }
     }
+}
+
+/// The residual of each type of constraint. A body with growing cuts has each type twice.
+fn residuals(system: &System<f32>) -> Vec<KindResidual> {
+    let mut all: Vec<(cutis_solver::Residual, usize)> = Vec::new();
+    for (residual, kind) in system.residuals().into_iter().zip(system.kinds()) {
+        match all.iter_mut().find(|(other, _)| other.name == residual.name) {
+            None => all.push((residual, kind.len())),
+            Some((other, count)) => {
+                let sum = other.rms.powi(2) * *count as f64 + residual.rms.powi(2) * kind.len() as f64;
+                *count += kind.len();
+                other.rms = (sum / (*count).max(1) as f64).sqrt();
+                other.max = other.max.max(residual.max);
+            }
+        }
+    }
+    all.iter().map(|(residual, _)| KindResidual::from(residual)).collect()
 }

@@ -66,9 +66,14 @@ pub struct IncisionSection {
     /// width and removes nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width_mm: Option<f64>,
-    /// Time at which the incision is made, s; later than 0 with the model `chainmail` only.
+    /// Time at which the incision is made or begins, s. With the model `pbd` an incision with a
+    /// width is made at 0.
     #[serde(default)]
     pub at_s: f64,
+    /// Speed at which the incision grows from one end to the other, mm/s (model `pbd`, without a
+    /// width). Left out: it is made at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_mm_s: Option<f64>,
 }
 
 /// A sphere of tissue that is dragged along a straight line.

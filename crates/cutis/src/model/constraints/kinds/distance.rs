@@ -51,13 +51,14 @@ impl ConstraintKind for DistanceSection {
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
         let mesh = &parts.body.mesh;
-        let groups = Groups::from_colors(&mesh.edge_colors())?;
+        let elements = &parts.elements;
+        let groups = Groups::from_colors(&elements.edge_colors())?;
         let stiffness = if parts.compliant() {
-            let volumes = mesh.edge_volumes();
+            let volumes = elements.edge_volumes();
             let factor = springs_over_body(mesh.lattice.split());
             let of_row = |row: &TissueMaterialSection| factor * row.youngs_modulus_pa;
             let moduli = parts.moduli(MODULUS_KEY, self.youngs_modulus_pa, of_row)?;
-            compliances(&mesh.edges, |n, [a, b]| {
+            compliances(elements.edges(), |n, [a, b]| {
                 let length = nalgebra::distance(&parts.position(a), &parts.position(b));
                 cutis_constraints::distance_compliance(length, moduli.of([a, b]), f64::from(volumes[n]))
             })?
@@ -65,6 +66,6 @@ impl ConstraintKind for DistanceSection {
             Stiffness::pbd(self.stiffness as f32)
         };
         let rest = DistanceMaterial { rest_scale: 1.0 };
-        Ok((builder.add_from_rest::<Distance, 2>(&mesh.edges, &rest, stiffness, &groups)?, groups.len()))
+        Ok((builder.add_from_rest::<Distance, 2>(elements.edges(), &rest, stiffness, &groups)?, groups.len()))
     }
 }

@@ -200,7 +200,7 @@ impl MembraneSection {
 
     /// The strips of the cut skin.
     fn kept_strips(&self, parts: &BodyParts<'_>) -> Result<Vec<Strip>, Error> {
-        self.strips(parts, &parts.body.skin, &|triangle| parts.body.skin_share(triangle))
+        self.strips(parts, parts.elements.skin(), &|triangle| parts.elements.skin_share(triangle))
     }
 
     /// Adds the load that strips set free, times a sign.
@@ -331,13 +331,12 @@ impl ConstraintKind for MembraneSection {
     }
 
     fn add_loads(&self, parts: &BodyParts<'_>, loads: &mut [Vector3<f64>]) -> Result<(), Error> {
-        self.add_freed(parts, &self.strips(parts, &parts.body.removed.triangles, &|_| 1.0)?, 1.0, loads);
-        let Some(severed) = &parts.body.severed else { return Ok(()) };
+        self.add_freed(parts, &self.strips(parts, parts.elements.removed(), &|_| 1.0)?, 1.0, loads);
+        let Some(divided) = parts.elements.divided() else { return Ok(()) };
         // A divided triangle pulled on its corners in the scan. Now its copies do.
-        self.add_freed(parts, &self.strips(parts, &severed.triangles, &|_| 1.0)?, 1.0, loads);
-        let whole = parts.body.skin.len() - severed.copies.len();
-        let share = |copy: usize| f64::from(severed.copies[copy].share);
-        self.add_freed(parts, &self.strips(parts, &parts.body.skin[whole..], &share)?, -1.0, loads);
+        self.add_freed(parts, &self.strips(parts, divided.triangles, &|_| 1.0)?, 1.0, loads);
+        let share = |copy: usize| f64::from(divided.shares[copy]);
+        self.add_freed(parts, &self.strips(parts, divided.copies, &share)?, -1.0, loads);
         Ok(())
     }
 

@@ -25,6 +25,7 @@ pub use membrane::{MembraneDirections, MembraneSection};
 pub use skin_tension::{NearIncisionSection, StcForm, StcSection};
 pub use tet_volume::VolumeConstraintSection;
 
+use super::elements::Elements;
 use crate::Error;
 use crate::body::Body;
 use crate::scene::validate::Check;
@@ -160,6 +161,8 @@ pub(crate) struct BodyParts<'a> {
     /// Whether the scan shows the body in equilibrium.
     pub(crate) at_rest: bool,
     pub(crate) body: &'a Body,
+    /// The elements on which the constraints act.
+    pub(crate) elements: Elements<'a>,
     /// Inverse mass of each vertex, 1/kg; 0 for a vertex that does not move.
     pub(crate) inverse_masses: &'a [f32],
     /// Whether the scene fixes no vertex.

@@ -128,7 +128,7 @@ impl StcSection {
     /// of the scan as their rest area: their tension is balanced, and what a cut sets free is a
     /// load.
     fn kept_materials(&self, parts: &BodyParts<'_>) -> Result<Vec<TriangleMaterial>, Error> {
-        let mut materials = self.materials(parts, &parts.body.skin)?;
+        let mut materials = self.materials(parts, parts.elements.skin())?;
         if parts.at_rest {
             materials.iter_mut().for_each(|material| material.rest_area_scale = 1.0);
         }
@@ -156,7 +156,7 @@ impl StcSection {
         parts: &BodyParts<'_>,
         groups: &Groups,
     ) -> Result<SystemBuilder<f32>, Error> {
-        let (skin, materials) = (&parts.body.skin, self.kept_materials(parts)?);
+        let (skin, materials) = (parts.elements.skin(), self.kept_materials(parts)?);
         let params: Vec<_> = skin
             .iter()
             .zip(&materials)
@@ -170,7 +170,7 @@ impl StcSection {
             .collect();
         let stiffness = if parts.compliant() {
             compliances(skin, |n, _| {
-                let modulus = self.area_modulus_n_per_m * materials[n].factor * parts.body.skin_share(n);
+                let modulus = self.area_modulus_n_per_m * materials[n].factor * parts.elements.skin_share(n);
                 cutis_constraints::skin_compliance(f64::from(params[n][0]), modulus)
             })?
         } else {
@@ -185,7 +185,7 @@ impl StcSection {
         parts: &BodyParts<'_>,
         groups: &Groups,
     ) -> Result<SystemBuilder<f32>, Error> {
-        let (skin, materials) = (&parts.body.skin, self.kept_materials(parts)?);
+        let (skin, materials) = (parts.elements.skin(), self.kept_materials(parts)?);
         let params: Result<Vec<_>, Error> = skin
             .iter()
             .zip(&materials)
@@ -278,7 +278,7 @@ impl ConstraintKind for StcSection {
         builder: SystemBuilder<f32>,
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
-        let groups = greedy(&parts.body.skin, parts.body.mesh.positions.len())?;
+        let groups = greedy(parts.elements.skin(), parts.body.mesh.positions.len())?;
         let builder = match self.form {
             StcForm::Energy => self.add_energy_form(builder, parts, &groups)?,
             StcForm::Paper => self.add_paper_form(builder, parts, &groups)?,
@@ -297,12 +297,11 @@ impl ConstraintKind for StcSection {
             }
             Ok(())
         };
-        add(&parts.body.removed.triangles, &|_| 1.0)?;
-        let Some(severed) = &parts.body.severed else { return Ok(()) };
+        add(parts.elements.removed(), &|_| 1.0)?;
+        let Some(divided) = parts.elements.divided() else { return Ok(()) };
         // A divided triangle pulled on its corners in the scan. Now its copies do.
-        add(&severed.triangles, &|_| 1.0)?;
-        let whole = parts.body.skin.len() - severed.copies.len();
-        add(&parts.body.skin[whole..], &|copy| -f64::from(severed.copies[copy].share))
+        add(divided.triangles, &|_| 1.0)?;
+        add(divided.copies, &|copy| -f64::from(divided.shares[copy]))
     }
 
     /// `T s (1 + β s)` with `s = 1/scale − 1`: the derivative of the energy of a triangle by its

@@ -48,18 +48,18 @@ impl ConstraintKind for VolumeConstraintSection {
         builder: SystemBuilder<f32>,
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
-        let mesh = &parts.body.mesh;
-        let groups = Groups::from_colors(&mesh.tet_colors())?;
+        let elements = &parts.elements;
+        let groups = Groups::from_colors(&elements.tet_colors())?;
         let stiffness = if parts.compliant() {
-            let volumes = mesh.tet_volumes();
+            let volumes = elements.tet_volumes();
             let moduli = parts.moduli(MODULUS_KEY, self.bulk_modulus_pa, |row| row.bulk_modulus_pa)?;
-            compliances(&mesh.tets, |n, tet| {
+            compliances(elements.tets(), |n, tet| {
                 cutis_constraints::volume_compliance(f64::from(volumes[n]), moduli.of(tet))
             })?
         } else {
             Stiffness::pbd(self.stiffness as f32)
         };
         let rest = VolumeMaterial { rest_scale: 1.0 };
-        Ok((builder.add_from_rest::<Volume, 4>(&mesh.tets, &rest, stiffness, &groups)?, groups.len()))
+        Ok((builder.add_from_rest::<Volume, 4>(elements.tets(), &rest, stiffness, &groups)?, groups.len()))
     }
 }
