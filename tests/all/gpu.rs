@@ -40,7 +40,7 @@ fn state(folder: &Path) -> Vec<f32> {
 /// True if two runs agree. Software adapters must give the CPU's bits. Hardware may fuse a
 /// multiplication and an addition, so its results may differ by 1e-5 of the body's size and of the
 /// largest velocity.
-fn agree(gpu: &Gpu, first: &Path, second: &Path) -> bool {
+pub fn agree(gpu: &Gpu, first: &Path, second: &Path) -> bool {
     let (first, second) = (state(first), state(second));
     if is_exact(gpu) {
         return first == second;

@@ -8,6 +8,7 @@ mod bad_values;
 mod chainmail;
 mod determinism;
 mod gpu;
+mod growing_cut;
 mod identity;
 mod left_out;
 mod materials;

@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("skin   {} triangles, {:.1} % coverage", skin.report.triangles, 100.0 * skin.report.coverage);
 
     let (from, to) = phantom.incision_site();
-    let incision = Incision { from_mm: from, to_mm: to, depth_mm: 24.0, width_mm: Some(4.0) };
+    let incision = Incision { path_mm: vec![from, to], depth_mm: 24.0, width_mm: Some(4.0) };
     let slits = Slit::on_lattice(&lattice, &on_body, &[incision])?;
     let (mut triangles, _) = mesh.divide_skin(&on_body);
     let cut = Cut::of_slits(&mesh, &triangles, slits)?;

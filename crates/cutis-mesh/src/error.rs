@@ -87,10 +87,18 @@ pub enum MeshError {
     IncisionSize {
         /// Number of the incision, from 0.
         incision: usize,
-        /// `depth_mm`, `width_mm`, or `length` (the distance from `from_mm` to `to_mm`).
+        /// `depth_mm`, `width_mm`, or `length` of a segment.
         key: &'static str,
         /// The given value.
         value: f64,
+    },
+    /// The path of an incision cannot be cut.
+    #[error("incision {incision}: its path cannot be cut: {why}")]
+    IncisionPath {
+        /// Number of the incision, from 0.
+        incision: usize,
+        /// What is wrong, and what would be right.
+        why: String,
     },
     /// The segment of an incision is too far from the skin.
     #[error(

@@ -15,13 +15,13 @@ const MOST_BINS: f64 = 1024.0;
 /// The points and the axis by which the opening of a wound is measured.
 ///
 /// The left lip is on the left side of the middle surface of the slit, the right lip on the other
-/// side. Only points between the start and the end of the segment count. The lips of a cut that
+/// side. Only points between the start and the end of the path count. The lips of a cut that
 /// removes tissue are the remaining skin vertices of the skin triangles that the slit opens. The
 /// lips of a cut of no width are the points where it cuts the edges of the skin.
 ///
-/// The segment is divided into equal bins of at least one lattice step. The opening in a bin is the
+/// The path is divided into equal bins of at least one lattice step. The opening in a bin is the
 /// difference between the mean positions of the two lips, along the lateral axis of the slit at
-/// rest. The opening is also measured in the middle tenth of the segment, or in one lattice step if
+/// rest. The opening is also measured in the middle tenth of the path, or in one lattice step if
 /// that is longer.
 ///
 /// The points are chosen at rest, so that openings before and after a run differ only by motion. At
@@ -29,8 +29,7 @@ const MOST_BINS: f64 = 1024.0;
 /// nearest remaining vertices, that is, the width rounded up to the lattice.
 #[derive(Clone, Debug)]
 pub struct Gape {
-    lateral: Vector3<f64>,
-    /// The bins in the middle 80 % of the segment that have points on both sides.
+    /// The bins in the middle 80 % of the path that have points on both sides.
     bins: Vec<Sides>,
     middle: Sides,
     /// Points of the left lip, then of the right lip.
@@ -42,12 +41,15 @@ pub struct Gape {
 struct Placed {
     point: Embedded,
     right: bool,
-    at: SlitPoint,
+    /// Length along the path in m.
+    along: f64,
 }
 
-/// The points of both lips in a part of the segment, as ranges of `Gape::points`.
+/// The points of both lips in a part of the path, as ranges of `Gape::points`.
 #[derive(Clone, Debug)]
 struct Sides {
+    /// Unit vector from the left to the right lip at rest.
+    lateral: Vector3<f64>,
     left: Range<usize>,
     right: Range<usize>,
 }
@@ -55,7 +57,7 @@ struct Sides {
 /// Openings of one wound in mm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WoundGape {
-    /// Mean opening over the bins, without the first and last tenth of the segment.
+    /// Mean opening over the bins, without the first and last tenth of the path.
     pub mean_mm: f64,
     /// Opening in the middle tenth.
     pub mid_mm: f64,
@@ -72,67 +74,66 @@ impl Gape {
     /// The gape of a cut that removes tissue. `lips` are the remaining vertices at its lips.
     pub(crate) fn of_vertices(
         mesh: &TetMesh,
-        incision: usize,
-        slit: &Slit,
+        slits: &[Slit],
         lips: &[u32],
         step: f64,
     ) -> Result<Self, MeshError> {
         let place = |&vertex: &u32| {
-            let at = slit.coordinates(mesh.positions[vertex as usize].cast());
-            Placed { point: Embedded::node(vertex), right: at.lateral >= 0.0, at }
+            let (along, at) = place(slits, mesh.positions[vertex as usize].cast())?;
+            Some(Placed { point: Embedded::node(vertex), right: at.lateral >= 0.0, along })
         };
-        Self::new(incision, slit, lips.iter().map(place).collect(), step)
+        Self::new(slits, lips.iter().filter_map(place).collect(), step)
     }
 
     /// The gape of a cut of no width. `rest` are the positions of all nodes.
     pub(crate) fn of_lips(
         rest: &[Point3<f32>],
-        incision: usize,
-        slit: &Slit,
+        slits: &[Slit],
         lips: &[LipPoint],
         step: f64,
     ) -> Result<Self, MeshError> {
         let place = |lip: &LipPoint| {
-            let at = slit.coordinates(lip.at.at(rest).cast());
-            Placed { point: lip.at, right: lip.right, at }
+            let (along, _) = place(slits, lip.at.at(rest).cast())?;
+            Some(Placed { point: lip.at, right: lip.right, along })
         };
-        Self::new(incision, slit, lips.iter().map(place).collect(), step)
+        Self::new(slits, lips.iter().filter_map(place).collect(), step)
     }
 
-    fn new(incision: usize, slit: &Slit, mut placed: Vec<Placed>, step: f64) -> Result<Self, MeshError> {
-        placed.retain(|placed| (0.0..=slit.length).contains(&placed.at.along));
+    fn new(slits: &[Slit], mut placed: Vec<Placed>, step: f64) -> Result<Self, MeshError> {
+        let length: f64 = slits.iter().map(|slit| slit.length).sum();
         // The sort is stable, so that points at one place keep their order.
-        placed.sort_by(|a, b| a.right.cmp(&b.right).then(a.at.along.total_cmp(&b.at.along)));
+        placed.sort_by(|a, b| a.right.cmp(&b.right).then(a.along.total_cmp(&b.along)));
         let left = placed.partition_point(|placed| !placed.right);
         let right = placed.len() - left;
         if left == 0 || right == 0 {
-            return Err(MeshError::IncisionWithoutLips { incision, left, right });
+            return Err(MeshError::IncisionWithoutLips { incision: slits[0].incision, left, right });
         }
         let between = |from: f64, to: f64| {
             let find = |part: Range<usize>, limit: f64| {
-                part.start + placed[part].partition_point(|placed| placed.at.along < limit)
+                part.start + placed[part].partition_point(|placed| placed.along < limit)
             };
             Sides {
+                lateral: lateral_at(slits, 0.5 * (from + to)),
                 left: find(0..left, from)..find(0..left, to),
                 right: find(left..placed.len(), from)..find(left..placed.len(), to),
             }
         };
-        let count = (slit.length / step).floor().clamp(1.0, MOST_BINS);
-        let width = slit.length / count;
+        let count = (length / step).floor().clamp(1.0, MOST_BINS);
+        let width = length / count;
         let inner = |bin: &f64| count < 10.0 / 8.0 || (0.1..=0.9).contains(&((bin + 0.5) / count));
         let bins = (0..count as usize).map(|bin| bin as f64).filter(inner);
         let bins: Vec<Sides> =
             bins.map(|bin| between(bin * width, (bin + 1.0) * width)).filter(Sides::complete).collect();
-        // Widen the middle until it contains a point of each lip. The whole segment does.
-        let mut half = (slit.length / 20.0).max(step / 2.0);
-        let mut middle = between(slit.length / 2.0 - half, slit.length / 2.0 + half);
+        // Widen the middle until it contains a point of each lip. The whole path does.
+        let mut half = (length / 20.0).max(step / 2.0);
+        let mut middle = between(length / 2.0 - half, length / 2.0 + half);
         while !middle.complete() {
             half *= 2.0;
-            middle = between(slit.length / 2.0 - half, slit.length / 2.0 + half);
+            middle = between(length / 2.0 - half, length / 2.0 + half);
         }
         let bins = if bins.is_empty() { vec![middle.clone()] } else { bins };
         let points = placed.iter().map(|placed| placed.point).collect();
-        Ok(Self { lateral: slit.lateral, bins, middle, points, left })
+        Ok(Self { bins, middle, points, left })
     }
 
     /// Points of the left lip, from start to end.
@@ -173,7 +174,7 @@ impl Gape {
         };
         let opening = |sides: &Sides| {
             let apart = (mean(&sides.right) - mean(&sides.left)) * 1000.0;
-            (apart.dot(&self.lateral), apart.norm())
+            (apart.dot(&sides.lateral), apart.norm())
         };
         let bins = self.bins.len();
         let (lateral, distance) =
@@ -187,6 +188,32 @@ impl Gape {
             bins,
         }
     }
+}
+
+/// Length along the path of some slits at a position, and its coordinates in the slit that is
+/// closest to it. None if it lies beside no slit.
+fn place(slits: &[Slit], position: Point3<f64>) -> Option<(f64, SlitPoint)> {
+    let mut before = 0.0;
+    let mut best: Option<(f64, SlitPoint)> = None;
+    for slit in slits {
+        let at = slit.coordinates(position);
+        let closer = best.is_none_or(|(_, other)| at.lateral.abs() < other.lateral.abs());
+        if (0.0..=slit.length).contains(&at.along) && closer {
+            best = Some((before + at.along, at));
+        }
+        before += slit.length;
+    }
+    best
+}
+
+/// Lateral axis of the slit at a length along the path.
+fn lateral_at(slits: &[Slit], along: f64) -> Vector3<f64> {
+    let mut end = 0.0;
+    let holds = |slit: &&Slit| {
+        end += slit.length;
+        along < end
+    };
+    slits.iter().find(holds).unwrap_or(&slits[slits.len() - 1]).lateral
 }
 
 impl Sides {

@@ -10,14 +10,12 @@ use crate::neighbors::Neighbors;
 use crate::slit::{Facet, Slit, check_indices};
 use crate::{MeshError, NO_VERTEX, TetMesh};
 
-/// A straight incision along a segment on or near the skin, in world millimeters.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// An incision along straight segments on or near the skin, in world millimeters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Incision {
-    /// Start of the segment in mm.
-    pub from_mm: [f64; 3],
-    /// End of the segment in mm.
-    pub to_mm: [f64; 3],
+    /// Ends of the segments in mm: two points or more.
+    pub path_mm: Vec<[f64; 3]>,
     /// Depth below the local skin in mm.
     pub depth_mm: f64,
     /// Full width of the slit in mm. Without it the cut has no width: it removes nothing.
@@ -39,10 +37,10 @@ pub struct Incision {
 pub struct Cut {
     /// One flag per mesh vertex: true if the vertex is removed.
     pub removed: Vec<bool>,
-    /// The slits, in the order of the incisions.
+    /// The slits: one for each segment, in the order of the incisions.
     pub slits: Vec<Slit>,
-    /// The gape of each slit, in the same order. Those of slits without a width are missing until
-    /// [`Cut::sever`].
+    /// The gape of each incision, in their order. Those of incisions without a width are missing
+    /// until [`Cut::sever`].
     pub gapes: Vec<Gape>,
     /// One flag per mesh vertex: true if a slit can cut an element with this corner.
     near: Vec<bool>,
@@ -126,15 +124,10 @@ impl Cut {
         self.slits.iter().map(|slit| slit.distance(position) * 1000.0).fold(f64::INFINITY, f64::min)
     }
 
-    /// True if the line between two rest positions passes through the middle surface of a slit.
+    /// True if the line between two rest positions passes through the middle surface of a slit with
+    /// a width.
     pub(crate) fn crosses(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
         self.slits.iter().any(|slit| !slit.removes_nothing() && slit.crosses(a, b))
-    }
-
-    /// True if the line between two rest positions passes through the middle surface of a slit,
-    /// with or without a width.
-    pub(crate) fn separates(&self, a: Point3<f32>, b: Point3<f32>) -> bool {
-        self.slits.iter().any(|slit| slit.crosses(a, b))
     }
 
     /// True if a rest position is in a slit.
@@ -152,21 +145,30 @@ impl Cut {
     }
 
     fn check_each_slit_cuts(&self, mesh: &TetMesh) -> Result<(), MeshError> {
-        for (incision, slit) in self.removing() {
+        for slits in self.removing() {
             let near = |&v: &u32| self.near[v as usize];
-            let crosses =
-                |[a, b]: &[u32; 2]| slit.crosses(mesh.positions[*a as usize], mesh.positions[*b as usize]);
-            let held = mesh.positions.iter().zip(&self.near).any(|(&p, &near)| near && slit.contains(p));
+            let crosses = |[a, b]: &[u32; 2]| {
+                let [a, b] = [a, b].map(|&v| mesh.positions[v as usize]);
+                slits.iter().any(|slit| slit.crosses(a, b))
+            };
+            let contains = |p: Point3<f32>| slits.iter().any(|slit| slit.contains(p));
+            let held = mesh.positions.iter().zip(&self.near).any(|(&p, &near)| near && contains(p));
             if !held && !mesh.edges.iter().any(|edge| edge.iter().all(near) && crosses(edge)) {
+                let incision = slits[0].incision;
                 return Err(MeshError::IncisionEmpty { incision, step_mm: mesh.lattice.longest_step_mm() });
             }
         }
         Ok(())
     }
 
-    /// The slits with a width, with their numbers.
-    fn removing(&self) -> impl Iterator<Item = (usize, &Slit)> {
-        self.slits.iter().enumerate().filter(|(_, slit)| !slit.removes_nothing())
+    /// The slits of each incision, in order.
+    pub fn incisions(&self) -> impl Iterator<Item = &[Slit]> {
+        self.slits.chunk_by(|a, b| a.incision == b.incision)
+    }
+
+    /// The slits of each incision with a width.
+    fn removing(&self) -> impl Iterator<Item = &[Slit]> {
+        self.incisions().filter(|slits| !slits[0].removes_nothing())
     }
 
     /// Removes the vertices whose tets are all cut.
@@ -180,25 +182,25 @@ impl Cut {
         self.removed.iter_mut().zip(held).for_each(|(removed, held)| *removed |= !held);
     }
 
-    /// The gape of each slit. The lips are the remaining vertices of the skin triangles that the
-    /// slit opens.
+    /// The gape of each incision with a width. The lips are the remaining vertices of the skin
+    /// triangles that it opens.
     fn find_lips(&self, mesh: &TetMesh, triangles: &[[u32; 3]]) -> Result<Vec<Gape>, MeshError> {
         let step = mesh.lattice.longest_step_mm() / 1000.0;
-        let gape = |(incision, slit): (usize, &Slit)| {
-            let opened = |triangle: &&[u32; 3]| {
-                let corner = |&v: &u32| mesh.positions[v as usize];
-                let touched = triangle.iter().all(|v| slit.near(corner(v), step))
-                    && (triangle.iter().any(|v| self.removed[*v as usize])
-                        || pairs(triangle).any(|(a, b)| slit.crosses(corner(&a), corner(&b))));
-                touched
-                    && Facet::of(triangle.map(|v| mesh.positions[v as usize])).area_vector.dot(&slit.inward)
-                        < 0.0
-            };
+        let opens = |slit: &Slit, triangle: &[u32; 3]| {
+            let corner = |&v: &u32| mesh.positions[v as usize];
+            let touched = triangle.iter().all(|v| slit.near(corner(v), step))
+                && (triangle.iter().any(|v| self.removed[*v as usize])
+                    || pairs(triangle).any(|(a, b)| slit.crosses(corner(&a), corner(&b))));
+            touched
+                && Facet::of(triangle.map(|v| mesh.positions[v as usize])).area_vector.dot(&slit.inward) < 0.0
+        };
+        let gape = |slits: &[Slit]| {
+            let opened = |triangle: &&[u32; 3]| slits.iter().any(|slit| opens(slit, triangle));
             let mut lips: Vec<u32> = triangles.iter().filter(opened).flatten().copied().collect();
             lips.sort_unstable();
             lips.dedup();
             lips.retain(|&v| !self.removed[v as usize]);
-            Gape::of_vertices(mesh, incision, slit, &lips, step)
+            Gape::of_vertices(mesh, slits, &lips, step)
         };
         self.removing().map(gape).collect()
     }
@@ -231,9 +233,9 @@ fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshE
     let refuse = |points: &mut dyn Iterator<Item = usize>, coarse: bool| {
         let touched = points.flat_map(|point| {
             let position = position_of(point);
-            let near = slits.iter().enumerate().filter(move |(_, slit)| slit.near(position, margin));
-            near.filter(move |(_, slit)| touches(slit, point, position))
-                .map(move |(incision, slit)| (incision, slit.distance(position), position))
+            let near = slits.iter().filter(move |slit| slit.near(position, margin));
+            near.filter(move |slit| touches(slit, point, position))
+                .map(move |slit| (slit.incision, slit.distance(position), position))
         });
         match touched.max_by(|(_, a, _), (_, b, _)| a.total_cmp(b)) {
             None => Ok(()),

@@ -18,6 +18,7 @@ mod incision;
 mod lattice;
 mod mass;
 mod neighbors;
+mod path;
 mod select;
 pub mod sever;
 mod shell;

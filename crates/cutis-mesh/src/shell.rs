@@ -98,7 +98,13 @@ impl Shell {
         }
         let positions: Vec<Point3<f32>> =
             points.iter().map(|&point| mesh.frame.to_local(lattice.mm(grid.point(point as usize)))).collect();
-        let rows = Followed::by(mesh, cut, &vertex_of, &points, &positions);
+        let blades = severed.map(|severed| severed.blades.as_slice()).unwrap_or_default();
+        let reach = longest_edge(mesh);
+        let separates = |a: Point3<f32>, b: Point3<f32>| {
+            let ends = [a.cast(), b.cast()];
+            cut.crosses(a, b) || blades.iter().any(|blade| blade.separates(ends, reach))
+        };
+        let rows = Followed::by(mesh, &cut.removed, &separates, &vertex_of, &points, &positions);
         for (n, &point) in points.iter().enumerate() {
             vertex_of[point as usize] = (vertices + n) as u32;
         }
@@ -116,10 +122,8 @@ impl Shell {
             tet.iter().any(|&v| is_removed(v))
                 || (0..4).any(|a| (0..a).any(|b| cut.crosses(position(tet[a]), position(tet[b]))))
         });
-        let blades = severed.map(|severed| severed.blades.as_slice()).unwrap_or_default();
         let count = vertices + positions.len();
-        let DividedShell { whole, followers, pieces } =
-            divide_shell(tets, count, &position, blades, longest_edge(mesh));
+        let DividedShell { whole, followers, pieces } = divide_shell(tets, count, &position, blades, reach);
         let mut rows = rows;
         let mut positions = positions;
         for follower in followers {
@@ -213,7 +217,15 @@ impl Followed {
         self.held_by.push(held_by);
     }
 
-    fn by(mesh: &TetMesh, cut: &Cut, vertex_of: &[u32], points: &[u32], positions: &[Point3<f32>]) -> Self {
+    /// `separates` tells whether a cut is between two rest positions.
+    fn by(
+        mesh: &TetMesh,
+        removed: &[bool],
+        separates: &dyn Fn(Point3<f32>, Point3<f32>) -> bool,
+        vertex_of: &[u32],
+        points: &[u32],
+        positions: &[Point3<f32>],
+    ) -> Self {
         let around = Neighbors::new(&mesh.lattice);
         let is_inactive =
             |point: usize| mesh.inactive.as_ref().is_some_and(|inactive| inactive.points[point]);
@@ -224,8 +236,8 @@ impl Followed {
             if !is_inactive(point as usize) {
                 around.of(point as usize, |neighbor| match vertex_of[neighbor] {
                     NO_VERTEX => held_by += u32::from(is_inactive(neighbor)),
-                    vertex if cut.removed[vertex as usize] => {}
-                    vertex if cut.separates(position, mesh.positions[vertex as usize]) => {}
+                    vertex if removed[vertex as usize] => {}
+                    vertex if separates(position, mesh.positions[vertex as usize]) => {}
                     vertex => rows.neighbors.push(vertex),
                 });
             }

@@ -3,13 +3,14 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::incision::Incision;
+use crate::path::check_path;
 use crate::{Frame, Lattice, MeshError};
 
 /// Largest number of sample points and bins along one slit. It limits the work for very long
 /// segments.
 const MOST_BINS: f64 = 1024.0;
 
-/// An incision placed on the skin at rest. Lengths are in meters, positions in local meters.
+/// A segment of an incision placed on the skin at rest. Lengths are in meters, positions in local meters.
 ///
 /// It has three orthogonal axes. *Along* points from start to end. *Inward* is opposite to the mean
 /// outward normal of the skin near the segment. *Lateral* is inward × along: the left lip has
@@ -19,6 +20,8 @@ const MOST_BINS: f64 = 1024.0;
 /// varies along the slit, so that curved skin is cut to an even depth.
 #[derive(Clone, Debug)]
 pub struct Slit {
+    /// Number of the incision of which it is a segment.
+    pub(crate) incision: usize,
     start: Point3<f64>,
     pub(crate) along: Vector3<f64>,
     pub(crate) lateral: Vector3<f64>,
@@ -44,7 +47,7 @@ pub(crate) struct SlitPoint {
 }
 
 impl Slit {
-    /// Places incisions on the skin of a lattice. `skin` holds triangles in flat lattice indices
+    /// Places the segments of incisions on the skin of a lattice. `skin` holds triangles in flat lattice indices
     /// ([`crate::TissueMask::skin`]).
     ///
     /// This needs no mesh, so the region that is meshed can depend on the slits.
@@ -52,6 +55,7 @@ impl Slit {
     /// # Errors
     /// [`MeshError::VertexIndex`] if a triangle names a point that does not exist.
     /// [`MeshError::IncisionSize`] if a length, depth or width is not finite and positive.
+    /// [`MeshError::IncisionPath`] if a path has fewer than two points, turns back or crosses itself.
     /// [`MeshError::IncisionOffSkin`] if a segment is too far from the skin.
     /// [`MeshError::IncisionThroughSkin`] if it pierces the skin.
     pub fn on_lattice(
@@ -63,11 +67,14 @@ impl Slit {
         check_indices(skin, grid.len())?;
         let position = |point: u32| frame.to_local(lattice.mm(grid.point(point as usize)));
         let surface = SkinSurface::new(frame, lattice, skin, &position);
-        incisions
-            .iter()
-            .enumerate()
-            .map(|(number, incision)| Self::place(&surface, number, incision))
-            .collect()
+        let mut slits = Vec::new();
+        for (number, incision) in incisions.iter().enumerate() {
+            check_path(number, &incision.path_mm, lattice.longest_step_mm())?;
+            for ends in incision.path_mm.windows(2) {
+                slits.push(Self::place(&surface, number, incision, [ends[0], ends[1]])?);
+            }
+        }
+        Ok(slits)
     }
 
     /// Finds the axes of the slit and the height of the skin along it.
@@ -76,9 +83,14 @@ impl Slit {
     /// suffices for a segment under strongly curved skin. The segment must come within `reach` of
     /// the center of a skin triangle. Along at least half of the segment there must be skin within
     /// `reach` above or below it.
-    fn place(surface: &SkinSurface<'_>, number: usize, cut: &Incision) -> Result<Self, MeshError> {
+    fn place(
+        surface: &SkinSurface<'_>,
+        number: usize,
+        cut: &Incision,
+        [from_mm, to_mm]: [[f64; 3]; 2],
+    ) -> Result<Self, MeshError> {
         let local = |mm: [f64; 3]| Point3::from((Point3::from(mm) - surface.frame.origin_mm) / 1000.0);
-        let (start, end) = (local(cut.from_mm), local(cut.to_mm));
+        let (start, end) = (local(from_mm), local(to_mm));
         let length = (end - start).norm();
         let width = cut.width_mm.map(|width| ("width_mm", width));
         let sizes = [("length", length * 1000.0), ("depth_mm", cut.depth_mm)].into_iter().chain(width);
@@ -96,8 +108,8 @@ impl Slit {
         };
         let off_skin = |distance: f64| MeshError::IncisionOffSkin {
             incision: number,
-            from_mm: cut.from_mm,
-            to_mm: cut.to_mm,
+            from_mm,
+            to_mm,
             distance_mm: distance * 1000.0,
             reach_mm: reach * 1000.0,
         };
@@ -116,15 +128,25 @@ impl Slit {
         if outward.norm() < 0.1 {
             return Err(MeshError::IncisionThroughSkin {
                 incision: number,
-                from_mm: cut.from_mm,
-                to_mm: cut.to_mm,
+                from_mm,
+                to_mm,
                 normal: normal.into(),
             });
         }
         let inward = -outward.normalize();
         let lateral = inward.cross(&along);
-        let mut slit =
-            Self { start, along, lateral, inward, length, half_width, depth, above: reach, skin: Vec::new() };
+        let mut slit = Self {
+            incision: number,
+            start,
+            along,
+            lateral,
+            inward,
+            length,
+            half_width,
+            depth,
+            above: reach,
+            skin: Vec::new(),
+        };
         let (heights, on_skin) = slit.heights(surface);
         if 2 * on_skin < heights.len() {
             let from = |end: Point3<f64>| {
@@ -190,7 +212,7 @@ impl Slit {
     }
 
     /// The point of the skin at a length along the segment, in local meters.
-    pub(crate) fn skin_at(&self, along: f64) -> Point3<f64> {
+    pub fn skin_at(&self, along: f64) -> Point3<f64> {
         self.start + self.along * along + self.inward * self.height(along)
     }
 
@@ -266,12 +288,6 @@ impl Slit {
     /// Unit vector from the start to the end of the segment.
     pub fn along(&self) -> Vector3<f64> {
         self.along
-    }
-
-    /// The point of the skin above the middle of the slit at rest, in local meters.
-    pub fn middle(&self) -> Point3<f64> {
-        let height = self.skin.get(self.skin.len() / 2).copied().unwrap_or(0.0);
-        self.start + self.along * (self.length / 2.0) + self.inward * height
     }
 
     /// Unit vector across the slit, from the left to the right lip.

@@ -138,11 +138,15 @@ impl Reach {
     fn of(name: &'static str, set: &[String], at_rest: bool) -> Result<Self, Failure> {
         let set = [set, &[format!("scan_is_at_rest={at_rest}")]].concat();
         let Moved { before, after, skin, incision, growth_mm, change } = Moved::of(name, &set)?;
-        let [from, to] = [incision.from_mm, incision.to_mm].map(Point3::from);
+        let path: Vec<Point3<f64>> = incision.path().into_iter().map(Point3::from).collect();
+        let from_path = |position: Point3<f64>| {
+            let segments = path.windows(2).map(|ends| to_segment(position, ends[0], ends[1] - ends[0]));
+            segments.fold(f64::INFINITY, f64::min)
+        };
         let mut beyond_mm = [0.0_f64; 4];
         let (mut far, mut moved) = (0, 0);
         for v in skin.into_iter().map(|v| v as usize) {
-            let distance = to_segment(before[v], from, to - from);
+            let distance = from_path(before[v]);
             let displacement = (after[v] - before[v]).norm();
             for (beyond, _) in beyond_mm.iter_mut().zip(DISTANCES).filter(|(_, least)| distance > *least) {
                 *beyond = beyond.max(displacement);

@@ -373,8 +373,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: the close-up is centered on the origin of the body",
         "crates/cutis/src/output/pictures.rs",
-        "frame.origin_mm + slit.middle().coords * 1000.0",
-        "frame.origin_mm + slit.middle().coords",
+        "frame.origin_mm + middle.coords * 1000.0",
+        "frame.origin_mm + middle.coords",
     ),
     mutation(
         Outputs,

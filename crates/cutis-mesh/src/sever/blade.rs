@@ -96,6 +96,16 @@ impl Blade {
         self.reached_at(p + (q - p) * (d / (d - e)), reach)
     }
 
+    /// True if the blade severs the line between two positions. `reach` is at least its length.
+    pub(crate) fn separates(&self, ends: [Point3<f64>; 2], reach: f64) -> bool {
+        let [low, high] = self.bounds();
+        let near =
+            |p: &Point3<f64>| (0..3).all(|axis| (low[axis] - reach..=high[axis] + reach).contains(&p[axis]));
+        let side = |p: Point3<f64>| self.distance(p, reach).map(signed);
+        let [Some(d), Some(e)] = ends.map(|p| Some(p).filter(near).and_then(side)) else { return false };
+        self.crosses(ends, [d, e], reach).is_some()
+    }
+
     /// Length of the path in m.
     pub fn length(&self) -> f64 {
         self.length

@@ -1,10 +1,12 @@
 //! Incisions of no width on a mesh with its skin.
 
+use nalgebra::Vector3;
+
 use super::blade::{Blade, Station};
 use super::growth::Growth;
 use super::pieces::Pieces;
 use super::severing::{Severing, longest_edge};
-use super::wound::TriangleCopy;
+use super::wound::{TooManyBlades, TriangleCopy, Wound};
 use crate::gape::Gape;
 use crate::{Cut, MeshError, Slit, TetMesh};
 
@@ -26,85 +28,127 @@ pub struct Severed {
     pub tet_pieces: Pieces<4>,
     /// The shapes of the copies of skin triangles. Their field `copies` is a number in `copies`.
     pub skin_pieces: Pieces<3>,
-    /// What the cuts need to grow, if they do.
-    pub growth: Option<Growth>,
 }
 
-impl Slit {
-    /// The blade of the incision: through the skin along the segment, with stations that are at
-    /// most `step` apart. `margin` is that of [`Blade::along`].
-    fn blade(&self, step: f64, margin: f64) -> Option<Blade> {
-        let count = (self.length() / step).ceil().clamp(1.0, Self::MOST_STATIONS) as usize;
-        let station = |n: usize| {
-            let along = self.length() * (n as f64 / count as f64);
-            Station { skin: self.skin_at(along), inward: self.inward() }
-        };
-        let stations: Vec<Station> = (0..=count).map(station).collect();
-        Blade::along(&stations, self.depth(), self.above(), margin)
-    }
+/// Largest number of stations of a segment of a blade.
+const MOST_STATIONS: f64 = 1024.0;
 
-    /// Largest number of stations of a blade.
-    const MOST_STATIONS: f64 = 1024.0;
+/// The blade of an incision: through the skin along its segments, with stations that are at most
+/// `step` apart. `margin` is that of [`Blade::along`].
+fn blade(slits: &[Slit], step: f64, margin: f64) -> Option<Blade> {
+    let mut stations: Vec<Station> = Vec::new();
+    for (number, slit) in slits.iter().enumerate() {
+        let count = (slit.length() / step).ceil().clamp(1.0, MOST_STATIONS) as usize;
+        let station = |n: usize| {
+            let part = n as f64 / count as f64;
+            Some(Station {
+                skin: slit.skin_at(slit.length() * part),
+                inward: inward_at(slits, number, part)?,
+            })
+        };
+        let mut own = (0..=count).map(station);
+        // Where two segments meet, the blade passes between their ends.
+        if let Some(last) = stations.last_mut() {
+            last.skin = nalgebra::center(&last.skin, &own.next()??.skin);
+        }
+        for station in own {
+            stations.push(station?);
+        }
+    }
+    let above = slits.iter().map(Slit::above).fold(0.0, f64::max);
+    Blade::along(&stations, slits[0].depth(), above, margin)
+}
+
+/// Inward direction of a blade at a part of a segment, from 0 to 1. It is that of the segment in its
+/// middle and turns evenly from there to the middle of the next one. If it turned at once where two
+/// segments meet, the blade would fold over below the skin or above it.
+fn inward_at(slits: &[Slit], number: usize, part: f64) -> Option<Vector3<f64>> {
+    let other = if part < 0.5 { number.checked_sub(1) } else { Some(number + 1) };
+    let own = &slits[number];
+    let Some(other) = other.and_then(|other| slits.get(other)) else { return Some(own.inward()) };
+    let from_middle = (part - 0.5).abs() * own.length();
+    let share = from_middle / (0.5 * (own.length() + other.length()));
+    (own.inward() * (1.0 - share) + other.inward() * share).try_normalize(0.0)
 }
 
 impl Cut {
-    /// Cuts the mesh and its skin along the slits without a width, and adds the gapes of these
-    /// slits. Call it after [`Cut::apply`] and once. None if no slit is without a width. With
-    /// `grows`, the result can tell the elements of a wound that is not finished.
+    /// Cuts the mesh and its skin along the incisions without a width, and adds their gapes. Call it
+    /// after [`Cut::apply`] and once. None if no incision is without a width.
     ///
     /// # Errors
-    /// [`MeshError::IncisionEmpty`] if a slit crosses no edge. [`MeshError::IncisionWithoutLips`]
-    /// if it does not cut the skin. [`MeshError::TooManyCuts`] if too many slits meet in one tet.
+    /// [`MeshError::IncisionEmpty`] if an incision crosses no edge.
+    /// [`MeshError::IncisionWithoutLips`] if it does not cut the skin. [`MeshError::TooManyCuts`] if
+    /// too many incisions meet in one tet.
     pub fn sever(
         &mut self,
         mesh: &mut TetMesh,
         triangles: &mut Vec<[u32; 3]>,
-        grows: bool,
     ) -> Result<Option<Severed>, MeshError> {
-        let severing_slits: Vec<usize> =
-            (0..self.slits.len()).filter(|&n| self.slits[n].removes_nothing()).collect();
-        if severing_slits.is_empty() {
+        let severed = self.sever_with(mesh, triangles, &mut |severing, mesh, _| {
+            severing.cut_all();
+            Ok((severing.wound(mesh)?, ()))
+        })?;
+        let Some((severed, ())) = severed else { return Ok(None) };
+        // A vertex that a blade touches may lose all its tets.
+        let mut held = vec![false; mesh.positions.len()];
+        mesh.tets.iter().flatten().for_each(|&v| held[v as usize] = true);
+        self.removed.iter_mut().zip(held).for_each(|(removed, held)| *removed |= !held);
+        Ok(Some(severed))
+    }
+
+    /// Does what [`Cut::sever`] does, and returns how the cuts grow to that. No vertex counts as
+    /// removed.
+    ///
+    /// # Errors
+    /// The errors of [`Cut::sever`].
+    pub fn sever_growing(
+        &mut self,
+        mesh: &mut TetMesh,
+        triangles: &mut Vec<[u32; 3]>,
+    ) -> Result<Option<(Severed, Growth)>, MeshError> {
+        self.sever_with(mesh, triangles, &mut |severing, mesh, triangles| severing.grow(mesh, triangles))
+    }
+
+    fn sever_with<G>(
+        &mut self,
+        mesh: &mut TetMesh,
+        triangles: &mut Vec<[u32; 3]>,
+        cut: &mut dyn FnMut(&mut Severing, &TetMesh, &[[u32; 3]]) -> Result<(Wound, G), TooManyBlades>,
+    ) -> Result<Option<(Severed, G)>, MeshError> {
+        let cuts: Vec<(usize, &[Slit])> =
+            self.incisions().enumerate().filter(|(_, slits)| slits[0].removes_nothing()).collect();
+        if cuts.is_empty() {
             return Ok(None);
         }
         let mut severing = Severing::new(mesh);
         let mut blades = Vec::new();
         let step_mm = mesh.lattice.longest_step_mm();
         let step = step_mm / 1000.0;
-        for &incision in &severing_slits {
-            let blade = self.slits[incision].blade(step / 2.0, 2.0 * longest_edge(mesh));
+        for &(incision, slits) in &cuts {
+            let blade = blade(slits, step / 2.0, 2.0 * longest_edge(mesh));
             let crossing = blade.map(|blade| (severing.add(mesh, &blade).1, blade));
             match crossing {
                 Some((crossed, blade)) if crossed > 0 => blades.push(blade),
                 _ => return Err(MeshError::IncisionEmpty { incision, step_mm }),
             }
         }
-        let (wound, growth) = if grows {
-            severing.grow(mesh, triangles).map(|(wound, growth)| (wound, Some(growth)))
-        } else {
-            severing.cut_all();
-            severing.wound(mesh).map(|wound| (wound, None))
-        }
-        .map_err(|error| MeshError::TooManyCuts {
-            cuts: error.blades,
-            at_mm: mesh.frame.to_mm(mesh.positions[mesh.tets[error.tet as usize][0] as usize]).into(),
-        })?;
+        let (wound, growth) =
+            cut(&mut severing, mesh, triangles).map_err(|error| MeshError::TooManyCuts {
+                cuts: error.blades,
+                at_mm: mesh.frame.to_mm(mesh.positions[mesh.tets[error.tet as usize][0] as usize]).into(),
+            })?;
         let mut copies = wound.skin(mesh, triangles);
         let skin_pieces = wound.skin_pieces(mesh, triangles, &copies);
         let rest = [mesh.positions.as_slice(), &wound.positions(mesh)].concat();
-        for (blade, &incision) in severing_slits.iter().enumerate() {
+        let mut gapes = Vec::new();
+        for (blade, &(incision, slits)) in cuts.iter().enumerate() {
             let lips = wound.lips(mesh, triangles, &copies, blade);
-            let gape = Gape::of_lips(&rest, incision, &self.slits[incision], &lips, step)?;
-            self.gapes.insert(incision, gape);
+            gapes.push((incision, Gape::of_lips(&rest, slits, &lips, step)?));
         }
+        gapes.into_iter().for_each(|(incision, gape)| self.gapes.insert(incision, gape));
         let tet_pieces = wound.tet_pieces(mesh);
         mesh.divide(&wound);
         self.removed.resize(mesh.positions.len(), false);
-        if !grows {
-            // A vertex that a blade touches may lose all its tets.
-            let mut held = vec![false; mesh.positions.len()];
-            mesh.tets.iter().flatten().for_each(|&v| held[v as usize] = true);
-            self.removed.iter_mut().zip(held).for_each(|(removed, held)| *removed |= !held);
-        }
         let mut replaced: Vec<u32> = copies.iter().map(|copy| copy.triangle).collect();
         replaced.dedup();
         for copy in &mut copies {
@@ -117,14 +161,7 @@ impl Cut {
         triangles.extend(copies.iter().map(|copy| copy.nodes));
         let divided = divided.into_iter().map(|(_, triangle)| triangle).collect();
         let virtual_nodes = wound.virtual_nodes;
-        Ok(Some(Severed {
-            virtual_nodes,
-            triangles: divided,
-            copies,
-            blades,
-            tet_pieces,
-            skin_pieces,
-            growth,
-        }))
+        let severed = Severed { virtual_nodes, triangles: divided, copies, blades, tet_pieces, skin_pieces };
+        Ok(Some((severed, growth)))
     }
 }

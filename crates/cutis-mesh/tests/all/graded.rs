@@ -92,7 +92,7 @@ fn incisions_that_leave_the_fine_zone_are_refused() {
         let skin = body.skin(&found).0;
         let middle = skin_at + Vector3::x() * 3.0;
         let ends = [-12.0, 12.0].map(|s| (middle + along * s).into());
-        let incision = Incision { from_mm: ends[0], to_mm: ends[1], depth_mm: 8.0, width_mm: Some(3.0) };
+        let incision = Incision { path_mm: ends.to_vec(), depth_mm: 8.0, width_mm: Some(3.0) };
         let slits = Slit::on_lattice(&lattice, &skin, &[incision])?;
         Cut::of_slits(&mesh, &mesh.divide_skin(&skin).0, slits)
     };

@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use cutis_mesh::sever::Embedded;
-use cutis_mesh::{Cut, Incision, Lattice, MeshError, SkinMode, SkinOptions, Slit, Split, TetMesh, skin};
+use cutis_mesh::{
+    Cut, Incision, Lattice, MeshError, SkinMode, SkinOptions, Slit, Split, TetMesh, WoundGape, skin,
+};
 use nalgebra::{Point3, Vector3};
 
 use crate::oracle::{air, lattice, mesh, plan, skin_on_mesh};
@@ -29,7 +31,7 @@ fn body(lattice: &Lattice, is_tissue: impl Fn([f64; 3]) -> bool) -> (TetMesh, Ve
 }
 
 fn incision(from_mm: [f64; 3], to_mm: [f64; 3], depth_mm: f64, width_mm: f64) -> Incision {
-    Incision { from_mm, to_mm, depth_mm, width_mm: Some(width_mm) }
+    Incision { path_mm: vec![from_mm, to_mm], depth_mm, width_mm: Some(width_mm) }
 }
 
 /// Vertices reached from a vertex through tets whose corners all satisfy a condition.
@@ -64,11 +66,55 @@ fn a_cut_through_lattice_points_has_two_lips() {
                 Incision { width_mm: None, ..incision([10.0, place, 20.0], [50.0, place, 20.0], 8.0, 2.0) };
             let mut cut = plan(&mesh, &triangles, &[incision]).unwrap();
             cut.apply(&mut mesh, &mut triangles);
-            cut.sever(&mut mesh, &mut triangles, false).unwrap().unwrap();
+            cut.sever(&mut mesh, &mut triangles).unwrap().unwrap();
             let gape = &cut.gapes[0];
             assert!(!gape.left().is_empty() && !gape.right().is_empty(), "{split:?} {place}");
         }
     }
+}
+
+/// The mesh that a cut of no width along a path leaves, and the gape of the path.
+fn severed(path: &[[f64; 3]], moved: &dyn Fn([f64; 3]) -> [f64; 3]) -> (TetMesh, WoundGape) {
+    let (mut mesh, mut triangles) = block(2.0, Split::Five);
+    let along = Incision { path_mm: path.to_vec(), depth_mm: 8.0, width_mm: None };
+    let mut cut = plan(&mesh, &triangles, &[along]).unwrap();
+    cut.apply(&mut mesh, &mut triangles);
+    cut.sever(&mut mesh, &mut triangles).unwrap().unwrap();
+    let initial = cut.gapes[0].measure(&mesh.positions);
+    assert!(initial.mean_distance_mm < 1e-6, "{initial:?}");
+    // The virtual nodes move and the others stay.
+    let mut positions = mesh.positions.clone();
+    for position in &mut positions[mesh.real_vertices()..] {
+        let mm = mesh.frame.to_mm(*position);
+        *position = mesh.frame.to_local(moved(mm.into()).into());
+    }
+    (mesh, cut.gapes[0].measure(&positions))
+}
+
+/// A further point on a straight path changes nothing. Control: a point beside it does.
+#[test]
+fn a_point_on_a_straight_path_changes_nothing() {
+    let still = |mm| mm;
+    let ends = [[12.3, 20.7, 20.0], [47.1, 20.7, 20.0]];
+    let middle = |y| [ends[0], [30.2, y, 20.0], ends[1]];
+    let (straight, _) = severed(&ends, &still);
+    let (through, _) = severed(&middle(20.7), &still);
+    assert_eq!(straight.tets, through.tets);
+    let (bent, _) = severed(&middle(26.0), &still);
+    assert_ne!(straight.tets, bent.tets);
+}
+
+/// The gape of a bent path is across each of its segments: a ring of tissue around the path that is
+/// lifted out of the plane has none, and lips that move along the normals of the segments have it.
+#[test]
+fn the_gape_of_a_bent_path_is_across_its_segments() {
+    let path = [[15.0, 15.0, 20.0], [30.3, 26.0, 20.0], [46.0, 15.0, 20.0]];
+    let (mesh, lifted) = severed(&path, &|[x, y, z]| [x, y, z + 3.0]);
+    assert!(mesh.positions.len() > mesh.real_vertices());
+    assert!(lifted.mean_mm.abs() < 1e-3 && lifted.mean_distance_mm > 0.5, "{lifted:?}");
+    let (_, apart) = severed(&path, &|[x, y, z]| [x, y - 2.0, z]);
+    // The virtual nodes are on both sides, so that only a part of the lips moves.
+    assert!(apart.mean_mm.abs() < apart.mean_distance_mm, "{apart:?}");
 }
 
 #[test]
@@ -246,11 +292,11 @@ fn invalid_incisions_are_refused() {
         let error = refuse(incision(a, b, depth, width));
         assert!(error.to_string().contains(key) && error.to_string().contains("incision 1"), "{error}");
     }
-    assert!(matches!(refuse(incision(a, a, 6.0, 4.0)), MeshError::IncisionSize { key: "length", .. }));
-    assert!(matches!(
-        refuse(incision([f64::NAN; 3], b, 6.0, 4.0)),
-        MeshError::IncisionSize { key: "length", .. }
-    ));
+    for (from, why) in [(b, "points 0 and 1 are the same"), ([f64::NAN; 3], "finite")] {
+        let error = refuse(incision(from, b, 6.0, 4.0));
+        assert!(matches!(error, MeshError::IncisionPath { incision: 1, .. }), "{error}");
+        assert!(error.to_string().contains(why), "{error}");
+    }
     let off = refuse(incision([20.0, 20.0, 70.0], [40.0, 20.0, 70.0], 6.0, 4.0));
     assert!(
         matches!(off, MeshError::IncisionOffSkin { distance_mm, .. } if (distance_mm - 50.0).abs() < 1.0),

@@ -168,7 +168,7 @@ fn a_cut_in_a_region_is_the_cut_of_the_whole_body() {
     let (body, _, skin, inside) = ball(-1.0);
     let top = body.lattice().mm([10, 10, 10]) + Vector3::new(0.0, 0.0, 16.0);
     let ends = [-6.0, 6.0].map(|x| (top + Vector3::new(x, 0.5, 0.0)).into());
-    let incision = Incision { from_mm: ends[0], to_mm: ends[1], depth_mm: 6.0, width_mm: Some(4.5) };
+    let incision = Incision { path_mm: ends.to_vec(), depth_mm: 6.0, width_mm: Some(4.5) };
     let slits = Slit::on_lattice(body.lattice(), &skin, &[incision]).unwrap();
     let cut = |mut mesh: TetMesh, slits: Vec<Slit>| {
         let mut own = mesh.divide_skin(&skin).0;

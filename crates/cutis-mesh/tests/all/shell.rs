@@ -59,7 +59,7 @@ fn slits_open_the_shell_and_no_vertex_follows_across_them() {
     let (mut mesh, mut triangles, air) = ball();
     let top = mesh.lattice.grid().mm([8, 8, 8]) + Vector3::new(0.0, 0.0, 11.0);
     let (from, to) = (top - Vector3::new(7.0, 0.5, 0.0), top + Vector3::new(7.0, -0.5, 0.0));
-    let slit = Incision { from_mm: from.into(), to_mm: to.into(), depth_mm: 6.0, width_mm: Some(0.5) };
+    let slit = Incision { path_mm: vec![from.into(), to.into()], depth_mm: 6.0, width_mm: Some(0.5) };
     let cut = plan(&mesh, &triangles, &[slit]).unwrap();
     cut.apply(&mut mesh, &mut triangles);
     let shell = Shell::new(&mesh, &air, &cut, None).unwrap();

@@ -42,9 +42,10 @@ impl Body {
         region::check_handles(sections, &mesh)?;
         let mut cut = Cut::of_slits(&mesh, &skin, slits).map_err(|e| region::incision_error(sections, e))?;
         let removed = cut.apply(&mut mesh, &mut skin);
-        let mut severed =
-            cut.sever(&mut mesh, &mut skin, sections.cuts_grow).map_err(file.blame("incision"))?;
-        let growth = severed.as_mut().and_then(|severed| severed.growth.take());
+        let (severed, growth) = match sections.cuts_grow {
+            false => (cut.sever(&mut mesh, &mut skin).map_err(file.blame("incision"))?, None),
+            true => cut.sever_growing(&mut mesh, &mut skin).map_err(file.blame("incision"))?.unzip(),
+        };
         let of_blades = sections.incisions.iter().filter(|section| section.width_mm.is_none());
         let growing = growth.map(|growth| GrowingCuts::new(growth, of_blades, &mesh, &density));
         if let Some(severed) = &severed {

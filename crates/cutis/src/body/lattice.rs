@@ -73,8 +73,8 @@ fn fine_zone(sections: &BodySections<'_>, zone: Zone, even: &Grid) -> [[f64; 2];
         }
         Zone::Around(around) => {
             for incision in sections.incisions {
-                for end in [incision.from_mm, incision.to_mm] {
-                    add(end, around + incision.depth_mm);
+                for point in incision.path() {
+                    add(point, around + incision.depth_mm);
                 }
             }
             sections.handles.iter().for_each(|handle| add(handle.at_mm, around + handle.radius_mm));

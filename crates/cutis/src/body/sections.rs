@@ -55,7 +55,7 @@ pub(crate) fn needs_skin(scene: &Scene) -> bool {
 
 impl From<&IncisionSection> for Incision {
     fn from(section: &IncisionSection) -> Self {
-        let IncisionSection { from_mm, to_mm, depth_mm, width_mm, .. } = *section;
-        Self { from_mm, to_mm, depth_mm, width_mm }
+        let IncisionSection { depth_mm, width_mm, .. } = *section;
+        Self { path_mm: section.path(), depth_mm, width_mm }
     }
 }

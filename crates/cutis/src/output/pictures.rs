@@ -49,7 +49,7 @@ pub(super) fn draw(
     let depth = depth(ct, air_below_hu)?;
     let depth_after = warp.apply(&depth, stages, progress)?.0;
 
-    let wound = body.cut.slits.first().map(|slit| Wound::of(slit, &body.mesh.frame));
+    let wound = body.cut.incisions().next().map(|slits| Wound::of(slits, &body.mesh.frame));
     let focus = wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm });
     let [at_rest, now] = [&body.mesh.positions, deformed.positions].map(|p| body.whole_skin(p).0);
     let (_, triangles) = body.whole_skin(&[]);
@@ -156,13 +156,26 @@ struct Wound {
 }
 
 impl Wound {
-    fn of(slit: &Slit, frame: &cutis_mesh::Frame) -> Self {
-        let middle: Point3<f64> = frame.origin_mm + slit.middle().coords * 1000.0;
+    /// The wound of an incision, seen at the middle of its path.
+    fn of(slits: &[Slit], frame: &cutis_mesh::Frame) -> Self {
+        let mut half = 0.5 * slits.iter().map(Slit::length).sum::<f64>();
+        let mut at = &slits[0];
+        for slit in slits {
+            at = slit;
+            if half <= slit.length() {
+                break;
+            }
+            half -= slit.length();
+        }
+        let middle = at.skin_at(half.min(at.length()));
+        let ends = slits.iter().flat_map(|slit| [slit.skin_at(0.0), slit.skin_at(slit.length())]);
+        let farthest = ends.map(|end| nalgebra::distance(&end, &middle)).fold(0.0, f64::max);
+        let middle_mm: Point3<f64> = frame.origin_mm + middle.coords * 1000.0;
         Self {
-            middle_mm: middle.into(),
-            length_mm: slit.length() * 1000.0,
-            along: slit.along(),
-            outward: (-slit.inward()).into(),
+            middle_mm: middle_mm.into(),
+            length_mm: 2000.0 * farthest,
+            along: at.along(),
+            outward: (-at.inward()).into(),
         }
     }
 

@@ -157,8 +157,7 @@ impl Scene {
     fn validate_incisions(&self, check: &Check<'_>) -> Result<(), Error> {
         for (n, incision) in self.incision.iter().enumerate() {
             let key = |field: &str| format!("incision[{n}].{field}");
-            check.point(&key("from_mm"), incision.from_mm)?;
-            check.point(&key("to_mm"), incision.to_mm)?;
+            self.validate_path(check, &key, incision)?;
             check.positive(&key("depth_mm"), incision.depth_mm)?;
             match incision.width_mm {
                 Some(width_mm) => check.positive(&key("width_mm"), width_mm)?,
@@ -175,11 +174,36 @@ impl Scene {
                 let why = "must be left out next to width_mm: an incision with a width is made at once";
                 check.require(incision.width_mm.is_none(), &key, speed, why)?;
             }
-            let to = format!("{:?}", incision.to_mm);
-            let apart = incision.from_mm != incision.to_mm;
-            check.require(apart, &key("to_mm"), to, "must differ from from_mm")?;
         }
         Ok(())
+    }
+
+    /// The path of an incision: two ends, or two or more points.
+    fn validate_path(
+        &self,
+        check: &Check<'_>,
+        key: &dyn Fn(&str) -> String,
+        incision: &IncisionSection,
+    ) -> Result<(), Error> {
+        let IncisionSection { from_mm, to_mm, path_mm, .. } = incision;
+        for (name, end) in [("from_mm", from_mm), ("to_mm", to_mm)] {
+            let (key, shown) = (key(name), format!("{:?}", end.unwrap_or_default()));
+            let why = "must be left out next to path_mm, whose points hold the ends";
+            check.require(end.is_none() || path_mm.is_empty(), &key, shown, why)?;
+            let why = "is missing: give from_mm and to_mm, or path_mm";
+            check.require(end.is_some() || !path_mm.is_empty(), &key, "", why)?;
+            end.map_or(Ok(()), |end| check.point(&key, end))?;
+        }
+        if path_mm.is_empty() {
+            let shown = format!("{:?}", to_mm.unwrap_or_default());
+            return check.require(from_mm != to_mm, &key("to_mm"), shown, "must differ from from_mm");
+        }
+        let (key, count) = (key("path_mm"), path_mm.len());
+        check.require(count >= 2, &key, format!("{path_mm:?}"), "must have two points or more")?;
+        path_mm.iter().enumerate().try_for_each(|(n, &point)| check.point(&format!("{key}[{n}]"), point))?;
+        let straight = incision.width_mm.is_none() || count == 2;
+        let why = "must have two points next to width_mm: only a cut without a width can bend";
+        check.require(straight, &key, format!("{count} points"), why)
     }
 
     /// The time of an incision. Only some models can remove tissue from a body that has begun to

@@ -133,13 +133,14 @@ impl Baseline<'_> {
         list
     }
 
-    /// Length of the longest incision, or twice the radius of the largest handle, mm.
+    /// Largest distance between points of an incision, or twice the radius of the largest handle, mm.
     fn reach_mm(&self) -> Option<f64> {
         let scene = &self.loaded.scene;
-        let incisions = scene
-            .incision
-            .iter()
-            .map(|i| nalgebra::distance(&Point3::from(i.from_mm), &Point3::from(i.to_mm)));
+        let extent = |path: Vec<[f64; 3]>| {
+            let points = || path.iter().copied().map(Point3::from);
+            points().flat_map(|a| points().map(move |b| nalgebra::distance(&a, &b))).fold(0.0, f64::max)
+        };
+        let incisions = scene.incision.iter().map(|incision| extent(incision.path()));
         let handles = scene.handle.iter().map(|handle| 2.0 * handle.radius_mm);
         incisions.chain(handles).reduce(f64::max)
     }

@@ -1,6 +1,6 @@
 //! A simulation by a solver of constraints.
 
-use cutis_solver::{StepProfile, System};
+use cutis_solver::{Change, StepProfile, System};
 use nalgebra::{Point3, Vector3};
 
 use super::start::StartedSolver;
@@ -34,9 +34,15 @@ impl<'a> SolverRun<'a> {
 
     /// Cuts as far as the cuts are at the present time.
     fn cut(&mut self) -> Result<(), Error> {
+        self.cut_with(|_| ())
+    }
+
+    /// Does the same with a change that is edited before it is made.
+    fn cut_with(&mut self, edit: impl FnOnce(&mut Change<f32>)) -> Result<(), Error> {
         let (Some(cuts), Some(wound)) = (&self.input.body.growing, &mut self.wound) else { return Ok(()) };
         let time_s = self.solver.reader().time_s();
-        if let Some(change) = wound.change(&self.input, cuts, time_s)? {
+        if let Some(mut change) = wound.change(&self.input, cuts, time_s)? {
+            edit(&mut change);
             self.solver.solver().change(&change)?;
         }
         Ok(())
@@ -60,7 +66,13 @@ impl Simulation for SolverRun<'_> {
             .chunks_exact(3)
             .map(|v| Vector3::from_fn(|axis, _| f32::from_bits(v[axis])))
             .collect();
-        Ok(self.solver.solver().restore(&saved.positions, &velocities, u64::from(saved.frame))?)
+        let frame = u64::from(saved.frame);
+        if self.wound.is_some() && frame > 0 {
+            // The cuts were where they were when the last frame began. All nodes have their states.
+            self.solver.solver().restore(&saved.positions, &velocities, frame - 1)?;
+            self.cut_with(|change| change.states.clear())?;
+        }
+        Ok(self.solver.solver().restore(&saved.positions, &velocities, frame)?)
     }
 
     fn step(&mut self) -> Result<(), Error> {

@@ -52,14 +52,20 @@ pub struct BoxSection {
     pub max_mm: [f64; 3],
 }
 
-/// An incision along a straight segment on the skin. It is placed on the body at rest.
+/// An incision along straight segments on the skin. It is placed on the body at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IncisionSection {
-    /// One end, on or near the skin, mm.
-    pub from_mm: [f64; 3],
-    /// The other end, mm.
-    pub to_mm: [f64; 3],
+    /// One end, on or near the skin, mm. Left out with `path_mm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_mm: Option<[f64; 3]>,
+    /// The other end, mm. Left out with `path_mm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_mm: Option<[f64; 3]>,
+    /// Two or more points on or near the skin, mm, in place of `from_mm` and `to_mm`. The incision
+    /// runs straight from each point to the next.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub path_mm: Vec<[f64; 3]>,
     /// Depth below the skin, mm.
     pub depth_mm: f64,
     /// Width of the strip of tissue that is removed, mm, as in the paper. Left out: the cut has no
@@ -74,6 +80,14 @@ pub struct IncisionSection {
     /// width). Left out: it is made at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_mm_s: Option<f64>,
+}
+
+impl IncisionSection {
+    /// The points of its path, mm.
+    pub fn path(&self) -> Vec<[f64; 3]> {
+        let ends = || self.from_mm.into_iter().chain(self.to_mm).collect();
+        if self.path_mm.is_empty() { ends() } else { self.path_mm.clone() }
+    }
 }
 
 /// A sphere of tissue that is dragged along a straight line.

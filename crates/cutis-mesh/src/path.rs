@@ -1,0 +1,123 @@
+//! Checks of the path of an incision.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::MeshError;
+
+/// Largest angle in degrees by which a path may turn at a point.
+const SHARPEST_DEG: f64 = 150.0;
+
+/// Largest number of points of a path. It limits the time of the checks.
+const MOST_POINTS: usize = 1000;
+
+/// Checks that a path has two points or more, does not turn back, and does not cross itself: the
+/// distance of segments that are not neighbors is at least a lattice step.
+pub(crate) fn check_path(incision: usize, path_mm: &[[f64; 3]], step_mm: f64) -> Result<(), MeshError> {
+    let refuse = |why: String| Err(MeshError::IncisionPath { incision, why });
+    if path_mm.len() < 2 {
+        return refuse(format!("it has {} points; give two or more", path_mm.len()));
+    }
+    if path_mm.len() > MOST_POINTS {
+        return refuse(format!("it has {} points; give at most {MOST_POINTS}", path_mm.len()));
+    }
+    let points: Vec<Point3<f64>> = path_mm.iter().map(|&point| point.into()).collect();
+    if !points.iter().all(|point| point.iter().all(|value| value.is_finite())) {
+        return refuse("a coordinate is not a finite number".to_owned());
+    }
+    if let Some(n) = points.windows(2).position(|ends| ends[0] == ends[1]) {
+        return refuse(format!("points {n} and {} are the same; leave one out", n + 1));
+    }
+    for (n, corner) in points.windows(3).enumerate() {
+        let turn = (corner[1] - corner[0]).angle(&(corner[2] - corner[1])).to_degrees();
+        if turn > SHARPEST_DEG {
+            return refuse(format!(
+                "it turns by {turn:.0}° at point {}; at most {SHARPEST_DEG}° are possible: make two incisions",
+                n + 1
+            ));
+        }
+    }
+    let segments = points.len() - 1;
+    for a in 0..segments {
+        for b in a + 2..segments {
+            let apart = distance([points[a], points[a + 1]], [points[b], points[b + 1]]);
+            if apart < step_mm {
+                return refuse(format!(
+                    "segments {a} and {b} come within {apart:.1} mm of each other, less than a lattice step of \
+                     {step_mm:.1} mm; make two incisions"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Distance between two segments: the minimum of a convex function over a square, by minimizing
+/// along each segment in turn from the best of their ends.
+fn distance([a, b]: [Point3<f64>; 2], [c, d]: [Point3<f64>; 2]) -> f64 {
+    let (u, v) = (b - a, d - c);
+    let closest = |from: Point3<f64>, along: Vector3<f64>, to: Point3<f64>| {
+        ((to - from).dot(&along) / along.norm_squared()).clamp(0.0, 1.0)
+    };
+    // The interior minimum, if the segments are not parallel.
+    let normal = u.cross(&v).norm_squared();
+    let mut best = f64::INFINITY;
+    if normal > 1e-12 * u.norm_squared() * v.norm_squared() {
+        let w = c - a;
+        let (s, t) = (w.cross(&v).dot(&u.cross(&v)) / normal, w.cross(&u).dot(&u.cross(&v)) / normal);
+        if (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
+            best = ((a + u * s) - (c + v * t)).norm();
+        }
+    }
+    for point in [a, b] {
+        best = best.min((c + v * closest(c, v, point) - point).norm());
+    }
+    for point in [c, d] {
+        best = best.min((a + u * closest(a, u, point) - point).norm());
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(path: &[[f64; 3]]) -> String {
+        check_path(3, path, 4.0).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn paths_that_cannot_be_cut_are_refused_by_name() {
+        assert!(refused(&[[0.0; 3]]).contains("1 points"));
+        assert!(refused(&vec![[0.0; 3]; 1001]).contains("at most 1000"));
+        assert!(refused(&[[0.0; 3], [0.0; 3]]).contains("points 0 and 1"));
+        assert!(refused(&[[0.0; 3], [f64::NAN, 0.0, 0.0]]).contains("finite"));
+        assert!(refused(&[[0.0; 3], [20.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).contains("turns by 17"));
+        let crossing = [[0.0; 3], [40.0, 0.0, 0.0], [40.0, 40.0, 0.0], [20.0, 40.0, 0.0], [20.0, -20.0, 0.0]];
+        let text = refused(&crossing);
+        assert!(text.contains("incision 3") && text.contains("segments 0 and 3"), "{text}");
+        assert!(check_path(0, &[[0.0; 3], [20.0, 0.0, 0.0], [30.0, 15.0, 0.0]], 4.0).is_ok());
+        // Control: the same shape with its parts farther apart.
+        let open = [[0.0; 3], [40.0, 0.0, 0.0], [40.0, 40.0, 0.0], [20.0, 40.0, 0.0], [20.0, 10.0, 0.0]];
+        assert!(check_path(0, &open, 4.0).is_ok());
+    }
+
+    #[test]
+    fn distances_between_segments_are_those_of_dense_samples() {
+        let p = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
+        let cases = [
+            ([p(0.0, 0.0, 0.0), p(10.0, 0.0, 0.0)], [p(3.0, 4.0, -5.0), p(3.0, 4.0, 5.0)]),
+            ([p(0.0, 0.0, 0.0), p(10.0, 0.0, 0.0)], [p(12.0, 1.0, 0.0), p(20.0, 3.0, 1.0)]),
+            ([p(0.0, 0.0, 0.0), p(10.0, 2.0, 0.0)], [p(1.0, 3.0, 0.0), p(11.0, 5.0, 0.0)]),
+        ];
+        for ([a, b], [c, d]) in cases {
+            let mut least = f64::INFINITY;
+            for s in 0..=400 {
+                for t in 0..=400 {
+                    let [s, t] = [s, t].map(|n| f64::from(n) / 400.0);
+                    least = least.min(((a + (b - a) * s) - (c + (d - c) * t)).norm());
+                }
+            }
+            assert!((distance([a, b], [c, d]) - least).abs() < 1e-2, "{least}");
+        }
+    }
+}
