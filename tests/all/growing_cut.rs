@@ -87,7 +87,7 @@ fn the_wound_opens_behind_the_blade() {
 /// Control: a cut of half the length.
 #[test]
 fn the_opening_does_not_depend_on_how_the_cut_was_made() {
-    let settled = [("run.frames", "80")];
+    let settled = [("run.frames", "160")];
     let opening = |keys: &str| Run::of(&cut(keys, &settled)).report.wound.unwrap().mid_mm;
     let at_start = opening("");
     for keys in [", at_s = 0.1", ", at_s = 0.1, speed_mm_s = 400.0", ", speed_mm_s = 1000.0"] {
@@ -194,4 +194,39 @@ fn times_and_speeds_that_are_not_possible_are_refused() {
     refused(", at_s = 5.0", &[], ["incision[0].at_s", "run.frames"]);
     let chainmail = [("model", "chainmail"), ("constraints", "{}")];
     refused(", speed_mm_s = 10.0, width_mm = 5.0", &chainmail, ["incision[0].speed_mm_s", "width_mm"]);
+}
+
+/// Paths that no blade can follow are refused, with what to do. Control: a path that bends is cut.
+#[test]
+fn paths_that_are_not_possible_are_refused() {
+    let run = |keys: &str| {
+        let incision = format!("[{{ depth_mm = 20, {keys} }}]");
+        let set = [("incision", incision.as_str()), ("run.frames", "1"), ("output", "{}")];
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = Scene::load(&crate::scenes::folder().join(SMALL), &overrides(&set));
+        loaded.and_then(|loaded| run_in(folder.path(), &loaded, false))
+    };
+    let bent = "path_mm = [[30, 110, -50], [40, 108, 0], [30, 110, 50]]";
+    run(bent).unwrap();
+    for (keys, words) in [
+        ("from_mm = [30, 110, -50]".to_owned(), ["incision[0].to_mm", "path_mm"]),
+        (format!("{bent}, from_mm = [30, 110, -50]"), ["incision[0].from_mm", "left out"]),
+        (format!("{bent}, width_mm = 5"), ["incision[0].path_mm", "two points"]),
+        ("path_mm = [[30, 110, -50]]".to_owned(), ["incision[0].path_mm", "two points"]),
+        ("path_mm = [[30, 110, -50], [nan, 0, 0]]".to_owned(), ["incision[0].path_mm[1]", "finite"]),
+        (
+            "path_mm = [[30, 110, -50], [30, 110, 50], [30, 110, 0]]".to_owned(),
+            ["incision 0", "turns by 180"],
+        ),
+        (
+            "path_mm = [[0, 110, 0], [60, 105, 0], [60, 105, 40], [30, 110, 40], [30, 110, -40]]".to_owned(),
+            ["incision 0", "two incisions"],
+        ),
+        ("path_mm = [[30, 110, -50], [30, 200, 0], [30, 110, 50]]".to_owned(), ["incision", "from the skin"]),
+    ] {
+        let error = run(&keys).unwrap_err();
+        assert!(error.is_bad_input(), "{keys}: {error}");
+        let text = error.to_string();
+        assert!(words.iter().all(|word| text.contains(word)), "{keys}: {text}");
+    }
 }

@@ -29,3 +29,4 @@ mod tune;
 mod turned_patient;
 mod warnings;
 mod wound;
+mod wound_trends;
