@@ -127,7 +127,8 @@ fn a_run_resumes_in_the_middle_of_a_cut() {
     }
 }
 
-/// Two cuts that cross, one after the other, in a region of a graded lattice and with the area form.
+/// Two cuts that cross, one after the other, in a region of a graded lattice and with the area
+/// form.
 #[test]
 fn a_second_cut_crosses_the_first_one_later() {
     let cross = "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], depth_mm = 20, speed_mm_s = 1500.0 }, \

@@ -191,7 +191,7 @@ impl Gape {
 }
 
 /// Length along the path of some slits at a position, and its coordinates in the slit that is
-/// closest to it. None if it lies beside no slit.
+/// closest to it. None if it lies next to no slit.
 fn place(slits: &[Slit], position: Point3<f64>) -> Option<(f64, SlitPoint)> {
     let mut before = 0.0;
     let mut best: Option<(f64, SlitPoint)> = None;

@@ -10,7 +10,8 @@ use crate::{Frame, Lattice, MeshError};
 /// segments.
 const MOST_BINS: f64 = 1024.0;
 
-/// A segment of an incision placed on the skin at rest. Lengths are in meters, positions in local meters.
+/// A segment of an incision placed on the skin at rest. Lengths are in meters, positions in local
+/// meters.
 ///
 /// It has three orthogonal axes. *Along* points from start to end. *Inward* is opposite to the mean
 /// outward normal of the skin near the segment. *Lateral* is inward × along: the left lip has
@@ -47,16 +48,16 @@ pub(crate) struct SlitPoint {
 }
 
 impl Slit {
-    /// Places the segments of incisions on the skin of a lattice. `skin` holds triangles in flat lattice indices
-    /// ([`crate::TissueMask::skin`]).
+    /// Places the segments of incisions on the skin of a lattice. `skin` holds triangles in flat
+    /// lattice indices ([`crate::TissueMask::skin`]).
     ///
     /// This needs no mesh, so the region that is meshed can depend on the slits.
     ///
     /// # Errors
     /// [`MeshError::VertexIndex`] if a triangle names a point that does not exist.
     /// [`MeshError::IncisionSize`] if a length, depth or width is not finite and positive.
-    /// [`MeshError::IncisionPath`] if a path has fewer than two points, turns back or crosses itself.
-    /// [`MeshError::IncisionOffSkin`] if a segment is too far from the skin.
+    /// [`MeshError::IncisionPath`] if a path has fewer than two points, turns back or crosses
+    /// itself. [`MeshError::IncisionOffSkin`] if a segment is too far from the skin.
     /// [`MeshError::IncisionThroughSkin`] if it pierces the skin.
     pub fn on_lattice(
         lattice: &Lattice,

@@ -288,8 +288,8 @@ impl SolverGpu {
         Ok(())
     }
 
-    /// Brings the device up to date after a change of the host's copy. Kinds that did not change stay
-    /// on the device, unless they are stored by vertices.
+    /// Brings the device up to date after a change of the host's copy. Kinds that did not change
+    /// stay on the device, unless they are stored by vertices.
     fn rebuild(&mut self, change: &Change<f32>) -> Result<(), GpuError> {
         let simulation = &self.simulation;
         if self.body.loads.is_some() == simulation.system().loads().is_empty() {

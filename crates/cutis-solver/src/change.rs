@@ -121,8 +121,8 @@ impl<T: Scalar> Descent<T> {
     /// Prepares vertex block descent again after a change. `moved` tells which vertices moved
     /// before it.
     ///
-    /// The groups were checked for all kinds and the vertices that moved. What remains to be checked
-    /// are the new kinds, and the constraints at vertices that move only now.
+    /// The groups were checked for all kinds and the vertices that moved. What remains to be
+    /// checked are the new kinds, and the constraints at vertices that move only now.
     pub(crate) fn change(
         &mut self,
         system: &System<T>,

@@ -73,8 +73,8 @@ pub struct Stage {
     pub tets: Vec<TetCopy>,
     /// The edges of these tets.
     pub edges: Vec<EdgeCopy>,
-    /// The triangles of the skin on these tets, numbered in the order of the skin. A triangle that is
-    /// not cut has one copy, of share 1.
+    /// The triangles of the skin on these tets, numbered in the order of the skin. A triangle that
+    /// is not cut has one copy, of share 1.
     pub triangles: Vec<TriangleCopy>,
 }
 

@@ -59,9 +59,9 @@ fn blade(slits: &[Slit], step: f64, margin: f64) -> Option<Blade> {
     Blade::along(&stations, slits[0].depth(), above, margin)
 }
 
-/// Inward direction of a blade at a part of a segment, from 0 to 1. It is that of the segment in its
-/// middle and turns evenly from there to the middle of the next one. If it turned at once where two
-/// segments meet, the blade would fold over below the skin or above it.
+/// Inward direction of a blade at a part of a segment, from 0 to 1. It is that of the segment in
+/// its middle and turns evenly from there to the middle of the next one. If it turned at once where
+/// two segments meet, the blade would fold over below the skin or above it.
 fn inward_at(slits: &[Slit], number: usize, part: f64) -> Option<Vector3<f64>> {
     let other = if part < 0.5 { number.checked_sub(1) } else { Some(number + 1) };
     let own = &slits[number];
@@ -72,13 +72,13 @@ fn inward_at(slits: &[Slit], number: usize, part: f64) -> Option<Vector3<f64>> {
 }
 
 impl Cut {
-    /// Cuts the mesh and its skin along the incisions without a width, and adds their gapes. Call it
-    /// after [`Cut::apply`] and once. None if no incision is without a width.
+    /// Cuts the mesh and its skin along the incisions without a width, and adds their gapes. Call
+    /// it after [`Cut::apply`] and once. None if no incision is without a width.
     ///
     /// # Errors
     /// [`MeshError::IncisionEmpty`] if an incision crosses no edge.
-    /// [`MeshError::IncisionWithoutLips`] if it does not cut the skin. [`MeshError::TooManyCuts`] if
-    /// too many incisions meet in one tet.
+    /// [`MeshError::IncisionWithoutLips`] if it does not cut the skin. [`MeshError::TooManyCuts`]
+    /// if too many incisions meet in one tet.
     pub fn sever(
         &mut self,
         mesh: &mut TetMesh,

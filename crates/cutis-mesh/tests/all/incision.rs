@@ -91,7 +91,7 @@ fn severed(path: &[[f64; 3]], moved: &dyn Fn([f64; 3]) -> [f64; 3]) -> (TetMesh,
     (mesh, cut.gapes[0].measure(&positions))
 }
 
-/// A further point on a straight path changes nothing. Control: a point beside it does.
+/// A further point on a straight path changes nothing. Control: a point next to it does.
 #[test]
 fn a_point_on_a_straight_path_changes_nothing() {
     let still = |mm| mm;

@@ -1,5 +1,6 @@
 //! Integration tests of the solver.
 
+mod change;
 mod descent;
 mod loads;
 mod validation;

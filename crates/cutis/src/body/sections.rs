@@ -22,7 +22,8 @@ pub(crate) struct BodySections<'a> {
     /// The table of materials; none if the scene has none or its model does not use it.
     pub(crate) materials: Option<&'a TissueMaterials>,
     pub(crate) incisions: &'a [IncisionSection],
-    /// Whether incisions without a width are made at their times. If not, they exist from the start.
+    /// Whether incisions without a width are made at their times. If not, they exist from the
+    /// start.
     pub(crate) cuts_grow: bool,
     pub(crate) handles: &'a [HandleSection],
 }

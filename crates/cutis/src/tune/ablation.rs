@@ -133,7 +133,8 @@ impl Baseline<'_> {
         list
     }
 
-    /// Largest distance between points of an incision, or twice the radius of the largest handle, mm.
+    /// Largest distance between points of an incision, or twice the radius of the largest handle,
+    /// mm.
     fn reach_mm(&self) -> Option<f64> {
         let scene = &self.loaded.scene;
         let extent = |path: Vec<[f64; 3]>| {
