@@ -71,6 +71,9 @@ fn inward_at(slits: &[Slit], number: usize, part: f64) -> Option<Vector3<f64>> {
     (own.inward() * (1.0 - share) + other.inward() * share).try_normalize(0.0)
 }
 
+/// Cuts a mesh with this skin, whose blades have been added, and returns the finished wound.
+type CutAll<G> = fn(&mut Severing, &TetMesh, &[[u32; 3]]) -> Result<(Wound, G), TooManyBlades>;
+
 impl Cut {
     /// Cuts the mesh and its skin along the incisions without a width, and adds their gapes. Call
     /// it after [`Cut::apply`] and once. None if no incision is without a width.
@@ -84,7 +87,7 @@ impl Cut {
         mesh: &mut TetMesh,
         triangles: &mut Vec<[u32; 3]>,
     ) -> Result<Option<Severed>, MeshError> {
-        let severed = self.sever_with(mesh, triangles, &mut |severing, mesh, _| {
+        let severed = self.sever_with(mesh, triangles, |severing, mesh, _| {
             severing.cut_all();
             Ok((severing.wound(mesh)?, ()))
         })?;
@@ -106,14 +109,14 @@ impl Cut {
         mesh: &mut TetMesh,
         triangles: &mut Vec<[u32; 3]>,
     ) -> Result<Option<(Severed, Growth)>, MeshError> {
-        self.sever_with(mesh, triangles, &mut |severing, mesh, triangles| severing.grow(mesh, triangles))
+        self.sever_with(mesh, triangles, Severing::grow)
     }
 
     fn sever_with<G>(
         &mut self,
         mesh: &mut TetMesh,
         triangles: &mut Vec<[u32; 3]>,
-        cut: &mut dyn FnMut(&mut Severing, &TetMesh, &[[u32; 3]]) -> Result<(Wound, G), TooManyBlades>,
+        cut: CutAll<G>,
     ) -> Result<Option<(Severed, G)>, MeshError> {
         let cuts: Vec<(usize, &[Slit])> =
             self.incisions().enumerate().filter(|(_, slits)| slits[0].removes_nothing()).collect();
