@@ -4,6 +4,8 @@
 pub const DISTANCE: &str = include_str!("../wgsl/constraints/distance.wgsl");
 /// Source of `Volume`, with four vertices.
 pub const VOLUME: &str = include_str!("../wgsl/constraints/volume.wgsl");
+/// Source of `Thread`, with six vertices.
+pub const THREAD: &str = include_str!("../wgsl/constraints/thread.wgsl");
 /// Source of `SkinTension`, with three vertices.
 pub const SKIN_TENSION: &str = concat!(
     include_str!("../wgsl/constraints/triangle.wgsl"),

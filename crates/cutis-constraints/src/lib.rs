@@ -12,6 +12,7 @@
 //! | [`SkinStrip`] | 3 | (length of the image of a direction − rest length) · `q`, m | [`skin_strip_compliance`], m/N |
 //! | [`SkinStripAtRest`] | 3 | the same for a body at rest in the scan, m | as above |
 //! | [`SkinStripTurn`] | 3 | turn of the image against a constant load, m | as above |
+//! | [`Thread`] | 6 | distance of two points of triangles beyond a length, m | 1/stiffness, m/N |
 //!
 //! Each formula is written once and runs as `f32`, as `f64` and in SIMD lanes of both ([`Real`]).
 //! Every lane has the bits of a scalar evaluation. No formula contains an absolute length or an
@@ -43,6 +44,7 @@ mod skin_tension;
 mod skin_tension_paper;
 mod strip;
 mod strip_material;
+mod thread;
 mod triangle;
 mod volume;
 
@@ -58,6 +60,7 @@ pub use skin_strip_turn::SkinStripTurn;
 pub use skin_tension::{SkinTension, SkinTensionMaterial};
 pub use skin_tension_paper::{SkinTensionPaper, SkinTensionPaperMaterial};
 pub use strip_material::{SkinStripLaw, SkinStripMaterial, SkinStripShape};
+pub use thread::{Thread, ThreadMaterial};
 pub use volume::{Volume, VolumeMaterial};
 
 #[cfg(doctest)]

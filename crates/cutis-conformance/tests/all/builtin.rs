@@ -3,7 +3,8 @@
 use cutis_conformance::{Subject, conformance};
 use cutis_constraints::{
     Distance, DistanceMaterial, SkinStrip, SkinStripAtRest, SkinStripLaw, SkinStripMaterial, SkinStripTurn,
-    SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Volume, VolumeMaterial,
+    SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Thread, ThreadMaterial,
+    Volume, VolumeMaterial,
 };
 
 conformance!(mod distance: Distance, 2, Subject::new([
@@ -25,6 +26,12 @@ conformance!(mod skin_tension: SkinTension, 3, Subject::new([
 conformance!(mod skin_tension_paper: SkinTensionPaper, 3, Subject::new([
     SkinTensionPaperMaterial { rest_area_scale: 0.9, amplification: 2.0, max_amplification: 3.0 },
 ]).direction_only());
+
+conformance!(mod thread: Thread, 6, Subject::new([
+    ThreadMaterial { ends: [[0.2, 0.3], [0.5, 0.4]], length_scale: 0.8 },
+    ThreadMaterial { ends: [[0.0, 0.0], [1.0, 0.0]], length_scale: 0.1 },
+    ThreadMaterial { ends: [[0.3, 0.3], [0.1, 0.6]], length_scale: 1.5 },
+]));
 
 /// Strips with low to high tension, with and without stiffening and resistance to compression.
 fn strips() -> Vec<SkinStripMaterial> {
