@@ -39,6 +39,9 @@ from_mm = [0, 0, 0]
 to_mm = [1, 0, 0]
 depth_mm = 1
 width_mm = 1
+[[suture]]
+incision = 0
+every_mm = 1
 [[handle]]
 at_mm = [0, 0, 0]
 radius_mm = 1

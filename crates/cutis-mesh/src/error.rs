@@ -100,6 +100,18 @@ pub enum MeshError {
         /// What is wrong, and what would be right.
         why: String,
     },
+    /// A stitch has no skin at one of its ends, or nothing is cut between its ends.
+    #[error(
+        "a stitch across incision {incision} has no skin of its own within {reach_mm:.1} mm of {at_mm:.1?} mm; make it shorter or longer, or place it where the incision is"
+    )]
+    StitchOffSkin {
+        /// Number of the incision, from 0.
+        incision: usize,
+        /// Where the end of the stitch should be, in mm.
+        at_mm: [f64; 3],
+        /// Largest allowed distance in mm.
+        reach_mm: f64,
+    },
     /// The segment of an incision is too far from the skin.
     #[error(
         "incision {incision}: the segment {from_mm:?} → {to_mm:?} mm is {distance_mm:.1} mm from the skin; it must lie within {reach_mm:.1} mm of it"

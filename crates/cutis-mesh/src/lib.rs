@@ -25,6 +25,7 @@ mod shell;
 pub mod skin;
 mod slit;
 mod stencil;
+mod stitch;
 mod surface;
 mod tissue_mask;
 mod tissue_tets;
@@ -42,6 +43,7 @@ pub use select::HalfSpace;
 pub use shell::Shell;
 pub use skin::{Skin, SkinMode, SkinOptions, SkinReport};
 pub use slit::Slit;
+pub use stitch::Stitch;
 pub use surface::Topology;
 pub use tissue_mask::{InactiveSkin, InactiveTissue, TissueMask};
 

@@ -57,6 +57,7 @@ fn summary(report: &Report, out: &Path) -> String {
     lines.extend(report.wounds.iter().map(|w| {
         format!("wound: {:.2} mm -> {:.2} mm ({:.2} mm in the middle)", w.initial_mm, w.final_mm, w.mid_mm)
     }));
+    lines.extend(report.sutures.iter().map(|suture| suture.summary()));
     lines.push(format!("run folder: {}", out.display()));
     if report.scene.output.report {
         lines.push(format!("look at:    {}", out.join("report.html").display()));

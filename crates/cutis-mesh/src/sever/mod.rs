@@ -29,5 +29,6 @@ pub use pieces::{Embedded, LipPoint, Pieces};
 pub use severing::Severing;
 pub(crate) use severing::longest_edge;
 pub(crate) use shell::{DividedShell, divide_shell};
+pub(crate) use surface::closest_in_triangle;
 pub use walls::{Barycentric, Walls};
 pub use wound::{EdgeCopy, SplitTet, TetCopy, TooManyBlades, TriangleCopy, Wound};

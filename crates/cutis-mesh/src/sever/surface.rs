@@ -91,7 +91,7 @@ impl Surface {
             if (position - center).norm() > limit + radius {
                 continue;
             }
-            let (weights, feature) = closest_in_triangle(corners, position);
+            let (weights, feature) = closest_feature(corners, position);
             let squared = (position - at(corners, &weights)).norm_squared();
             if squared <= reach * reach && best.as_ref().is_none_or(|(least, ..)| squared < *least) {
                 best = Some((squared, number, weights, feature));
@@ -115,10 +115,15 @@ fn at(corners: &[Point3<f64>; 3], weights: &[f64; 3]) -> Point3<f64> {
     Point3::from(sum)
 }
 
+/// Weights of the corners at the point of a triangle that is closest to a position.
+pub(crate) fn closest_in_triangle(corners: &[Point3<f64>; 3], position: Point3<f64>) -> [f64; 3] {
+    closest_feature(corners, position).0
+}
+
 /// Weights of the corners at the closest point of a triangle, and the feature that it is on. It
 /// tests the regions of the corners, then those of the edges (Ericson, Real-Time Collision
 /// Detection, 2004, section 5.1.5).
-fn closest_in_triangle([a, b, c]: &[Point3<f64>; 3], p: Point3<f64>) -> ([f64; 3], Feature) {
+fn closest_feature([a, b, c]: &[Point3<f64>; 3], p: Point3<f64>) -> ([f64; 3], Feature) {
     let (ab, ac) = (b - a, c - a);
     let dots = |from: &Point3<f64>| ((p - from).dot(&ab), (p - from).dot(&ac));
     let ((ab_a, ac_a), (ab_b, ac_b), (ab_c, ac_c)) = (dots(a), dots(b), dots(c));

@@ -4,7 +4,7 @@ use cutis_mesh::{Cut, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask
 use cutis_volume::{TableKind, Volume};
 
 use super::lattice::lattice;
-use super::{Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, region};
+use super::{Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, region, sutures};
 use crate::Error;
 use crate::scene::Keep;
 
@@ -54,6 +54,8 @@ impl Body {
             inactive_skin.shift(mesh.real_vertices(), severed.virtual_nodes.len());
         }
         let grabbed = handles::grabbed(sections, &mesh, &cut)?;
+        let copies = severed.as_ref().map_or(0, |severed| severed.copies.len());
+        let stitches = sutures::stitches(sections, &mesh, &cut, &skin[..skin.len() - copies])?;
         warnings.extend(region::warning(&mesh));
         Ok(Self {
             mesh,
@@ -65,6 +67,7 @@ impl Body {
             removed,
             severed,
             growing,
+            stitches,
             membrane,
             grabbed,
             materials,

@@ -10,9 +10,10 @@ mod materials;
 mod membrane;
 mod region;
 mod sections;
+mod sutures;
 
 use cutis_mesh::sever::{Embedded, Severed};
-use cutis_mesh::{Cut, InactiveSkin, Removed, SkinReport, TetMesh};
+use cutis_mesh::{Cut, InactiveSkin, Removed, SkinReport, Stitch, TetMesh};
 use nalgebra::Point3;
 
 use crate::scene::HandleSection;
@@ -54,6 +55,8 @@ pub(crate) struct Body {
     pub(crate) severed: Option<Severed>,
     /// The cuts that are made while the body moves; none if the scene has none.
     pub(crate) growing: Option<GrowingCuts>,
+    /// The stitches of each suture of the scene.
+    pub(crate) stitches: Vec<Vec<Stitch>>,
     /// Normals and directions of the whole skin before the incisions; none if the scene has no
     /// constraint that needs them.
     pub(crate) membrane: Option<Membrane>,

@@ -5,7 +5,7 @@ use cutis_mesh::{Incision, SkinMode};
 use crate::model::ModelChoice;
 use crate::scene::{
     HandleSection, IncisionSection, LatticeSection, LoadedScene, MembraneSection, Scene, SceneFile,
-    TissueMaterials, TissueSection,
+    SutureSection, TissueMaterials, TissueSection,
 };
 
 /// The sections of a scene that a body is built from.
@@ -26,6 +26,8 @@ pub(crate) struct BodySections<'a> {
     /// start.
     pub(crate) cuts_grow: bool,
     pub(crate) handles: &'a [HandleSection],
+    /// None with a model that has no sutures.
+    pub(crate) sutures: &'a [SutureSection],
 }
 
 impl<'a> BodySections<'a> {
@@ -41,6 +43,7 @@ impl<'a> BodySections<'a> {
             incisions: &scene.incision,
             cuts_grow: scene.model == ModelChoice::Pbd && scene.incision.iter().any(IncisionSection::grows),
             handles: &scene.handle,
+            sutures: if scene.model == ModelChoice::Pbd { &scene.suture } else { &[] },
         }
     }
 }

@@ -13,6 +13,7 @@ pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
     let lines = [
         (!needs_skin(scene), "skin: not detected, nothing refers to it"),
         (scene.incision.is_empty(), "incision: nothing is cut"),
+        (scene.suture.is_empty(), "suture: nothing is closed"),
         (scene.handle.is_empty(), "handle: nothing is dragged"),
         (scene.run.checkpoint_every == 0, "checkpoints: none are written"),
         (!output.volume && !output.pictures, "volume: the CT is not resampled"),

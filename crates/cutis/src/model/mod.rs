@@ -97,6 +97,12 @@ pub(crate) trait Simulation {
     /// Positions of chosen vertices, local meters.
     fn positions_of(&mut self, vertices: &[u32]) -> Result<Vec<Point3<f32>>, Error>;
 
+    /// Force in each thread in N, with the number of its suture; empty without threads, or if the
+    /// formulation knows no forces.
+    fn thread_forces(&mut self) -> Result<Vec<(usize, f64)>, Error> {
+        Ok(Vec::new())
+    }
+
     /// The state after `frame` frames. A checkpoint has at least three words per vertex.
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error>;
 

@@ -39,7 +39,7 @@ pub(crate) fn write(
     figures: &[Figure],
     folder: &RunFolder,
 ) -> Result<(), Error> {
-    let plots: Vec<String> = opening_plot(rows).into_iter().collect();
+    let plots: Vec<String> = opening_plot(rows).into_iter().chain(force_plot(rows)).collect();
     let scene = toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string());
     files::write(&folder.html(), page(report, figures, &plots, &scene).as_bytes())
 }
@@ -62,6 +62,23 @@ fn opening_plot(rows: &[FrameRow]) -> Option<String> {
         curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Line }).collect();
     let axis = |label| Axis { label, scale: Scale::Linear };
     Some(line_chart("Opening of the wound", axis("time / s"), axis("distance of the lips / mm"), &series))
+}
+
+/// A plot of the forces of the sutures over time; none without sutures or without frames.
+fn force_plot(rows: &[FrameRow]) -> Option<String> {
+    let sutures = rows.first().map_or(0, |row| row.sutures.len());
+    if sutures == 0 || rows.len() < 2 {
+        return None;
+    }
+    let curve = |n: usize| {
+        let points = rows.iter().map(|row| [row.time_s, row.sutures[n][0]]).collect();
+        (format!("suture {}", n + 1), points)
+    };
+    let curves: Vec<(String, Vec<[f64; 2]>)> = (0..sutures).map(curve).collect();
+    let series: Vec<Series<'_>> =
+        curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Line }).collect();
+    let axis = |label| Axis { label, scale: Scale::Linear };
+    Some(line_chart("Force of the sutures", axis("time / s"), axis("sum over the threads / N"), &series))
 }
 
 /// The page as HTML.
@@ -123,6 +140,9 @@ fn summary(report: &Report) -> String {
             text,
             "<p>The wound opened from <b>{initial_mm:.2} mm</b> to <b>{final_mm:.2} mm</b> (mean distance of the lips; {mid_mm:.2} mm in the middle).</p>"
         );
+    }
+    for suture in &report.sutures {
+        let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&suture.summary())));
     }
     text
 }

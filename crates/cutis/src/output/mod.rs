@@ -6,6 +6,7 @@ mod pictures;
 pub mod report;
 mod resample_run;
 mod skin_lines;
+pub mod suture_report;
 mod warp;
 
 use std::path::Path;

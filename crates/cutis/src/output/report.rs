@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::ScanTension;
 use crate::model::constraints::kinds::report_name;
+use crate::output::suture_report::SutureReport;
 use crate::run::files;
 use crate::{CostReport, Error, Scene};
 
@@ -66,6 +67,9 @@ pub struct Report {
     /// Opening of the first incision, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wound: Option<Wound>,
+    /// The sutures and the forces in them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sutures: Vec<SutureReport>,
     /// The resampled CT, if an output needed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resample: Option<Resample>,

@@ -16,6 +16,8 @@ pub(crate) struct FrameRow {
     /// Wall time of the frame, ms.
     pub(crate) ms: f64,
     pub(crate) gapes: Vec<WoundGape>,
+    /// Sum of the forces in the threads of each suture, and the largest one, N.
+    pub(crate) sutures: Vec<[f64; 2]>,
 }
 
 /// Mean and shortest time of the frames. The first row is the state before them.
@@ -51,12 +53,18 @@ pub(crate) fn frames_csv(earlier: &str, rows: &[FrameRow]) -> String {
     for n in 0..wounds {
         let _ = write!(out, ",gape_{n}_mean_mm,gape_{n}_mid_mm");
     }
+    for n in 0..rows.first().map_or(0, |row| row.sutures.len()) {
+        let _ = write!(out, ",suture_{n}_n,suture_{n}_largest_n");
+    }
     out.push('\n');
     out.push_str(earlier);
     for row in rows {
         let _ = write!(out, "{},{},{:.3}", row.frame, row.time_s, row.ms);
         for gape in &row.gapes {
             let _ = write!(out, ",{:.4},{:.4}", gape.mean_mm, gape.mid_mm);
+        }
+        for [sum, largest] in &row.sutures {
+            let _ = write!(out, ",{sum:.5},{largest:.5}");
         }
         out.push('\n');
     }

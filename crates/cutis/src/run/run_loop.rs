@@ -20,6 +20,8 @@ pub(super) struct RunLoop<'a> {
     pub(super) folder: &'a RunFolder,
     pub(super) fingerprint: [u8; 32],
     pub(super) gapes: &'a [Gape],
+    /// Number of sutures whose forces are known.
+    pub(super) sutures: usize,
     /// Frame of the checkpoint from which the run resumes.
     pub(super) resumed: Option<u32>,
     pub(super) timing: Timing,
@@ -71,7 +73,8 @@ impl RunLoop<'_> {
         let RunSection { frames, checkpoint_every: every } = *self.run;
         let row = |simulation: &mut dyn Simulation, frame, ms| {
             let time_s = simulation.time_s();
-            Ok::<_, Error>(FrameRow { frame, time_s, ms, gapes: lips.measure(simulation)? })
+            let sutures = suture_forces(self.sutures, &simulation.thread_forces()?);
+            Ok::<_, Error>(FrameRow { frame, time_s, ms, gapes: lips.measure(simulation)?, sutures })
         };
         let mut rows = vec![row(simulation, self.done(), 0.0)?];
         let mut times = PartTimes::new(self.timing);
@@ -108,6 +111,17 @@ impl RunLoop<'_> {
             times.stamped = self.device.is_some_and(DeviceMeter::has_timestamps);
         }
     }
+}
+
+/// The sum of the forces in the threads of each suture, and the largest one, N.
+fn suture_forces(sutures: usize, threads: &[(usize, f64)]) -> Vec<[f64; 2]> {
+    let mut forces = vec![[0.0; 2]; sutures];
+    for &(suture, force) in threads {
+        let [sum, largest] = &mut forces[suture];
+        *sum += force;
+        *largest = f64::max(*largest, force);
+    }
+    forces
 }
 
 /// The present frame and the last checkpoint, for an error.

@@ -1,5 +1,7 @@
 //! The frames of a run: starts the model, resumes from a checkpoint, steps the simulation.
 
+use cutis_solver::Formulation;
+
 use super::RunOptions;
 use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
@@ -60,6 +62,7 @@ pub(super) fn simulate(
         folder,
         fingerprint,
         gapes: &body.cut.gapes,
+        sutures: if scene.solver.formulation == Formulation::Pbd { 0 } else { body.stitches.len() },
         resumed,
         timing: match (scene.output.report, simulation.parts_are_sequential()) {
             (false, _) => Timing::No,

@@ -1,6 +1,6 @@
 //! The end of a run: measures the wounds and displacements, and writes the report.
 
-use cutis_mesh::WoundGape;
+use cutis_mesh::{Slit, WoundGape};
 
 use super::clock::Clock;
 use super::files;
@@ -10,7 +10,9 @@ use crate::Error;
 use crate::backend::DeviceMeter;
 use crate::body::Body;
 use crate::output::report::{Machine, Report, SCHEMA, Wound};
+use crate::output::suture_report::SutureReport;
 use crate::output::{OutputResults, html};
+use crate::scene::{LoadedScene, SutureSection};
 
 /// Collects the report of a run, and writes it if the scene asks for it.
 ///
@@ -50,6 +52,7 @@ pub(super) fn report(
         frames: frame_times(&rows),
         wound: wounds.first().cloned(),
         wounds,
+        sutures: sutures(loaded, body, &rows),
         resample: outputs.resample,
         chainmail: end.chainmail,
         residuals: end.residuals,
@@ -66,6 +69,24 @@ pub(super) fn report(
         report.write(&folder.report())?;
     }
     Ok(report)
+}
+
+/// The sutures with the forces after the last frame.
+fn sutures(loaded: &LoadedScene, body: &Body, rows: &[FrameRow]) -> Vec<SutureReport> {
+    let forces = rows.last().map(|row| row.sutures.as_slice()).unwrap_or_default();
+    let sections = loaded.scene.suture.iter().zip(&body.stitches).zip(forces);
+    let report = |((section, stitches), &[force_n, largest_n]): ((&SutureSection, &Vec<_>), &[f64; 2])| {
+        let slits = body.cut.incisions().nth(section.incision).unwrap_or_default();
+        let length_cm = slits.iter().map(Slit::length).sum::<f64>() * 100.0;
+        SutureReport {
+            incision: section.incision,
+            stitches: stitches.len(),
+            force_n,
+            force_n_per_cm: force_n / length_cm,
+            largest_n,
+        }
+    };
+    sections.map(report).collect()
 }
 
 /// Opening of each wound, in the body at rest and after the last frame.

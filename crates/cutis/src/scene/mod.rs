@@ -70,6 +70,9 @@ pub struct Scene {
     /// Incisions, which cut the body.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incision: Vec<IncisionSection>,
+    /// Sutures, which close incisions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub suture: Vec<SutureSection>,
     /// Spheres of tissue that are dragged along.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub handle: Vec<HandleSection>,

@@ -92,6 +92,7 @@ impl Scene {
         self.validate_materials(&check)?;
         model::validate(self, &check)?;
         self.validate_incisions(&check)?;
+        self.validate_sutures(&check)?;
         self.validate_handles(&check)?;
         self.validate_solver(&check)
     }
@@ -218,6 +219,38 @@ impl Scene {
         let last = f64::from(self.run.frames.saturating_sub(1)) * self.solver.dt_s;
         let why = format!("must not lie after the beginning of the last frame, at {last} s (run.frames)");
         check.require(at_s <= last || at_s == 0.0, key, at_s, &why)
+    }
+
+    fn validate_sutures(&self, check: &Check<'_>) -> Result<(), Error> {
+        for (n, suture) in self.suture.iter().enumerate() {
+            let key = |field: &str| format!("suture[{n}].{field}");
+            let count = self.incision.len();
+            let why = format!("must be the number of an incision, from 0; there are {count}");
+            let incision = self.incision.get(suture.incision);
+            check.require(incision.is_some(), &key("incision"), suture.incision, &why)?;
+            let closes = incision.is_some_and(|incision| incision.width_mm.is_none());
+            let why =
+                "must be an incision without width_mm: a suture cannot close a slit whose tissue is gone";
+            check.require(
+                closes || !self.model.cuts_without_width(),
+                &key("incision"),
+                suture.incision,
+                why,
+            )?;
+            check.positive(&key("every_mm"), suture.every_mm)?;
+            check.positive(&key("bite_mm"), suture.bite_mm)?;
+            check.positive(&key("thread_n_per_m"), suture.thread_n_per_m)?;
+            check.not_negative(&key("at_s"), suture.at_s)?;
+            check.not_negative(&key("tighten_s"), suture.tighten_s)?;
+            check.positive(&key("tighten_to"), suture.tighten_to)?;
+            let why = "must be at most 1: a longer thread does not close the wound";
+            check.require(suture.tighten_to <= 1.0, &key("tighten_to"), suture.tighten_to, why)?;
+            let Some(release_s) = suture.release_s else { continue };
+            check.not_negative(&key("release_s"), release_s)?;
+            let why = format!("must be after at_s = {} s", suture.at_s);
+            check.require(release_s > suture.at_s, &key("release_s"), release_s, &why)?;
+        }
+        Ok(())
     }
 
     fn validate_handles(&self, check: &Check<'_>) -> Result<(), Error> {

@@ -131,6 +131,7 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
             scene.solver.gravity_m_s2 != [0.0; 3],
             "solver.gravity_m_s2 has no effect with model = \"chainmail\"",
         ),
+        (!scene.suture.is_empty(), "suture has no effect with model = \"chainmail\", which knows no forces"),
         (
             scene.handle.is_empty(),
             "there is no handle: with model = \"chainmail\" nothing else moves the body",

@@ -3,12 +3,14 @@
 use std::collections::{BTreeMap, HashSet};
 
 use cutis_coloring::Groups;
+use cutis_mesh::Stitch;
 use cutis_solver::{Change, Formulation, Handle, Settings, System, SystemBuilder};
 use nalgebra::Vector3;
 
 use super::ConstraintModel;
 use super::elements::Elements;
 use super::kinds::BodyParts;
+use super::threads::{self, Threads};
 use super::wound::{self, GrowingWound, WholeParts};
 use crate::Error;
 use crate::body::GrowingCuts;
@@ -79,7 +81,12 @@ impl ConstraintModel {
             warnings.extend(kind.warnings(&parts));
         }
         if scene.solver.formulation == Formulation::Vbd {
-            builder = builder.vertex_groups(Groups::from_colors(&body.mesh.vertex_colors())?);
+            let mut colors = body.mesh.vertex_colors();
+            let stitches: Vec<&Stitch> = body.stitches.iter().flatten().collect();
+            if !stitches.is_empty() {
+                threads::separate(&mut colors, &body.mesh, &stitches);
+            }
+            builder = builder.vertex_groups(Groups::from_colors(&colors)?);
         }
         for (n, (handle, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {
             let move_m = (Vector3::from(handle.move_mm) / 1000.0).into();
@@ -97,7 +104,13 @@ impl ConstraintModel {
             None => None,
             Some(cuts) => Some(add_wound(input, cuts, &mut system, &inverse_masses, &loads)?),
         };
-        Ok(Self { system, settings: settings(scene), colors, warnings, wound })
+        let mut threads = Threads::new(input, system.kinds().len())?;
+        if let Some(threads) = &mut threads {
+            let kind = threads.constraints(input)?;
+            colors.insert("suture".to_owned(), kind.colors());
+            system.add_kinds(vec![kind])?;
+        }
+        Ok(Self { system, settings: settings(scene), colors, warnings, wound, threads })
     }
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod kinds;
 mod measure;
 mod solver_run;
 mod start;
+mod threads;
 mod wound;
 
 use std::collections::BTreeMap;
@@ -24,6 +25,7 @@ use crate::{CostReport, Error, Progress};
 pub(crate) use estimate::CostEstimate;
 use solver_run::SolverRun;
 pub(crate) use start::{device_memory, start};
+use threads::Threads;
 use wound::GrowingWound;
 
 /// A system of constraints and the settings to step it with.
@@ -36,6 +38,8 @@ pub(crate) struct ConstraintModel {
     warnings: Vec<String>,
     /// The cuts that grow; none if the scene has none.
     wound: Option<GrowingWound>,
+    /// The threads of sutures; none if the scene has none.
+    threads: Option<Threads>,
 }
 
 /// Checks the sections of the constraint kinds.
@@ -92,14 +96,14 @@ impl Model for ConstraintModel {
         backend: &Chosen,
         clock: &mut Clock<'_>,
     ) -> Result<Started<'a>, Error> {
-        let Self { system, settings, wound, .. } = *self;
+        let Self { system, settings, wound, threads, .. } = *self;
         let (solver, device) = if backend.on_gpu() {
             let start = |_: &dyn Progress| start(backend, system, settings);
             clock.stage_on("gpu", "start the GPU", 0, start).map_err(input.file.blame("solver.backend"))?
         } else {
             start(backend, system, settings).map_err(input.file.blame("solver"))?
         };
-        Ok(Started { simulation: Box::new(SolverRun { solver, wound, input: *input }), device })
+        Ok(Started { simulation: Box::new(SolverRun { solver, wound, threads, input: *input }), device })
     }
 }
 

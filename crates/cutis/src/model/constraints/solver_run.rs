@@ -4,6 +4,7 @@ use cutis_solver::{Change, StepProfile, System};
 use nalgebra::{Point3, Vector3};
 
 use super::start::StartedSolver;
+use super::threads::Threads;
 use super::wound::GrowingWound;
 use crate::Error;
 use crate::backend::DevicePositions;
@@ -18,11 +19,16 @@ const COLLAPSED: f64 = 0.01;
 /// Name of the work of cuts that grow in a profile.
 const CUT: &str = "cut";
 
+/// Name of the work of sutures in a profile.
+const SUTURE: &str = "suture";
+
 /// A solver with a body in it.
 pub(crate) struct SolverRun<'a> {
     pub(crate) solver: StartedSolver,
     /// The cuts that grow; none if the scene has none.
     pub(crate) wound: Option<GrowingWound>,
+    /// The threads of sutures; none if the scene has none.
+    pub(crate) threads: Option<Threads>,
     pub(crate) input: ModelInput<'a>,
 }
 
@@ -48,6 +54,19 @@ impl<'a> SolverRun<'a> {
         Ok(())
     }
 
+    /// Pulls the threads as far as they are tightened at the present time.
+    fn tighten(&mut self) -> Result<(), Error> {
+        let Some(threads) = &mut self.threads else { return Ok(()) };
+        let time_s = self.solver.reader().time_s();
+        let solver = self.solver.solver();
+        let mut positions_of = |vertices: &[u32]| Ok(solver.positions_of(vertices)?);
+        if threads.tighten(&self.input.scene.suture, time_s, &mut positions_of)? {
+            let kinds = vec![(threads.kind, threads.constraints(&self.input)?)];
+            solver.change(&Change { kinds, ..Change::default() })?;
+        }
+        Ok(())
+    }
+
     /// Positions of all vertices. Those that a cut has not reached are where the vertices are that
     /// they follow.
     fn positions(&mut self) -> Result<Vec<Point3<f32>>, Error> {
@@ -61,28 +80,35 @@ impl<'a> SolverRun<'a> {
 
 impl Simulation for SolverRun<'_> {
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
-        let velocities: Vec<Vector3<f32>> = saved
-            .words
-            .chunks_exact(3)
-            .map(|v| Vector3::from_fn(|axis, _| f32::from_bits(v[axis])))
-            .collect();
+        let (velocities, starts) = saved.words.split_at(3 * saved.positions.len());
+        if let Some(threads) = &mut self.threads {
+            threads.restore(starts);
+        }
+        let velocities: Vec<Vector3<f32>> =
+            velocities.chunks_exact(3).map(|v| Vector3::from_fn(|axis, _| f32::from_bits(v[axis]))).collect();
         let frame = u64::from(saved.frame);
-        if self.wound.is_some() && frame > 0 {
-            // The cuts were where they were when the last frame began. All nodes have their states.
+        if (self.wound.is_some() || self.threads.is_some()) && frame > 0 {
+            // Cuts and threads are as they were when the last frame began. All nodes have their
+            // states.
             self.solver.solver().restore(&saved.positions, &velocities, frame - 1)?;
             self.cut_with(|change| change.states.clear())?;
+            self.tighten()?;
         }
         Ok(self.solver.solver().restore(&saved.positions, &velocities, frame)?)
     }
 
     fn step(&mut self) -> Result<(), Error> {
         self.cut()?;
+        self.tighten()?;
         Ok(self.solver.solver().step(1)?)
     }
 
     fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error> {
         if self.wound.is_some() {
             profile.time(CUT, || self.cut())?;
+        }
+        if self.threads.is_some() {
+            profile.time(SUTURE, || self.tighten())?;
         }
         Ok(self.solver.solver().step_timed(1, profile)?)
     }
@@ -103,13 +129,20 @@ impl Simulation for SolverRun<'_> {
         Ok(self.solver.solver().positions_of(&leaders)?)
     }
 
+    fn thread_forces(&mut self) -> Result<Vec<(usize, f64)>, Error> {
+        let Some(threads) = &self.threads else { return Ok(Vec::new()) };
+        let positions = self.solver.solver().positions_of(threads.vertices())?;
+        Ok(threads.sutures().zip(threads.forces(&positions)).collect())
+    }
+
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {
         let positions = self.positions()?;
         let mut velocities = self.solver.solver().velocities()?.to_vec();
         if let Some((cuts, wound)) = self.growing() {
             wound.complete(cuts, &mut velocities);
         }
-        let words = velocities.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits)).collect();
+        let words = velocities.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits));
+        let words = words.chain(self.threads.iter().flat_map(Threads::starts)).collect();
         Ok(Checkpoint { frame, positions, words })
     }
 

@@ -90,6 +90,54 @@ impl IncisionSection {
     }
 }
 
+/// Stitches along an incision without a width (model `pbd`). Each stitch is a thread between two
+/// points of the skin, one on each side. It pulls and does not push.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SutureSection {
+    /// Number of the incision, from 0.
+    pub incision: usize,
+    /// Distance from stitch to stitch, mm.
+    pub every_mm: f64,
+    /// Distance of the ends of a stitch from the incision, mm.
+    #[serde(default = "SutureSection::default_bite_mm")]
+    pub bite_mm: f64,
+    /// Stiffness of a thread, N/m (`xpbd`, `vbd`).
+    #[serde(default = "SutureSection::default_thread_n_per_m")]
+    pub thread_n_per_m: f64,
+    /// Time at which the threads begin to pull, s.
+    #[serde(default)]
+    pub at_s: f64,
+    /// Time in which they shorten, s; 0: at once.
+    #[serde(default = "SutureSection::default_tighten_s")]
+    pub tighten_s: f64,
+    /// Length of a tightened thread over the distance of its ends in the scan, at most 1. Skin
+    /// between the stitches and the incision is free and recoils, so lips meet below 1.
+    #[serde(default = "SutureSection::default_tighten_to")]
+    pub tighten_to: f64,
+    /// Time at which they are cut, s. Left out: they stay.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub release_s: Option<f64>,
+}
+
+impl SutureSection {
+    fn default_bite_mm() -> f64 {
+        5.0
+    }
+
+    fn default_thread_n_per_m() -> f64 {
+        1000.0
+    }
+
+    fn default_tighten_s() -> f64 {
+        0.5
+    }
+
+    fn default_tighten_to() -> f64 {
+        1.0
+    }
+}
+
 /// A sphere of tissue that is dragged along a straight line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
