@@ -366,8 +366,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: the wound is seen from inside the body",
         "crates/cutis/src/output/pictures.rs",
-        "outward: (-slit.inward()).into()",
-        "outward: slit.inward().into()",
+        "outward: (-at.inward()).into()",
+        "outward: at.inward().into()",
     ),
     mutation(
         Outputs,
