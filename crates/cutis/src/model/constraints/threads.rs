@@ -13,6 +13,9 @@ use crate::scene::SutureSection;
 /// Length of a thread that does not pull, m.
 const SLACK: f32 = 1e3;
 
+/// Returns the present positions of vertices.
+type PositionsOf<'a> = dyn FnMut(&[u32]) -> Result<Vec<Point3<f32>>, Error> + 'a;
+
 /// The threads of all sutures.
 pub(crate) struct Threads {
     /// Builds constraints; none after an error.
@@ -91,7 +94,7 @@ impl Threads {
         &mut self,
         sutures: &[SutureSection],
         time_s: f64,
-        positions_of: &mut dyn FnMut(&[u32]) -> Result<Vec<Point3<f32>>, Error>,
+        positions_of: &mut PositionsOf<'_>,
     ) -> Result<bool, Error> {
         let mut changed = false;
         for (thread, vertices) in self.threads.iter_mut().zip(&self.vertices) {
