@@ -86,6 +86,9 @@ fn a_wound_opens_again_when_the_threads_are_cut() {
     let again = run.report.wound.clone().unwrap();
     assert!((again.mid_mm / open.mid_mm - 1.0).abs() < 0.01, "{again:?} instead of {open:?}");
     assert_eq!(run.report.sutures[0].force_n, 0.0);
+    assert!(!run.report.warnings.iter().any(|line| line.contains("suture")), "{:?}", run.report.warnings);
+    let late = Run::of(&sewn(STITCHES, "around", &[("run.frames", "30")]));
+    assert!(late.report.warnings.iter().any(|line| line.contains("suture[0] is tight at 0.6 s only")));
     let (time, middle) = (column(&run, "time_s"), column(&run, "gape_0_mid_mm"));
     let held = time.iter().zip(&middle).filter(|(time, _)| **time <= 0.4);
     assert!(held.clone().all(|(_, gape)| *gape < 0.5 * open.mid_mm), "{middle:?}");
@@ -173,6 +176,7 @@ fn sutures_that_are_not_possible_are_refused() {
     let wide = CUT.replace("depth_mm", "width_mm = 7, depth_mm");
     refused(&wide, &own(""), ["suture[0].incision", "without width_mm"]);
     refused(CUT, "[{ incision = 0, every_mm = 0 }]", ["suture[0].every_mm", "above 0"]);
+    refused(CUT, "[{ incision = 0, every_mm = 1e-6 }]", ["suture[0]", "too many"]);
     refused(CUT, &own(", bite_mm = -1"), ["suture[0].bite_mm", "-1"]);
     refused(CUT, &own(", tighten_to = 1.5"), ["suture[0].tighten_to", "at most 1"]);
     refused(CUT, &own(", at_s = 1.0, release_s = 0.5"), ["suture[0].release_s", "after at_s"]);

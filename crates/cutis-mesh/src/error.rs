@@ -112,6 +112,18 @@ pub enum MeshError {
         /// Largest allowed distance in mm.
         reach_mm: f64,
     },
+    /// There would be more than 1000 stitches.
+    #[error(
+        "stitches across incision {incision} every {every_mm} mm are too many; give at least {least_mm:.3} mm"
+    )]
+    TooManyStitches {
+        /// Number of the incision, from 0.
+        incision: usize,
+        /// Distance between stitches in mm.
+        every_mm: f64,
+        /// Least possible distance in mm.
+        least_mm: f64,
+    },
     /// The segment of an incision is too far from the skin.
     #[error(
         "incision {incision}: the segment {from_mm:?} → {to_mm:?} mm is {distance_mm:.1} mm from the skin; it must lie within {reach_mm:.1} mm of it"

@@ -7,7 +7,7 @@ use crate::slit::{Facet, Slit};
 use crate::{Cut, MeshError, TetMesh};
 
 /// Largest number of stitches of an incision.
-const MOST_STITCHES: f64 = 10_000.0;
+const MOST_STITCHES: f64 = 1000.0;
 
 /// A stitch: a point of the skin on the left side of an incision, and one on its right side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,7 @@ impl Cut {
     ///
     /// # Errors
     /// [`MeshError::StitchOffSkin`] if a stitch has no skin near one of its ends, or if no cut is
-    /// between them.
+    /// between them. [`MeshError::TooManyStitches`] for more than 1000.
     ///
     /// # Panics
     /// If there is no such incision.
@@ -49,7 +49,12 @@ impl Cut {
     ) -> Result<Vec<Stitch>, MeshError> {
         let slits = self.incisions().nth(incision).expect("the incision exists");
         let length: f64 = slits.iter().map(Slit::length).sum();
-        let count = (length / every).round().clamp(1.0, MOST_STITCHES) as usize;
+        let count = (length / every).round().max(1.0);
+        if count > MOST_STITCHES {
+            let least_mm = length * 1000.0 / MOST_STITCHES;
+            return Err(MeshError::TooManyStitches { incision, every_mm: every * 1000.0, least_mm });
+        }
+        let count = count as usize;
         let step = mesh.lattice.longest_step_mm() / 1000.0;
         // The skin may be bent, and its triangles are those of the lattice.
         let reach = 2.0 * step + 0.25 * bite;

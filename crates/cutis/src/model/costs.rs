@@ -67,6 +67,16 @@ pub(super) fn unfinished_cuts(scene: &Scene, cuts: &GrowingCuts) -> Vec<String> 
     unfinished.map(line).collect()
 }
 
+/// Warnings about sutures that have not been tightened when the last frame begins.
+pub(super) fn unfinished_sutures(scene: &Scene) -> impl Iterator<Item = String> {
+    let last_s = f64::from(scene.run.frames.saturating_sub(1)) * scene.solver.dt_s;
+    let sutures = scene.suture.iter().enumerate();
+    sutures.filter(move |(_, suture)| suture.at_s + suture.tighten_s > last_s).map(move |(n, suture)| {
+        let tight_s = suture.at_s + suture.tighten_s;
+        format!("suture[{n}] is tight at {tight_s} s only, and the last frame begins at {last_s:.3} s")
+    })
+}
+
 /// The lines whose condition is true.
 pub(crate) fn lines_that_hold(lines: &[(bool, &str)]) -> Vec<String> {
     lines.iter().filter(|(holds, _)| *holds).map(|(_, line)| (*line).to_owned()).collect()

@@ -25,7 +25,7 @@ pub struct SceneSystem {
 
 /// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and adds the
 /// constraints and handles that the scene names. Opens no device, makes no step and writes nothing.
-/// Cuts that a run makes while the body moves exist from the start.
+/// Cuts that a run makes while the body moves exist from the start, and sutures do not pull.
 ///
 /// ```no_run
 /// use cutis::Scene;

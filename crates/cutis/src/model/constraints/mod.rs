@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 use cutis_solver::{Formulation, Settings, StepProfile, System};
 
-use super::costs::{lines_that_hold, sizes, unfinished_cuts, unfinished_handles};
+use super::costs::{lines_that_hold, sizes, unfinished_cuts, unfinished_handles, unfinished_sutures};
 use super::{Model, ModelCosts, ModelInput, Started};
 use crate::backend::{Chosen, Request};
 use crate::run::clock::Clock;
@@ -66,6 +66,7 @@ impl Model for ConstraintModel {
         let mut warnings = scene_warnings(scene);
         warnings.extend(self.warnings.iter().cloned());
         warnings.extend(unfinished_handles(scene));
+        warnings.extend(unfinished_sutures(scene));
         warnings.extend(input.body.growing.iter().flat_map(|cuts| unfinished_cuts(scene, cuts)));
         Ok(ModelCosts {
             device_memory: device_memory(&backend, system, settings),

@@ -1,5 +1,7 @@
 //! The threads of sutures: when they pull, how long they are, and the force in them.
 
+use std::collections::HashMap;
+
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::Thread;
 use cutis_mesh::{Stitch, TetMesh};
@@ -176,8 +178,11 @@ pub(crate) fn separate(colors: &mut [u16], mesh: &TetMesh, stitches: &[&Stitch])
         let (p, q) = (mesh.point(a), mesh.point(b));
         p.iter().zip(q).all(|(p, q)| p.abs_diff(q) <= 1)
     };
-    let stitched =
-        |a: u32, b: u32| stitches.iter().any(|stitch| [a, b].iter().all(|v| stitch.vertices().contains(v)));
+    let mut joined: HashMap<u32, Vec<u32>> = HashMap::new();
+    for vertices in stitches.iter().map(|stitch| stitch.vertices()) {
+        vertices.iter().for_each(|&vertex| joined.entry(vertex).or_default().extend(vertices));
+    }
+    let stitched = |a: u32, b: u32| joined.get(&a).is_some_and(|others| others.contains(&b));
     for vertex in stitches.iter().flat_map(|stitch| stitch.triangles[1]) {
         if moved.contains(&vertex) {
             continue;
