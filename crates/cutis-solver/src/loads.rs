@@ -47,7 +47,7 @@ impl<T: Scalar> System<T> {
     /// result as the load, vertex block descent therefore moves no vertex, not by one bit.
     ///
     /// # Errors
-    /// Returns the errors of [`Descent::new`] for a kind whose forces are not defined: a PBD
+    /// Returns the errors of [`Descent::new`](crate::Descent::new) for a kind whose forces are not defined: a PBD
     /// stiffness, or a compliance of zero.
     pub fn constraint_forces(&self) -> Result<Vec<Vector3<T>>, SolverError> {
         let indices: Vec<u32> = (0..self.vertices.len() as u32).collect();
