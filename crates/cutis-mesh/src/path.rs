@@ -51,8 +51,8 @@ pub(crate) fn check_path(incision: usize, path_mm: &[[f64; 3]], step_mm: f64) ->
     Ok(())
 }
 
-/// Distance between two segments: the minimum of a convex function over a square, by minimizing
-/// along each segment in turn from the best of their ends.
+/// Distance between two segments: where their lines come closest, if that is within both, or from
+/// one of the ends.
 fn distance([a, b]: [Point3<f64>; 2], [c, d]: [Point3<f64>; 2]) -> f64 {
     let (u, v) = (b - a, d - c);
     let closest = |from: Point3<f64>, along: Vector3<f64>, to: Point3<f64>| {

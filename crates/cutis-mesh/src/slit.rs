@@ -291,6 +291,12 @@ impl Slit {
         self.along
     }
 
+    /// The point of the skin above the middle of the slit at rest, in local meters.
+    pub fn middle(&self) -> Point3<f64> {
+        let height = self.skin.get(self.skin.len() / 2).copied().unwrap_or(0.0);
+        self.start + self.along * (self.length / 2.0) + self.inward * height
+    }
+
     /// Unit vector across the slit, from the left to the right lip.
     pub fn lateral(&self) -> Vector3<f64> {
         self.lateral

@@ -156,9 +156,10 @@ struct Wound {
 }
 
 impl Wound {
-    /// The wound of an incision, seen at the middle of its path.
+    /// The wound of an incision, seen at the middle of the segment that holds half of its path.
     fn of(slits: &[Slit], frame: &cutis_mesh::Frame) -> Self {
-        let mut half = 0.5 * slits.iter().map(Slit::length).sum::<f64>();
+        let length: f64 = slits.iter().map(Slit::length).sum();
+        let mut half = 0.5 * length;
         let mut at = &slits[0];
         for slit in slits {
             at = slit;
@@ -167,13 +168,11 @@ impl Wound {
             }
             half -= slit.length();
         }
-        let middle = at.skin_at(half.min(at.length()));
-        let ends = slits.iter().flat_map(|slit| [slit.skin_at(0.0), slit.skin_at(slit.length())]);
-        let farthest = ends.map(|end| nalgebra::distance(&end, &middle)).fold(0.0, f64::max);
+        let middle = at.middle();
         let middle_mm: Point3<f64> = frame.origin_mm + middle.coords * 1000.0;
         Self {
             middle_mm: middle_mm.into(),
-            length_mm: 2000.0 * farthest,
+            length_mm: length * 1000.0,
             along: at.along(),
             outward: (-at.inward()).into(),
         }
