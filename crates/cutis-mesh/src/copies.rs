@@ -42,14 +42,15 @@ impl TetMesh {
         });
         let mut split = wound.split_edges.iter().peekable();
         self.edges.retain(|edge| split.next_if(|other| *other == edge).is_none());
+        let kept = || wound.copies.iter().filter(|copy| !copy.gone);
         self.copies = Some(Copies {
             vertices,
             tets: self.tets.len(),
             edges: self.edges.len(),
-            of_tets: wound.copies.iter().map(|copy| (copy.number, copy.share)).collect(),
+            of_tets: kept().map(|copy| (copy.number, copy.share)).collect(),
             of_edges: wound.edges.iter().map(|edge| (edge.number, edge.volume)).collect(),
         });
-        self.tets.extend(wound.copies.iter().map(|copy| copy.nodes));
+        self.tets.extend(kept().map(|copy| copy.nodes));
         self.edges.extend(wound.edges.iter().map(|edge| edge.nodes));
         for &twin in &wound.virtual_nodes {
             let twin = twin as usize;

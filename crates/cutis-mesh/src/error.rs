@@ -183,6 +183,22 @@ pub enum MeshError {
         /// region.
         coarse: bool,
     },
+    /// An undermining cannot be made.
+    #[error("undermining {undermining} cannot be made: {why}")]
+    Undermining {
+        /// Number of the undermining, from 0.
+        undermining: usize,
+        /// What is wrong, and what would be right.
+        why: String,
+    },
+    /// An excision cannot be made.
+    #[error("excision {excision} cannot be made: {why}")]
+    Excision {
+        /// Number of the excision, from 0.
+        excision: usize,
+        /// What is wrong, and what would be right.
+        why: String,
+    },
     /// Too many cuts of no width meet in one tetrahedron.
     #[error(
         "{cuts} cuts meet in one lattice cell at {at_mm:.1?} mm; at most 8 can: use a finer lattice, or keep the cuts apart"

@@ -99,6 +99,23 @@ impl Gape {
         Self::new(slits, lips.iter().filter_map(place).collect(), step)
     }
 
+    /// The gape of a wound from which a piece was excised, across the line between the two points
+    /// of its outline that are farthest apart. `rest` are the positions of all nodes. Before the
+    /// wound is closed it is open by the width of the piece.
+    pub(crate) fn of_outline(
+        rest: &[Point3<f32>],
+        axis: &Slit,
+        lips: &[LipPoint],
+        step: f64,
+    ) -> Result<Self, MeshError> {
+        let axis = std::slice::from_ref(axis);
+        let place = |lip: &LipPoint| {
+            let (along, at) = place(axis, lip.at.at(rest).cast())?;
+            Some(Placed { point: lip.at, right: at.lateral >= 0.0, along })
+        };
+        Self::new(axis, lips.iter().filter(|lip| lip.right).filter_map(place).collect(), step)
+    }
+
     fn new(slits: &[Slit], mut placed: Vec<Placed>, step: f64) -> Result<Self, MeshError> {
         let length: f64 = slits.iter().map(|slit| slit.length).sum();
         // The sort is stable, so that points at one place keep their order.

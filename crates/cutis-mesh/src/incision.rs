@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::gape::Gape;
 use crate::neighbors::Neighbors;
+use crate::piece::Piece;
+use crate::pocket::Pocket;
+use crate::sever::{Blade, longest_edge};
 use crate::slit::{Facet, Slit, check_indices};
 use crate::{MeshError, NO_VERTEX, TetMesh};
 
@@ -40,8 +43,12 @@ pub struct Cut {
     /// The slits: one for each segment, in the order of the incisions.
     pub slits: Vec<Slit>,
     /// The gape of each incision, in their order. Those of incisions without a width are missing
-    /// until [`Cut::sever`].
+    /// until [`Cut::sever`]. Then those of pieces follow.
     pub gapes: Vec<Gape>,
+    /// Underminings.
+    pub pockets: Vec<Pocket>,
+    /// Excisions.
+    pub pieces: Vec<Piece>,
     /// One flag per mesh vertex: true if a slit can cut an element with this corner.
     near: Vec<bool>,
 }
@@ -76,11 +83,38 @@ impl Cut {
         let removes = |p| slits.iter().any(|slit| !slit.removes_nothing() && slit.near(p, margin));
         let near = mesh.positions.iter().map(|&p| removes(p)).collect();
         let removed = mesh.positions.iter().map(|&p| slits.iter().any(|slit| slit.contains(p))).collect();
-        let mut cut = Self { removed, slits, gapes: Vec::new(), near };
+        let (gapes, pockets, pieces) = (Vec::new(), Vec::new(), Vec::new());
+        let mut cut = Self { removed, slits, gapes, pockets, pieces, near };
         cut.check_each_slit_cuts(mesh)?;
         cut.remove_vertices_without_tets(mesh);
         cut.gapes = cut.find_lips(mesh, triangles)?;
         Ok(cut)
+    }
+
+    /// Adds underminings and excisions, which [`Cut::sever`] makes.
+    ///
+    /// # Errors
+    /// [`MeshError::Undermining`] or [`MeshError::Excision`] if one touches tissue outside the
+    /// region of the mesh or the coarse part of a graded lattice.
+    pub fn with(
+        mut self,
+        mesh: &TetMesh,
+        pockets: Vec<Pocket>,
+        pieces: Vec<Piece>,
+    ) -> Result<Self, MeshError> {
+        let beyond = |blade: &Blade| blade_beyond(mesh, blade);
+        if let Some((undermining, why)) =
+            pockets.iter().enumerate().find_map(|(n, pocket)| Some((n, beyond(&pocket.blade)?)))
+        {
+            return Err(MeshError::Undermining { undermining, why });
+        }
+        if let Some((excision, why)) =
+            pieces.iter().enumerate().find_map(|(n, piece)| Some((n, beyond(&piece.blade)?)))
+        {
+            return Err(MeshError::Excision { excision, why });
+        }
+        (self.pockets, self.pieces) = (pockets, pieces);
+        Ok(self)
     }
 
     /// Removes the cut elements from the mesh and its skin.
@@ -118,10 +152,13 @@ impl Cut {
         Removed { tets: removed, edges, triangles: cut }
     }
 
-    /// Distance in mm from a rest position (local meters) to the nearest slit. Infinite without
-    /// slits.
+    /// Distance in mm from a rest position (local meters) to the nearest slit, pocket or piece.
+    /// Infinite without any.
     pub fn distance_mm(&self, position: Point3<f32>) -> f64 {
-        self.slits.iter().map(|slit| slit.distance(position) * 1000.0).fold(f64::INFINITY, f64::min)
+        let slits = self.slits.iter().map(|slit| slit.distance(position));
+        let pockets = self.pockets.iter().map(|pocket| pocket.distance(position));
+        let pieces = self.pieces.iter().map(|piece| piece.distance(position));
+        slits.chain(pockets).chain(pieces).fold(f64::INFINITY, f64::min) * 1000.0
     }
 
     /// True if the line between two rest positions passes through the middle surface of a slit with
@@ -256,6 +293,36 @@ fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshE
         refuse(&mut vertices().filter(|&point| !planes.is_fine(grid.point(point))), true)?;
     }
     Ok(())
+}
+
+/// Where a blade cuts outside the region or in the coarse part of a lattice, as text. None if it
+/// does not.
+fn blade_beyond(mesh: &TetMesh, blade: &Blade) -> Option<String> {
+    let (lattice, grid) = (&mesh.lattice, mesh.lattice.grid());
+    let reach = longest_edge(lattice);
+    let position_of = |point: usize| mesh.frame.to_local(lattice.mm(grid.point(point)));
+    let cuts = |point: usize| {
+        let position = position_of(point).cast();
+        blade.near(&position, reach)
+            && blade.side(position, reach).is_some()
+            && blade.reached_at(position, reach).is_some()
+    };
+    let vertices = || mesh.lattice_index.iter().map(|&point| point as usize);
+    let refuse = |point: usize, place: &str| {
+        let at_mm: [f64; 3] = lattice.mm(grid.point(point)).into();
+        format!("it touches a vertex of the body at {at_mm:.1?} mm that lies {place}; make that larger")
+    };
+    if let Some(inactive) = &mesh.inactive {
+        let border = vertices().zip(&inactive.border).filter(|(_, border)| **border).map(|(point, _)| point);
+        let outside = (0..grid.len()).filter(|&point| inactive.points[point]);
+        if let Some(point) = border.chain(outside).find(|&point| cuts(point)) {
+            return Some(refuse(point, "outside the region (lattice.region)"));
+        }
+    }
+    let planes = lattice.planes()?;
+    let coarse = |&point: &usize| !planes.is_fine(grid.point(point));
+    let point = vertices().filter(coarse).find(|&point| cuts(point))?;
+    Some(refuse(point, "in the coarse part of the lattice (lattice.grading)"))
 }
 
 /// The edges of a simplex.

@@ -13,7 +13,18 @@ const MOST_POINTS: usize = 1000;
 /// Checks that a path has two points or more, does not turn back, and does not cross itself: the
 /// distance of segments that are not neighbors is at least a lattice step.
 pub(crate) fn check_path(incision: usize, path_mm: &[[f64; 3]], step_mm: f64) -> Result<(), MeshError> {
-    let refuse = |why: String| Err(MeshError::IncisionPath { incision, why });
+    check(path_mm, step_mm, false, "make two incisions")
+        .map_err(|why| MeshError::IncisionPath { incision, why })
+}
+
+/// Checks that an outline, whose last point is the first one again, does not turn back or cross
+/// itself. Returns what is wrong.
+pub(crate) fn check_outline(path_mm: &[[f64; 3]], step_mm: f64) -> Result<(), String> {
+    check(path_mm, step_mm, true, "round it off or make it larger")
+}
+
+fn check(path_mm: &[[f64; 3]], step_mm: f64, closed: bool, remedy: &str) -> Result<(), String> {
+    let refuse = |why: String| Err(why);
     if path_mm.len() < 2 {
         return refuse(format!("it has {} points; give two or more", path_mm.len()));
     }
@@ -27,23 +38,24 @@ pub(crate) fn check_path(incision: usize, path_mm: &[[f64; 3]], step_mm: f64) ->
     if let Some(n) = points.windows(2).position(|ends| ends[0] == ends[1]) {
         return refuse(format!("points {n} and {} are the same; leave one out", n + 1));
     }
-    for (n, corner) in points.windows(3).enumerate() {
+    let around = points.iter().chain(points.get(1).filter(|_| closed)).copied().collect::<Vec<_>>();
+    for (n, corner) in around.windows(3).enumerate() {
         let turn = (corner[1] - corner[0]).angle(&(corner[2] - corner[1])).to_degrees();
         if turn > SHARPEST_DEG {
             return refuse(format!(
-                "it turns by {turn:.0}° at point {}; at most {SHARPEST_DEG}° are possible: make two incisions",
+                "it turns by {turn:.0}° at point {}; at most {SHARPEST_DEG}° are possible: {remedy}",
                 n + 1
             ));
         }
     }
     let segments = points.len() - 1;
     for a in 0..segments {
-        for b in a + 2..segments {
+        for b in (a + 2..segments).filter(|b| !closed || b - a + 1 < segments) {
             let apart = distance([points[a], points[a + 1]], [points[b], points[b + 1]]);
             if apart < step_mm {
                 return refuse(format!(
                     "segments {a} and {b} come within {apart:.1} mm of each other, less than a lattice step of \
-                     {step_mm:.1} mm; make two incisions"
+                     {step_mm:.1} mm; {remedy}"
                 ));
             }
         }

@@ -31,6 +31,8 @@ pub struct Shell {
     /// The parts of the tets that cuts of no width divide. Corners from
     /// `first_extra + positions.len()` on are points.
     pub pieces: Pieces<4>,
+    /// The parts of these tets that are taken out with a piece, with the corners of `pieces`.
+    pub taken_out: Vec<[u32; 4]>,
     /// Extra vertex `n` follows the mesh vertices `neighbors[offsets[n]..offsets[n + 1]]`.
     pub offsets: Vec<u32>,
     /// The followed mesh vertices of all extra vertices.
@@ -99,7 +101,7 @@ impl Shell {
         let positions: Vec<Point3<f32>> =
             points.iter().map(|&point| mesh.frame.to_local(lattice.mm(grid.point(point as usize)))).collect();
         let blades = severed.map(|severed| severed.blades.as_slice()).unwrap_or_default();
-        let reach = longest_edge(mesh);
+        let reach = longest_edge(lattice);
         let separates = |a: Point3<f32>, b: Point3<f32>| {
             let ends = [a.cast(), b.cast()];
             cut.crosses(a, b) || blades.iter().any(|blade| blade.separates(ends, reach))
@@ -113,17 +115,20 @@ impl Shell {
             None => mesh.positions[v as usize],
         };
         let in_slit: Vec<bool> = positions.iter().map(|&position| cut.contains(position)).collect();
+        let is_taken = |v: u32| blades.iter().any(|blade| blade.encloses(position(v).cast()));
         let is_removed = |v: u32| match (v as usize).checked_sub(vertices) {
             Some(extra) => in_slit[extra],
-            None => cut.removed[v as usize],
+            None => cut.removed[v as usize] && !is_taken(v),
         };
         let all = found.into_iter().map(|tet| tet.map(|point| vertex_of[point as usize]));
         let (removed, tets) = all.partition(|tet| {
             tet.iter().any(|&v| is_removed(v))
+                || tet.iter().all(|&v| is_taken(v))
                 || (0..4).any(|a| (0..a).any(|b| cut.crosses(position(tet[a]), position(tet[b]))))
         });
         let count = vertices + positions.len();
-        let DividedShell { whole, followers, pieces } = divide_shell(tets, count, &position, blades, reach);
+        let DividedShell { whole, followers, pieces, taken_out } =
+            divide_shell(tets, count, &position, blades, reach);
         let mut rows = rows;
         let mut positions = positions;
         for follower in followers {
@@ -132,7 +137,17 @@ impl Shell {
         }
         let Followed { offsets, neighbors, held_by } = rows;
         let first_extra = vertices as u32;
-        Ok(Self { first_extra, positions, tets: whole, removed, pieces, offsets, neighbors, held_by })
+        Ok(Self {
+            first_extra,
+            positions,
+            tets: whole,
+            removed,
+            pieces,
+            taken_out,
+            offsets,
+            neighbors,
+            held_by,
+        })
     }
 
     /// Deformed positions of the extra vertices. Each moves by the mean displacement of the

@@ -84,7 +84,7 @@ impl Slit {
     /// suffices for a segment under strongly curved skin. The segment must come within `reach` of
     /// the center of a skin triangle. Along at least half of the segment there must be skin within
     /// `reach` above or below it.
-    fn place(
+    pub(crate) fn place(
         surface: &SkinSurface<'_>,
         number: usize,
         cut: &Incision,
@@ -310,13 +310,13 @@ impl Slit {
 
 /// The skin on which slits are placed.
 pub(crate) struct SkinSurface<'a> {
-    frame: Frame,
+    pub frame: Frame,
     /// Longest lattice step in m.
-    step: f64,
+    pub step: f64,
     triangles: &'a [[u32; 3]],
     /// Rest position of a corner in local meters.
     position: &'a dyn Fn(u32) -> Point3<f32>,
-    facets: Vec<Facet>,
+    pub facets: Vec<Facet>,
 }
 
 impl<'a> SkinSurface<'a> {
@@ -332,12 +332,18 @@ impl<'a> SkinSurface<'a> {
 }
 
 /// Center and area vector (outward normal times area) of a skin triangle.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Facet {
-    center: Point3<f64>,
+    pub center: Point3<f64>,
     pub area_vector: Vector3<f64>,
 }
 
 impl Facet {
+    /// True unless it faces into the body, as the far side of a thin part does.
+    pub fn faces_out(&self, inward: &Vector3<f64>) -> bool {
+        self.area_vector.dot(inward) < 0.5 * self.area_vector.norm()
+    }
+
     pub fn of(corners: [Point3<f32>; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.cast::<f64>());
         Self {

@@ -1,9 +1,15 @@
 //! Blades: surfaces along which tissue is severed.
 
+use std::fmt::Debug;
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 
+use super::bowl::Bowl;
 use super::components::EDGES;
-use super::surface::{Closest, Surface};
+use super::pocket::PocketFloor;
+use super::ribbon::Ribbon;
+use super::section::Border;
 
 /// A place on the skin that a blade passes, in local meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,27 +20,46 @@ pub struct Station {
     pub inward: Vector3<f64>,
 }
 
+/// The surface of a blade, and the coordinates on it.
+pub(super) trait Shape: Debug + Send + Sync {
+    /// Smallest box around the surface in local meters: lower and upper corner.
+    fn bounds(&self) -> [Point3<f64>; 2];
+
+    /// Signed distance in m, up to `reach`. On the surface it is zero.
+    fn distance(&self, position: Point3<f64>, reach: f64) -> Option<f64>;
+
+    /// Coordinates in m of the closest point of the surface, also beyond the part that cuts: the
+    /// length that the blade has passed when it cuts there, and the depth.
+    fn place(&self, position: Point3<f64>, reach: f64) -> Option<[f64; 2]>;
+
+    /// True if the blade cuts a piece out and a position is in it.
+    fn encloses(&self, _position: Point3<f64>) -> bool {
+        false
+    }
+}
+
 /// A surface that severs what crosses it. It removes nothing.
 ///
-/// Its positive side is on the right of the path, as seen from outside the body: in the direction
-/// inward × along.
-///
-/// Each of its points has two coordinates in m: the length along the path, and the depth below the
-/// skin. Only a range of the coordinates cuts. Beyond it the surface continues, so that the signed
-/// distance is defined on both sides of its border.
-#[derive(Debug)]
+/// Each of its points has two coordinates in m: the length that the blade has passed when it cuts
+/// there, and the depth below the skin. Only a range of the coordinates cuts. Beyond it the surface
+/// continues, so that the signed distance is defined on both sides of its border.
+#[derive(Clone, Debug)]
 pub struct Blade {
-    surface: Surface,
-    /// Coordinates of the corners of each triangle.
-    coordinates: Vec<[[f64; 2]; 3]>,
+    shape: Arc<dyn Shape>,
+    /// Smallest box around the surface in local meters: lower and upper corner.
+    bounds: [Point3<f64>; 2],
     /// Length of the path in m.
     length: f64,
-    /// Depth of the cut in m.
+    /// Depth of the cut in m. Infinite if only the length ends the cut.
     depth: f64,
+    /// True if the cut has a border where it begins.
+    begins: bool,
 }
 
 impl Blade {
     /// A blade through stations along a path on the skin, from above the skin to `depth` below it.
+    /// Its positive side is on the right of the path, as seen from outside the body: in the
+    /// direction inward × along.
     ///
     /// `above` is the height above the skin up to which it cuts: skin between two stations may lie
     /// higher than the line between them. `margin` is the length by which the surface continues
@@ -42,34 +67,24 @@ impl Blade {
     ///
     /// None if the stations are not a path: fewer than two, or two equal neighbors.
     pub fn along(stations: &[Station], depth: f64, above: f64, margin: f64) -> Option<Self> {
-        let steps: Vec<Vector3<f64>> = stations.windows(2).map(|pair| pair[1].skin - pair[0].skin).collect();
-        let (first, last) = (stations.first()?, stations.last()?);
-        let unit = |step: Option<&Vector3<f64>>| step.and_then(|step| step.try_normalize(0.0));
-        let (start, end) = (unit(steps.first())?, unit(steps.last())?);
-        if steps.iter().any(|step| step.norm() == 0.0) {
-            return None;
+        let (ribbon, length) = Ribbon::along(stations, depth, above, margin)?;
+        Some(Self { bounds: ribbon.bounds(), shape: Arc::new(ribbon), length, depth, begins: true })
+    }
+
+    /// A blade parallel to the skin that cuts from a path outwards, up to `distance` in m.
+    pub(crate) fn parallel(floor: PocketFloor, distance: f64) -> Self {
+        Self {
+            bounds: floor.bounds(),
+            shape: Arc::new(floor),
+            length: distance,
+            depth: f64::INFINITY,
+            begins: false,
         }
-        // Stations with their length along the path. The first and the last one are beyond the
-        // ends.
-        let mut along = vec![(-margin, Station { skin: first.skin - start * margin, ..*first })];
-        let mut length = 0.0;
-        along.push((length, *first));
-        for (station, step) in stations[1..].iter().zip(&steps) {
-            length += step.norm();
-            along.push((length, *station));
-        }
-        along.push((length + margin, Station { skin: last.skin + end * margin, ..*last }));
-        let rows = [-above - margin, depth + margin];
-        let point =
-            |&(s, station): &(f64, Station)| rows.map(|t| (station.skin + station.inward * t, [s, t]));
-        let columns: Vec<_> = along.iter().map(point).collect();
-        let points: Vec<Point3<f64>> = columns.iter().flatten().map(|(p, _)| *p).collect();
-        let places: Vec<[f64; 2]> = columns.iter().flatten().map(|(_, place)| *place).collect();
-        let quads = (0..columns.len() as u32 - 1).map(|n| 2 * n);
-        let triangles: Vec<[u32; 3]> =
-            quads.flat_map(|n| [[n, n + 1, n + 2], [n + 1, n + 3, n + 2]]).collect();
-        let coordinates = triangles.iter().map(|t| t.map(|p| places[p as usize])).collect();
-        Some(Self { surface: Surface::new(&points, &triangles), coordinates, length, depth })
+    }
+
+    /// A blade around a piece, which it cuts out at once. `length` is that of the outline in m.
+    pub(crate) fn around(bowl: Bowl, length: f64) -> Self {
+        Self { bounds: bowl.bounds(), shape: Arc::new(bowl), length, depth: f64::INFINITY, begins: false }
     }
 
     /// The distances of four corners in m, if the blade has corners on both sides, and the mask of
@@ -98,12 +113,22 @@ impl Blade {
 
     /// True if the blade severs the line between two positions. `reach` is at least its length.
     pub(crate) fn separates(&self, ends: [Point3<f64>; 2], reach: f64) -> bool {
-        let [low, high] = self.bounds();
-        let near =
-            |p: &Point3<f64>| (0..3).all(|axis| (low[axis] - reach..=high[axis] + reach).contains(&p[axis]));
         let side = |p: Point3<f64>| self.distance(p, reach).map(signed);
-        let [Some(d), Some(e)] = ends.map(|p| Some(p).filter(near).and_then(side)) else { return false };
+        let [Some(d), Some(e)] = ends.map(|p| Some(p).filter(|p| self.near(p, reach)).and_then(side)) else {
+            return false;
+        };
         self.crosses(ends, [d, e], reach).is_some()
+    }
+
+    /// True if a position is in the piece that the blade cuts out.
+    pub(crate) fn encloses(&self, position: Point3<f64>) -> bool {
+        self.near(&position, 0.0) && self.shape.encloses(position)
+    }
+
+    /// True if a position is at most `reach` from the box around the surface.
+    pub(crate) fn near(&self, position: &Point3<f64>, reach: f64) -> bool {
+        let [low, high] = self.bounds;
+        (0..3).all(|axis| (low[axis] - reach..=high[axis] + reach).contains(&position[axis]))
     }
 
     /// Length of the path in m.
@@ -111,34 +136,31 @@ impl Blade {
         self.length
     }
 
-    /// Smallest box around the surface in local meters: lower and upper corner.
-    pub(super) fn bounds(&self) -> [Point3<f64>; 2] {
-        self.surface.bounds()
+    /// Whether a position is on the positive side. None if it is farther than `reach` in m.
+    pub(crate) fn side(&self, position: Point3<f64>, reach: f64) -> Option<bool> {
+        Some(self.distance(position, reach)? >= 0.0)
     }
 
     /// Signed distance in m, up to `reach`. On the blade it is zero.
     pub(super) fn distance(&self, position: Point3<f64>, reach: f64) -> Option<f64> {
-        Some(self.surface.closest(position, reach)?.signed)
+        self.shape.distance(position, reach)
     }
 
     /// Length along the path where a point of the surface is cut. None if it is beyond the border.
-    fn reached_at(&self, position: Point3<f64>, reach: f64) -> Option<f64> {
+    pub(crate) fn reached_at(&self, position: Point3<f64>, reach: f64) -> Option<f64> {
         let [s, t] = self.place(position, reach)?;
         ((0.0..=self.length).contains(&s) && t <= self.depth).then_some(s)
     }
 
     /// Coordinates of the closest point of the surface, also beyond its border.
     pub(super) fn place(&self, position: Point3<f64>, reach: f64) -> Option<[f64; 2]> {
-        let Closest { triangle, weights, .. } = self.surface.closest(position, reach)?;
-        let coordinate = |n: usize| -> f64 {
-            self.coordinates[triangle].iter().zip(&weights).map(|(place, weight)| place[n] * weight).sum()
-        };
-        Some([coordinate(0), coordinate(1)])
+        self.shape.place(position, reach)
     }
 
-    /// Depth of the cut in m.
-    pub(super) fn depth(&self) -> f64 {
-        self.depth
+    /// The border of the whole cut on a lattice with this step in m.
+    pub(super) fn border(&self, step: f64) -> Border {
+        let border = Border::new(self.length, self.depth, step);
+        if self.begins { border } else { border.without_start() }
     }
 }
 

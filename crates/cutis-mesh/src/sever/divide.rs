@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::components::{EDGES, count, parts_of};
-use super::severing::Severing;
+use super::severing::{Severing, Sides};
 use super::walls::{Walls, raise};
 use super::wound::{SplitTet, TetCopy, TooManyBlades, Wound};
 use crate::TetMesh;
@@ -37,6 +37,16 @@ pub(super) struct Divided {
     pub volumes: [f64; 4],
     pub distances: Vec<[f32; 4]>,
     pub blades: Vec<u32>,
+    /// For each part: the blade that takes it out.
+    pub gone: [Option<u32>; 4],
+}
+
+impl Divided {
+    /// The blade that takes the whole tet out.
+    pub fn gone_whole(&self) -> Option<u32> {
+        let parts = self.parts.map(|part| self.gone[usize::from(part)]);
+        parts.iter().all(Option::is_some).then_some(parts[0]).flatten()
+    }
 }
 
 /// A tet that blades cut: its cell, its number in the cell, and the share of its section that each
@@ -67,19 +77,22 @@ impl Severing {
             let Divided { tet: number, parts, kept, cut, .. } = *tet;
             let first_copy = wound.copies.len() as u32;
             wound.split.push(SplitTet { tet: number, parts, kept, first_copy, cut, walls });
-            let copy = |of_tet: u8, nodes, share: f64, whole| TetCopy {
+            let copy = |of_tet: u8, nodes, share: f64, whole, gone: Option<u32>| TetCopy {
                 tet: number,
                 number: of_tet,
                 nodes,
                 share: share as f32,
                 whole,
+                gone: gone.is_some(),
             };
             for (of_tet, part) in (0..).zip((0..4).filter(|part| kept >> part & 1 == 1)) {
-                wound.copies.push(copy(of_tet, [0; 4], tet.cut * tet.volumes[part], false));
+                let share = tet.cut * tet.volumes[part];
+                wound.copies.push(copy(of_tet, [0; 4], share, false, tet.gone[part]));
             }
             if tet.cut < 1.0 {
                 let corners = mesh.tets[number as usize];
-                wound.copies.push(copy(kept.count_ones() as u8, corners, 1.0 - tet.cut, true));
+                let gone = tet.gone_whole();
+                wound.copies.push(copy(kept.count_ones() as u8, corners, 1.0 - tet.cut, true, gone));
             }
         }
         self.join(mesh, divided, &mut wound);
@@ -127,9 +140,36 @@ impl Severing {
         touched
     }
 
+    /// The tets of pieces that are taken out and that no blade has cut.
+    fn within_pieces(&self, mesh: &TetMesh, touched: &[Touched]) -> Vec<Touched> {
+        let mut within = Vec::new();
+        let taken = self.blades.iter().filter(|sides| sides.reached >= sides.length);
+        for &vertex in taken.flat_map(|sides| &sides.inside) {
+            self.index.around_point(mesh.point(vertex), |cell, number| {
+                let tet = self.index.position(cell, number);
+                if touched.binary_search_by_key(&tet, |touched| touched.tet).is_err() {
+                    within.push(Touched { tet, cell, number, cuts: Vec::new() });
+                }
+            });
+        }
+        within.sort_by_key(|touched| touched.tet);
+        within.dedup_by_key(|touched| touched.tet);
+        within
+    }
+
     pub(super) fn divided(&self, mesh: &TetMesh) -> Result<Vec<Divided>, TooManyBlades> {
+        let mut touched = self.touched();
+        touched.extend(self.within_pieces(mesh, &touched));
+        touched.sort_by_key(|touched| touched.tet);
         let divide = |touched: &Touched| self.divide(mesh, touched).transpose();
-        self.touched().par_iter().filter_map(divide).collect()
+        touched.par_iter().filter_map(divide).collect()
+    }
+
+    /// The blade that has taken out the piece that holds a vertex.
+    fn taken_by(&self, vertex: u32) -> Option<u32> {
+        let takes =
+            |sides: &Sides| sides.reached >= sides.length && sides.inside.binary_search(&vertex).is_ok();
+        self.blades.iter().position(takes).map(|blade| blade as u32)
     }
 
     /// Divides a tet. One blade divides it by the sides of the corners, as far as it has cut the
@@ -146,8 +186,8 @@ impl Severing {
             return Err(TooManyBlades { tet, blades: blades.len() });
         }
         let (mut cut, mut parts) = (1.0, parts_of(self.severed(mesh, corners)));
-        if blades.len() == 1 || count(&parts) == 1 {
-            let deepest = cuts.iter().max_by(|(_, a), (_, b)| a.total_cmp(b)).expect("a blade touches it");
+        let deepest = cuts.iter().max_by(|(_, a), (_, b)| a.total_cmp(b));
+        if let Some(deepest) = deepest.filter(|_| blades.len() == 1 || count(&parts) == 1) {
             (blades, cut) = (vec![deepest.0], deepest.1);
             let [row] = distances(&blades)[..] else { return Ok(None) };
             let apart =
@@ -160,6 +200,11 @@ impl Severing {
         let kept = (0..4).fold(0, |kept, n| kept | u8::from(shares[n] >= LEAST_SHARE) << n);
         let mut volumes = Walls { kept, ..all }.volumes();
         raise(&mut volumes, kept, THIN);
-        Ok(Some(Divided { cell, number, tet, parts, kept, cut, volumes, distances, blades }))
+        let gone = |part: u8| {
+            let first = parts.iter().position(|&other| other == part)?;
+            self.taken_by(corners[first])
+        };
+        let gone = [0, 1, 2, 3].map(gone);
+        Ok(Some(Divided { cell, number, tet, parts, kept, cut, volumes, distances, blades, gone }))
     }
 }

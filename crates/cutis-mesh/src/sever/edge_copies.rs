@@ -8,13 +8,15 @@ use crate::TetMesh;
 impl Severing {
     /// Finds the edges of the copies.
     pub(super) fn edges(&self, mesh: &TetMesh, wound: &mut Wound) {
-        let mut all: Vec<([u32; 2], [u32; 2], f64)> = Vec::new();
+        // Copies that are taken out have no nodes here.
+        let mut all: Vec<([u32; 2], Option<[u32; 2]>, f64)> = Vec::new();
         for copy in &wound.copies {
             let corners = &mesh.tets[copy.tet as usize];
             for (a, b) in EDGES {
                 let volume = mesh.edge_share(corners, [a, b]) * f64::from(copy.share);
                 let (a, b) = if corners[a] < corners[b] { (a, b) } else { (b, a) };
-                all.push(([corners[a], corners[b]], [copy.nodes[a], copy.nodes[b]], volume));
+                let nodes = (!copy.gone).then_some([copy.nodes[a], copy.nodes[b]]);
+                all.push(([corners[a], corners[b]], nodes, volume));
             }
         }
         all.sort_by_key(|&(vertices, nodes, _)| (vertices, nodes));
@@ -24,7 +26,7 @@ impl Severing {
             let whole = self.whole_volume(mesh, wound, [low, high]);
             let mut copies: Vec<([u32; 2], f64)> = edge
                 .chunk_by(|a, b| a.1 == b.1)
-                .map(|same| (same[0].1, same.iter().map(|(.., volume)| volume).sum()))
+                .filter_map(|same| Some((same[0].1?, same.iter().map(|(.., volume)| volume).sum())))
                 .collect();
             if whole > 0.0 {
                 match copies.iter_mut().find(|(nodes, _)| *nodes == [low, high]) {

@@ -49,6 +49,8 @@ struct GrowingTet {
     apart: Vec<(u32, u8)>,
     /// Divided tets across its faces: number, and the corners of the face here and there.
     across: Vec<(u32, [[u8; 2]; 3])>,
+    /// For each part: the blade that takes it out.
+    gone: [Option<u32>; 4],
 }
 
 /// An edge of divided tets.
@@ -126,6 +128,7 @@ impl Severing {
                 crossings: if several { self.crossings_of(mesh, tet) } else { Vec::new() },
                 apart: tet.blades.iter().copied().zip(tet.distances.iter().map(apart)).collect(),
                 across: self.divided_across(mesh, tet, wound),
+                gone: tet.gone,
             });
         }
         let edges = self.growing_edges(mesh, wound, &local);
@@ -227,6 +230,7 @@ impl Growth {
         }
         let root: Vec<usize> = (0..self.nodes.len()).map(|node| classes.root(node)).collect();
         let node = |local: u32| self.nodes[root[local as usize]];
+        let taken = |blade: u32| reached[blade as usize] >= self.blades[blade as usize].length;
         let mut stage = Stage::default();
         let apart = (0..self.nodes.len()).filter(|&n| root[n] != n);
         stage.follows = apart.map(|n| [self.nodes[n], self.nodes[root[n]]]).collect();
@@ -234,7 +238,7 @@ impl Growth {
         let mut of_tet = Vec::with_capacity(self.tets.len());
         for (tet, cut) in self.tets.iter().zip(&cuts) {
             let first = stage.tets.len();
-            tet.copies_at(cut, &node, &mut stage.tets);
+            tet.copies_at(cut, &node, &taken, &mut stage.tets);
             of_tet.push(first..stage.tets.len());
         }
         for edge in &self.edges {
@@ -242,7 +246,8 @@ impl Growth {
         }
         for (number, triangle) in (0..).zip(&self.triangles) {
             let split = triangle.split as usize;
-            triangle.copies_at(number, &self.tets[split], &cuts[split], &node, &mut stage.triangles);
+            let tet = &self.tets[split];
+            triangle.copies_at(number, tet, &cuts[split], &node, &taken, &mut stage.triangles);
         }
         stage
     }
@@ -316,8 +321,24 @@ impl GrowingTet {
         }
     }
 
+    /// Whether a part is taken out of the body, by the blades that have taken out their pieces.
+    fn is_gone(&self, part: usize, taken: &dyn Fn(u32) -> bool) -> bool {
+        self.gone[part].is_some_and(taken)
+    }
+
+    /// Whether the whole tet is taken out.
+    fn is_all_gone(&self, taken: &dyn Fn(u32) -> bool) -> bool {
+        self.parts.iter().all(|&part| self.is_gone(usize::from(part), taken))
+    }
+
     /// Adds the copies of the tet.
-    fn copies_at(&self, cut: &Cut, node: &dyn Fn(u32) -> u32, copies: &mut Vec<TetCopy>) {
+    fn copies_at(
+        &self,
+        cut: &Cut,
+        node: &dyn Fn(u32) -> u32,
+        taken: &dyn Fn(u32) -> bool,
+        copies: &mut Vec<TetCopy>,
+    ) {
         let mut add = |number, nodes: [u32; 4], share: f64, whole| {
             copies.push(TetCopy {
                 tet: self.tet,
@@ -325,16 +346,26 @@ impl GrowingTet {
                 nodes: nodes.map(node),
                 share: share as f32,
                 whole,
+                gone: false,
             });
         };
-        let Some((cut, groups)) = cut else { return add(0, self.corners, 1.0, true) };
+        let all_gone = self.is_all_gone(taken);
+        let Some((cut, groups)) = cut else {
+            return if all_gone {
+            } else {
+                add(0, self.corners, 1.0, true)
+            };
+        };
         for (part, copy) in self.copies.iter().enumerate() {
             let Some((number, nodes)) = copy else { continue };
+            if self.is_gone(part, taken) {
+                continue;
+            }
             if let Some(share) = self.share_of_group(part, groups, &self.volumes) {
                 add(*number, *nodes, cut * share, false);
             }
         }
-        if *cut < 1.0 {
+        if *cut < 1.0 && !all_gone {
             let number = self.copies.iter().flatten().count() as u8;
             add(number, self.corners, 1.0 - cut, true);
         }
@@ -389,6 +420,7 @@ impl DividedTriangle {
         tet: &GrowingTet,
         cut: &Cut,
         node: &dyn Fn(u32) -> u32,
+        taken: &dyn Fn(u32) -> bool,
         copies: &mut Vec<TriangleCopy>,
     ) {
         let mut add = |nodes: &[u32; 4], part, share: f64| {
@@ -396,14 +428,23 @@ impl DividedTriangle {
             let share = share as f32;
             copies.push(TriangleCopy { triangle: number, split: self.split, part, nodes, share });
         };
-        let Some((cut, groups)) = cut else { return add(&tet.corners, None, 1.0) };
+        let all_gone = tet.is_all_gone(taken);
+        let Some((cut, groups)) = cut else {
+            return if all_gone {
+            } else {
+                add(&tet.corners, None, 1.0)
+            };
+        };
         for (part, copy) in tet.copies.iter().enumerate() {
             let Some((_, nodes)) = copy else { continue };
+            if tet.is_gone(part, taken) {
+                continue;
+            }
             if let Some(share) = tet.share_of_group(part, groups, &self.areas).filter(|share| *share > 0.0) {
                 add(nodes, Some(part as u8), cut * share);
             }
         }
-        if *cut < 1.0 {
+        if *cut < 1.0 && !all_gone {
             add(&tet.corners, None, 1.0 - cut);
         }
     }

@@ -1,11 +1,10 @@
 //! Incisions of no width on a mesh with its skin.
 
-use nalgebra::Vector3;
-
-use super::blade::{Blade, Station};
+use super::blade::Blade;
 use super::growth::Growth;
 use super::pieces::Pieces;
 use super::severing::{Severing, longest_edge};
+use super::stations::stations;
 use super::wound::{TooManyBlades, TriangleCopy, Wound};
 use crate::gape::Gape;
 use crate::{Cut, MeshError, Slit, TetMesh};
@@ -22,53 +21,23 @@ pub struct Severed {
     pub triangles: Vec<[u32; 3]>,
     /// The copies of these triangles. Their field `triangle` is a number in `triangles`.
     pub copies: Vec<TriangleCopy>,
-    /// The blades of the slits without a width, in their order.
+    /// The blades: those of the incisions without a width, of pockets, and of pieces.
     pub blades: Vec<Blade>,
-    /// The shapes of the parts of divided tets. They fill the divided tets.
+    /// The shapes of the parts of divided tets. They fill the divided tets, but for those that are
+    /// taken out.
     pub tet_pieces: Pieces<4>,
+    /// The shapes of the parts of tets that are taken out, with the corners of `tet_pieces`.
+    pub taken_out: Vec<[u32; 4]>,
     /// The shapes of the copies of skin triangles. Their field `copies` is a number in `copies`.
     pub skin_pieces: Pieces<3>,
 }
 
-/// Largest number of stations of a segment of a blade.
-const MOST_STATIONS: f64 = 1024.0;
-
 /// The blade of an incision: through the skin along its segments, with stations that are at most
 /// `step` apart. `margin` is that of [`Blade::along`].
 fn blade(slits: &[Slit], step: f64, margin: f64) -> Option<Blade> {
-    let mut stations: Vec<Station> = Vec::new();
-    for (number, slit) in slits.iter().enumerate() {
-        let count = (slit.length() / step).ceil().clamp(1.0, MOST_STATIONS) as usize;
-        let station = |n: usize| {
-            let part = n as f64 / count as f64;
-            Some(Station {
-                skin: slit.skin_at(slit.length() * part),
-                inward: inward_at(slits, number, part)?,
-            })
-        };
-        let mut own = (0..=count).map(station);
-        // Where two segments meet, the blade passes between their ends.
-        if let Some(last) = stations.last_mut() {
-            last.skin = nalgebra::center(&last.skin, &own.next()??.skin);
-        }
-        for station in own {
-            stations.push(station?);
-        }
-    }
+    let path: Vec<&Slit> = slits.iter().collect();
     let above = slits.iter().map(Slit::above).fold(0.0, f64::max);
-    Blade::along(&stations, slits[0].depth(), above, margin)
-}
-
-/// Inward direction of a blade at a part of a segment, from 0 to 1. It is that of the segment in
-/// its middle and turns evenly from there to the middle of the next one. If it turned at once where
-/// two segments meet, the blade would fold over below the skin or above it.
-fn inward_at(slits: &[Slit], number: usize, part: f64) -> Option<Vector3<f64>> {
-    let other = if part < 0.5 { number.checked_sub(1) } else { Some(number + 1) };
-    let own = &slits[number];
-    let Some(other) = other.and_then(|other| slits.get(other)) else { return Some(own.inward()) };
-    let from_middle = (part - 0.5).abs() * own.length();
-    let share = from_middle / (0.5 * (own.length() + other.length()));
-    (own.inward() * (1.0 - share) + other.inward() * share).try_normalize(0.0)
+    Blade::along(&stations(&path, step, false)?, slits[0].depth(), above, margin)
 }
 
 /// Cuts a mesh with this skin, whose blades have been added, and returns the finished wound.
@@ -120,7 +89,7 @@ impl Cut {
     ) -> Result<Option<(Severed, G)>, MeshError> {
         let cuts: Vec<(usize, &[Slit])> =
             self.incisions().enumerate().filter(|(_, slits)| slits[0].removes_nothing()).collect();
-        if cuts.is_empty() {
+        if cuts.is_empty() && self.pockets.is_empty() && self.pieces.is_empty() {
             return Ok(None);
         }
         let mut severing = Severing::new(mesh);
@@ -128,12 +97,27 @@ impl Cut {
         let step_mm = mesh.lattice.longest_step_mm();
         let step = step_mm / 1000.0;
         for &(incision, slits) in &cuts {
-            let blade = blade(slits, step / 2.0, 2.0 * longest_edge(mesh));
+            let blade = blade(slits, step / 2.0, 2.0 * longest_edge(&mesh.lattice));
             let crossing = blade.map(|blade| (severing.add(mesh, &blade).1, blade));
             match crossing {
                 Some((crossed, blade)) if crossed > 0 => blades.push(blade),
                 _ => return Err(MeshError::IncisionEmpty { incision, step_mm }),
             }
+        }
+        for (number, pocket) in self.pockets.iter().enumerate() {
+            if severing.add(mesh, &pocket.blade).1 == 0 {
+                let why = format!("it crosses no edge of the lattice, whose step is {step_mm:.1} mm");
+                return Err(MeshError::Undermining { undermining: number, why });
+            }
+            blades.push(pocket.blade.clone());
+        }
+        let first_piece = blades.len();
+        for (number, piece) in self.pieces.iter().enumerate() {
+            if severing.add(mesh, &piece.blade).1 == 0 {
+                let why = format!("it crosses no edge of the lattice, whose step is {step_mm:.1} mm");
+                return Err(MeshError::Excision { excision: number, why });
+            }
+            blades.push(piece.blade.clone());
         }
         let (wound, growth) =
             cut(&mut severing, mesh, triangles).map_err(|error| MeshError::TooManyCuts {
@@ -149,11 +133,20 @@ impl Cut {
             gapes.push((incision, Gape::of_lips(&rest, slits, &lips, step)?));
         }
         gapes.into_iter().for_each(|(incision, gape)| self.gapes.insert(incision, gape));
-        let tet_pieces = wound.tet_pieces(mesh);
+        for (number, piece) in self.pieces.iter().enumerate() {
+            let lips = wound.lips(mesh, triangles, &copies, first_piece + number);
+            let gape =
+                Gape::of_outline(&rest, &piece.axis, &lips, step).map_err(|_| MeshError::Excision {
+                    excision: number,
+                    why: "it leaves no skin on both sides of its long axis".to_owned(),
+                })?;
+            self.gapes.push(gape);
+        }
+        let (tet_pieces, taken_out) = wound.tet_pieces(mesh).apart(|copy| wound.copies[copy as usize].gone);
+        let replaced: Vec<u32> =
+            wound.areas(mesh, triangles).into_iter().map(|triangle| triangle.triangle).collect();
         mesh.divide(&wound);
         self.removed.resize(mesh.positions.len(), false);
-        let mut replaced: Vec<u32> = copies.iter().map(|copy| copy.triangle).collect();
-        replaced.dedup();
         for copy in &mut copies {
             copy.triangle = replaced.partition_point(|&number| number < copy.triangle) as u32;
         }
@@ -164,7 +157,8 @@ impl Cut {
         triangles.extend(copies.iter().map(|copy| copy.nodes));
         let divided = divided.into_iter().map(|(_, triangle)| triangle).collect();
         let virtual_nodes = wound.virtual_nodes;
-        let severed = Severed { virtual_nodes, triangles: divided, copies, blades, tet_pieces, skin_pieces };
+        let severed =
+            Severed { virtual_nodes, triangles: divided, copies, blades, tet_pieces, taken_out, skin_pieces };
         Ok(Some((severed, growth)))
     }
 }

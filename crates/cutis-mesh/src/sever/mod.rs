@@ -7,28 +7,36 @@
 //! removed, and a body that is cut but not moved is the body before the cut.
 
 mod blade;
+mod bowl;
 mod components;
+mod depth;
 mod divide;
 mod edge_copies;
 mod growth;
 mod incise;
 mod nodes;
 mod pieces;
+mod pocket;
+mod ribbon;
 mod section;
 mod severing;
 mod shell;
+mod stations;
 mod surface;
 mod tet_index;
 mod walls;
 mod wound;
 
 pub use blade::{Blade, Station};
+pub(crate) use bowl::Bowl;
 pub use growth::{Growth, Stage};
 pub use incise::Severed;
 pub use pieces::{Embedded, LipPoint, Pieces};
+pub(crate) use pocket::PocketFloor;
 pub use severing::Severing;
 pub(crate) use severing::longest_edge;
 pub(crate) use shell::{DividedShell, divide_shell};
+pub(crate) use stations::stations;
 pub(crate) use surface::closest_in_triangle;
 pub use walls::{Barycentric, Walls};
 pub use wound::{EdgeCopy, SplitTet, TetCopy, TooManyBlades, TriangleCopy, Wound};

@@ -52,6 +52,22 @@ pub struct Pieces<const N: usize> {
     pub copies: Vec<u32>,
 }
 
+impl<const N: usize> Pieces<N> {
+    /// The pieces but for those of some copies, and the corners of these.
+    pub(super) fn apart(mut self, leaves: impl Fn(u32) -> bool) -> (Self, Vec<[u32; N]>) {
+        let (mut kept, mut copies, mut left) = (Vec::new(), Vec::new(), Vec::new());
+        for (simplex, copy) in self.simplices.drain(..).zip(self.copies.drain(..)) {
+            if leaves(copy) {
+                left.push(simplex);
+            } else {
+                kept.push(simplex);
+                copies.push(copy);
+            }
+        }
+        (Self { simplices: kept, copies, ..self }, left)
+    }
+}
+
 impl Wound {
     /// Number of nodes of the cut body.
     pub fn nodes(&self, mesh: &TetMesh) -> usize {

@@ -15,13 +15,20 @@ pub(super) struct Border {
     along: f64,
     down: f64,
     depth: f64,
+    /// Where the cut begins: at 0, or without a border.
+    start: f64,
 }
 
 impl Border {
     /// The border of a cut of a length and a depth on a lattice with this step, all in m. It is
     /// blurred over a step, but over no more than a quarter of the length and half of the depth.
     pub fn new(length: f64, depth: f64, step: f64) -> Self {
-        Self { along: step.min(0.25 * length), down: step.min(0.5 * depth), depth }
+        Self { along: step.min(0.25 * length), down: step.min(0.5 * depth), depth, start: 0.0 }
+    }
+
+    /// The border of a cut that begins at another cut, so that nothing holds where it begins.
+    pub fn without_start(self) -> Self {
+        Self { start: f64::NEG_INFINITY, ..self }
     }
 }
 
@@ -44,14 +51,14 @@ impl Section {
     /// Share of the section that a cut with this border has passed, from 0 to 1, if it has reached
     /// a length of `reached` in m.
     pub fn cut(&self, border: &Border, reached: f64) -> f64 {
-        let Border { along, down, depth } = *border;
-        let inner = |[s, t]: &[f64; 2]| (along..=reached - along).contains(s) && *t <= depth - down;
+        let Border { along, down, depth, start } = *border;
+        let inner = |[s, t]: &[f64; 2]| (start + along..=reached - along).contains(s) && *t <= depth - down;
         if self.corners[..self.count].iter().all(inner) {
             return 1.0;
         }
         let share = |sample: usize| {
             let inset = (2 * sample + 1) as f64 / SAMPLES as f64 - 1.0;
-            self.sharply_cut([along * inset, reached - along * inset], depth - down * inset)
+            self.sharply_cut([start + along * inset, reached - along * inset], depth - down * inset)
         };
         let begun = if reached < along { reached / along } else { 1.0 };
         begun * (0..SAMPLES).map(share).sum::<f64>() / SAMPLES as f64

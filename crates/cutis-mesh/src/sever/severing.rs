@@ -7,7 +7,7 @@ use super::blade::{Blade, signed};
 use super::components::EDGES;
 use super::section::{Border, Section};
 use super::tet_index::TetIndex;
-use crate::{NO_VERTEX, TetMesh};
+use crate::{Lattice, NO_VERTEX, TetMesh};
 
 /// How far blades have cut a mesh. Cuts only grow.
 ///
@@ -31,6 +31,8 @@ pub(super) struct Sides {
     crossings: Vec<Crossing>,
     /// Tets on both sides of the surface that the blade cuts, in ascending order.
     pub sections: Vec<TetSection>,
+    /// Vertices in the piece that the blade cuts out, in ascending order.
+    pub inside: Vec<u32>,
     /// Length of the blade's path in m.
     pub length: f64,
     /// The border of the whole cut.
@@ -88,20 +90,21 @@ impl Severing {
     /// Adds a blade that has not cut yet. Returns its number, and the number of edges that it
     /// crosses. `mesh` is the mesh of [`Severing::new`].
     pub fn add(&mut self, mesh: &TetMesh, blade: &Blade) -> (usize, usize) {
-        let reach = longest_edge(mesh);
-        let [low, high] = blade.bounds();
-        let inside =
-            |p: Point3<f64>| (0..3).all(|axis| (low[axis] - reach..=high[axis] + reach).contains(&p[axis]));
+        let reach = longest_edge(&mesh.lattice);
         let distance = |(vertex, position): (usize, &Point3<f32>)| {
             let position = position.cast::<f64>();
-            let distance = inside(position).then(|| blade.distance(position, reach)).flatten()?;
+            let distance = blade.near(&position, reach).then(|| blade.distance(position, reach)).flatten()?;
             Some((vertex as u32, signed(distance)))
         };
         let near: Vec<(u32, f32)> = mesh.positions.par_iter().enumerate().filter_map(distance).collect();
         let length = blade.length();
-        let border = Border::new(length, blade.depth(), finest_step(mesh));
+        let border = blade.border(finest_step(mesh));
+        let inside = |(vertex, position): (usize, &Point3<f32>)| {
+            blade.encloses(position.cast()).then_some(vertex as u32)
+        };
+        let inside = mesh.positions.par_iter().enumerate().filter_map(inside).collect();
         let (crossings, sections) = (Vec::new(), Vec::new());
-        let mut sides = Sides { near, crossings, sections, length, border, reached: 0.0, cut: 0 };
+        let mut sides = Sides { near, crossings, sections, inside, length, border, reached: 0.0, cut: 0 };
         let of_vertex =
             |&(vertex, distance): &(u32, f32)| self.crossings(mesh, blade, &sides, vertex, distance, reach);
         let mut crossings: Vec<Crossing> = sides.near.par_iter().flat_map_iter(of_vertex).collect();
@@ -216,9 +219,9 @@ fn finest_step(mesh: &TetMesh) -> f64 {
 }
 
 /// Longest edge of the lattice in m. On a graded lattice it is that of the largest cell.
-pub(crate) fn longest_edge(mesh: &TetMesh) -> f64 {
-    let spacing = mesh.lattice.grid().affine.spacing_mm();
-    let coarsest = mesh.lattice.planes().map_or(1.0, |planes| {
+pub(crate) fn longest_edge(lattice: &Lattice) -> f64 {
+    let spacing = lattice.grid().affine.spacing_mm();
+    let coarsest = lattice.planes().map_or(1.0, |planes| {
         let steps = planes.axes().iter().flat_map(|axis| axis.windows(2).map(|pair| pair[1] - pair[0]));
         steps.fold(1.0, f64::max)
     });

@@ -21,6 +21,8 @@ pub(crate) struct DividedShell {
     pub followers: Vec<Follower>,
     /// The shapes of the parts of divided tets. Corners from `vertices + followers` on are points.
     pub pieces: Pieces<4>,
+    /// The parts that are taken out, with the corners of `pieces`.
+    pub taken_out: Vec<[u32; 4]>,
 }
 
 /// Divides the tets of a shell along blades. `vertices` is the number of vertices of mesh and
@@ -59,11 +61,15 @@ pub(crate) fn divide_shell(
                 followers.push(Follower { rest: position(tet[n]), own_side: own_side.clone() });
                 (vertices + followers.len() - 1) as u32
             });
-            copies.push((nodes, part, parts, distances.clone()));
+            let own = (0..4).find(|&n| parts[n] == part);
+            let taken = own.is_some_and(|n| blades.iter().any(|blade| blade.encloses(corners[n])));
+            copies.push((nodes, part, parts, distances.clone(), taken));
         }
     }
     let mut builder = Builder::new(vertices + followers.len());
-    for (number, (nodes, own, parts, distances)) in copies.into_iter().enumerate() {
+    let mut taken = Vec::with_capacity(copies.len());
+    for (number, (nodes, own, parts, distances, gone)) in copies.into_iter().enumerate() {
+        taken.push(gone);
         let walls = Walls { distances: &distances, parts, kept: u8::MAX };
         walls.pieces([0, 1, 2, 3].map(unit), |part, piece| {
             if part == own {
@@ -71,5 +77,6 @@ pub(crate) fn divide_shell(
             }
         });
     }
-    DividedShell { whole, followers, pieces: builder.pieces }
+    let (pieces, taken_out) = builder.pieces.apart(|copy| taken[copy as usize]);
+    DividedShell { whole, followers, pieces, taken_out }
 }

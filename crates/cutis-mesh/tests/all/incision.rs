@@ -20,7 +20,7 @@ fn block(step: f64, split: Split) -> (TetMesh, Vec<[u32; 3]>) {
     body(&lattice, |p| within(p[0], 60.0) && within(p[1], 40.0) && within(p[2], 20.0))
 }
 
-fn body(lattice: &Lattice, is_tissue: impl Fn([f64; 3]) -> bool) -> (TetMesh, Vec<[u32; 3]>) {
+pub fn body(lattice: &Lattice, is_tissue: impl Fn([f64; 3]) -> bool) -> (TetMesh, Vec<[u32; 3]>) {
     let air = air(lattice, is_tissue);
     let mesh = mesh(lattice, &air);
     // The boundary mode also gives the ends of the block in z.
@@ -35,7 +35,7 @@ fn incision(from_mm: [f64; 3], to_mm: [f64; 3], depth_mm: f64, width_mm: f64) ->
 }
 
 /// Vertices reached from a vertex through tets whose corners all satisfy a condition.
-fn reached(mesh: &TetMesh, start: u32, within: impl Fn(Point3<f64>) -> bool) -> BTreeSet<u32> {
+pub fn reached(mesh: &TetMesh, start: u32, within: impl Fn(Point3<f64>) -> bool) -> BTreeSet<u32> {
     let usable: Vec<&[u32; 4]> = mesh
         .tets
         .iter()

@@ -2,6 +2,7 @@
 //! results.
 
 mod files;
+mod flaps;
 mod graded;
 mod growth;
 mod incision;

@@ -1,0 +1,285 @@
+//! Underminings and excisions: what they separate and what they take out.
+
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use cutis_mesh::{
+    Cut, Excision, Incision, Lattice, MeshError, Piece, Pocket, Slit, Split, TetMesh, Undermining,
+};
+use nalgebra::Point3;
+
+use crate::incision::{body, reached};
+
+const SPLITS: [Split; 2] = [Split::Kuhn6, Split::Five];
+
+/// A block of 80 × 60 × 24 mm whose upper face is at z = 24 mm, in steps of 2 mm.
+fn block(split: Split) -> (TetMesh, Vec<[u32; 3]>) {
+    let affine = cutis_volume::Affine::from_spacing([2.0; 3], [-4.0; 3]).unwrap();
+    let grid = cutis_volume::Grid { shape: [45, 35, 17], affine };
+    let within = |v: f64, high: f64| (-1e-9..=high + 1e-9).contains(&v);
+    body(&Lattice::new(grid, split).unwrap(), |p| {
+        within(p[0], 80.0) && within(p[1], 60.0) && within(p[2], 24.0)
+    })
+}
+
+/// Plans incisions, underminings and excisions.
+fn plan(
+    mesh: &TetMesh,
+    triangles: &[[u32; 3]],
+    incisions: &[Incision],
+    underminings: &[Undermining],
+    excisions: &[Excision],
+) -> Result<Cut, MeshError> {
+    let skin: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| mesh.lattice_index[v as usize])).collect();
+    let slits = Slit::on_lattice(&mesh.lattice, &skin, incisions)?;
+    let pockets = Pocket::on_lattice(&mesh.lattice, &skin, &slits, underminings)?;
+    let pieces = Piece::on_lattice(&mesh.lattice, &skin, excisions)?;
+    Cut::of_slits(mesh, triangles, slits)?.with(mesh, pockets, pieces)
+}
+
+fn along_x(y: f64, depth_mm: f64) -> Incision {
+    Incision { path_mm: vec![[20.0, y, 24.0], [60.0, y, 24.0]], depth_mm, width_mm: None }
+}
+
+/// An ellipse of 40 × 16 mm in the middle of the block's upper face.
+fn ellipse(depth_mm: f64) -> Excision {
+    let point = |n: usize| {
+        let angle = TAU * n as f64 / 24.0;
+        [40.0 + 20.0 * angle.cos(), 30.0 + 8.0 * angle.sin(), 24.0]
+    };
+    Excision { path_mm: (0..24).chain([0]).map(point).collect(), depth_mm }
+}
+
+fn volume_mm3(mesh: &TetMesh) -> f64 {
+    mesh.tet_volumes().iter().map(|&volume| f64::from(volume) * 1e9).sum()
+}
+
+fn volume_of(tets: &[[u32; 4]], at: &dyn Fn(u32) -> Point3<f64>) -> f64 {
+    let of = |tet: &[u32; 4]| {
+        let [a, b, c, d] = tet.map(at);
+        ((b - a).cross(&(c - a)).dot(&(d - a)) / 6.0).abs() * 1e9
+    };
+    tets.iter().map(of).sum()
+}
+
+/// The piece has the area of its outline times its depth. Control: another depth.
+#[test]
+fn an_excision_takes_out_its_piece_and_nothing_else() {
+    for split in SPLITS {
+        for depth in [6.0, 8.0] {
+            let (mut mesh, mut skin) = block(split);
+            let before = volume_mm3(&mesh);
+            let area: f64 = skin_area(&mesh, &skin);
+            let mut cut = plan(&mesh, &skin, &[], &[], &[ellipse(depth)]).unwrap();
+            let severed = cut.sever(&mut mesh, &mut skin).unwrap().unwrap();
+            let gone = before - volume_mm3(&mesh);
+            // The polygon with 24 corners inside the ellipse.
+            let outline = 0.5 * 24.0 * 20.0 * 8.0 * (TAU / 24.0).sin();
+            assert!(
+                (gone / (outline * depth) - 1.0).abs() < 0.03,
+                "{split:?}: {gone} of {}",
+                outline * depth
+            );
+            assert!((gone / (outline * (14.0 - depth)) - 1.0).abs() > 0.2);
+            let at = |corner: u32| match (corner as usize).checked_sub(mesh.positions.len()) {
+                None => mesh.positions[corner as usize].cast::<f64>(),
+                Some(point) => severed.tet_pieces.points[point].at(&mesh.positions).cast(),
+            };
+            // Thin parts get a least share, so volumes agree only nearly.
+            assert!((volume_of(&severed.taken_out, &at) / gone - 1.0).abs() < 0.01);
+            let (whole, pieces) = (&mesh.tets[..mesh.whole_tets()], &severed.tet_pieces.simplices);
+            let kept = volume_of(whole, &at) + volume_of(pieces, &at);
+            assert!((kept + volume_of(&severed.taken_out, &at) - before).abs() < 1e-3 * before);
+            let lost = area - skin_area_cut(&mesh, &skin, &severed);
+            assert!((lost / outline - 1.0).abs() < 0.02, "{lost} of {outline} mm²");
+            // What is left is one body, and it still has all vertices outside the piece.
+            let inside = |v: usize| {
+                let p = mesh.frame.to_mm(mesh.positions[v]);
+                ((p.x - 40.0) / 20.0).powi(2) + ((p.y - 30.0) / 8.0).powi(2) < 0.95 && p.z > 24.5 - depth
+            };
+            for v in 0..mesh.real_vertices() {
+                assert!(!inside(v) || cut.removed[v], "vertex {v}");
+            }
+            let held: BTreeSet<u32> = mesh.tets.iter().flatten().copied().collect();
+            assert_eq!(reached(&mesh, mesh.tets[0][0], |_| true), held);
+            let gape = cut.gapes[0].measure(&mesh.positions);
+            assert!((gape.mid_mm / 16.0 - 1.0).abs() < 0.02, "{gape:?}");
+        }
+    }
+}
+
+fn skin_area(mesh: &TetMesh, triangles: &[[u32; 3]]) -> f64 {
+    let area = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| mesh.positions[v as usize].cast::<f64>());
+        (b - a).cross(&(c - a)).norm() / 2.0 * 1e6
+    };
+    triangles.iter().map(area).sum()
+}
+
+fn skin_area_cut(mesh: &TetMesh, triangles: &[[u32; 3]], severed: &cutis_mesh::sever::Severed) -> f64 {
+    let (whole, copies) = triangles.split_at(triangles.len() - severed.copies.len());
+    let share = |(triangle, copy): (&[u32; 3], &cutis_mesh::sever::TriangleCopy)| {
+        skin_area(mesh, &[*triangle]) * f64::from(copy.share)
+    };
+    skin_area(mesh, whole) + copies.iter().zip(&severed.copies).map(share).sum::<f64>()
+}
+
+/// Before its time an excision changes nothing, and at its time it leaves what a static one leaves.
+#[test]
+fn an_excision_happens_at_once_at_its_time() {
+    for split in SPLITS {
+        let (whole, whole_skin) = block(split);
+        let all = volume_mm3(&whole);
+        let make = || {
+            let (mesh, skin) = block(split);
+            let cut = plan(&mesh, &skin, &[along_x(30.0, 10.0)], &[UNDERMINING], &[ellipse(8.0)]).unwrap();
+            (mesh, skin, cut)
+        };
+        let (mut mesh, mut skin, mut cut) = make();
+        let (_, growth) = cut.sever_growing(&mut mesh, &mut skin).unwrap().unwrap();
+        let lengths = growth.lengths();
+        let volume = |reached: &[f64]| {
+            let stage = growth.stage(reached);
+            let outside = volume_of(&mesh.tets[..mesh.whole_tets()], &|v| mesh.positions[v as usize].cast());
+            outside + stage.tets.iter().map(|copy| mesh.copy_volume(copy) * 1e9).sum::<f64>()
+        };
+        let (mut static_mesh, mut static_skin, mut static_cut) = make();
+        static_cut.sever(&mut static_mesh, &mut static_skin).unwrap();
+        let left = volume_mm3(&static_mesh);
+        assert!((volume(&[0.0; 3]) / all - 1.0).abs() < 1e-5);
+        assert!((volume(&[lengths[0], lengths[1], 0.0]) / all - 1.0).abs() < 1e-5);
+        assert!((volume(&[0.0, 0.0, lengths[2]]) / left - 1.0).abs() < 1e-5);
+        assert!((volume(&lengths) / left - 1.0).abs() < 1e-5);
+        assert!(left < 0.97 * all);
+        let end = growth.stage(&lengths);
+        let copies: Vec<[u32; 4]> = end.tets.iter().map(|copy| copy.nodes).collect();
+        assert_eq!(copies, static_mesh.tets[static_mesh.whole_tets()..]);
+        assert_eq!(
+            growth.stage(&[0.0; 3]).triangles.len(),
+            whole_skin.len() - untouched(&static_skin, &growth)
+        );
+        assert_eq!(skin, static_skin);
+    }
+}
+
+fn untouched(skin: &[[u32; 3]], growth: &cutis_mesh::sever::Growth) -> usize {
+    let end = growth.stage(&growth.lengths());
+    skin.len() - end.triangles.len()
+}
+
+const UNDERMINING: Undermining = Undermining { incision: 0, distance_mm: 12.0, depth_mm: 6.0 };
+
+/// Vertices below the floor of the pocket that can be reached from the skin within a box on one
+/// side of the incision, without going around the pocket.
+fn reached_below(mesh: &TetMesh, far: f64) -> usize {
+    let start = (0..mesh.real_vertices() as u32).find(|&v| {
+        let p = mesh.frame.to_mm(mesh.positions[v as usize]);
+        (p - Point3::new(40.0, 34.0, 24.0)).norm() < 1e-3
+    });
+    let inside =
+        |p: Point3<f64>| (26.0..=54.0).contains(&p.x) && (31.0..=30.0 + far).contains(&p.y) && p.z > 12.0;
+    let found = reached(mesh, start.unwrap(), inside);
+    found.iter().filter(|&&v| mesh.frame.to_mm(mesh.positions[v as usize]).z < 17.0).count()
+}
+
+/// Skin within the distance is separated from what is below it. Controls: without the undermining,
+/// and beyond its end.
+#[test]
+fn an_undermining_separates_the_skin_from_what_is_below() {
+    for split in SPLITS {
+        let cut_with = |underminings: &[Undermining]| {
+            let (mut mesh, mut skin) = block(split);
+            let all = volume_mm3(&mesh);
+            let mut cut = plan(&mesh, &skin, &[along_x(30.0, 10.0)], underminings, &[]).unwrap();
+            cut.sever(&mut mesh, &mut skin).unwrap();
+            assert!((volume_mm3(&mesh) / all - 1.0).abs() < 1e-5, "nothing is removed");
+            mesh
+        };
+        let mesh = cut_with(&[UNDERMINING]);
+        assert_eq!(reached_below(&mesh, 9.0), 0, "{split:?}");
+        assert!(reached_below(&mesh, 16.0) > 0);
+        assert!(reached_below(&cut_with(&[]), 9.0) > 0);
+    }
+}
+
+/// An undermining grows from the incision outwards.
+#[test]
+fn an_undermining_grows_from_its_incision() {
+    let (mut mesh, mut skin) = block(Split::Five);
+    let mut cut = plan(&mesh, &skin, &[along_x(30.0, 10.0)], &[UNDERMINING], &[]).unwrap();
+    let (_, growth) = cut.sever_growing(&mut mesh, &mut skin).unwrap().unwrap();
+    let lengths = growth.lengths();
+    assert!((lengths[1] - 0.012).abs() < 1e-9);
+    let below = |reached: f64, far: f64| {
+        let stage = growth.stage(&[lengths[0], reached]);
+        let mut at_stage = mesh.clone();
+        at_stage.tets.truncate(mesh.whole_tets());
+        at_stage.tets.extend(stage.tets.iter().map(|copy| copy.nodes));
+        reached_below(&at_stage, far)
+    };
+    assert!(below(0.0, 5.0) > 0);
+    assert_eq!(below(0.008, 5.0), 0);
+    assert!(below(0.008, 11.0) > 0);
+    assert_eq!(below(0.012, 9.0), 0);
+}
+
+/// Under curved skin the floor of a pocket has an even depth.
+#[test]
+fn the_floor_of_a_pocket_follows_curved_skin() {
+    let affine = cutis_volume::Affine::from_spacing([2.0; 3], [0.0, -40.0, -40.0]).unwrap();
+    let grid = cutis_volume::Grid { shape: [31, 41, 41], affine };
+    let lattice = Lattice::new(grid, Split::Five).unwrap();
+    let (mut mesh, mut skin) = body(&lattice, |p| p[1].hypot(p[2]) <= 32.0);
+    let path_mm = vec![[20.0, 0.0, 32.0], [40.0, 0.0, 32.0]];
+    let incision = Incision { path_mm, depth_mm: 8.0, width_mm: None };
+    let undermining = Undermining { incision: 0, distance_mm: 16.0, depth_mm: 6.0 };
+    let mut cut = plan(&mesh, &skin, &[incision], &[undermining], &[]).unwrap();
+    let severed = cut.sever(&mut mesh, &mut skin).unwrap().unwrap();
+    let walls = severed.tet_pieces.points.iter().map(|point| {
+        let p = mesh.frame.to_mm(point.at(&mesh.positions));
+        (p, 32.0 - p.y.hypot(p.z))
+    });
+    // Away from the incision all walls belong to the pocket.
+    let floor: Vec<f64> =
+        walls.filter(|(p, _)| p.y.abs() > 2.0 && p.x > 20.0 && p.x < 40.0).map(|(_, depth)| depth).collect();
+    assert!(floor.len() > 200, "{}", floor.len());
+    let mean = floor.iter().sum::<f64>() / floor.len() as f64;
+    let spread = floor.iter().map(|depth| (depth - mean).abs()).fold(0.0, f64::max);
+    // The skin of the lattice lies below the true one by up to a step. Its floor is even.
+    assert!((6.0..8.0).contains(&mean) && spread < 0.5, "{mean} ± {spread} mm");
+}
+
+#[test]
+fn cuts_that_cannot_be_made_are_refused_by_name() {
+    let (mesh, skin) = block(Split::Five);
+    let undermined = |undermining: Undermining| {
+        plan(&mesh, &skin, &[along_x(30.0, 10.0)], &[undermining], &[]).unwrap_err().to_string()
+    };
+    let text = undermined(Undermining { incision: 1, ..UNDERMINING });
+    assert!(text.contains("undermining 0") && text.contains("no incision 1"), "{text}");
+    let text = undermined(Undermining { depth_mm: 12.0, ..UNDERMINING });
+    assert!(text.contains("12 mm deep") && text.contains("10.0 mm deep"), "{text}");
+    let text = undermined(Undermining { distance_mm: f64::NAN, ..UNDERMINING });
+    assert!(text.contains("`distance_mm` is NaN"), "{text}");
+    let excised = |change: &dyn Fn(&mut Excision)| {
+        let mut excision = ellipse(8.0);
+        change(&mut excision);
+        plan(&mesh, &skin, &[], &[], &[excision]).unwrap_err().to_string()
+    };
+    let text = excised(&|excision| {
+        excision.path_mm.pop();
+    });
+    assert!(text.contains("excision 0") && text.contains("not closed"), "{text}");
+    let text = excised(&|excision| excision.path_mm.swap(3, 15));
+    assert!(text.contains("excision 0") && !text.contains("incision"), "{text}");
+    let text = excised(&|excision| {
+        excision.path_mm =
+            vec![[30.0, 25.0, 24.0], [50.0, 25.0, 24.0], [50.0, 26.0, 24.0], [30.0, 25.0, 24.0]]
+    });
+    assert!(text.contains("turns by") && text.contains("round it off"), "{text}");
+    let text = excised(&|excision| excision.path_mm.iter_mut().for_each(|point| point[2] += 100.0));
+    assert!(text.contains("from the skin"), "{text}");
+    let text = excised(&|excision| excision.depth_mm = -1.0);
+    assert!(text.contains("depth_mm"), "{text}");
+    assert!(plan(&mesh, &skin, &[along_x(30.0, 10.0)], &[UNDERMINING], &[ellipse(8.0)]).is_ok());
+}
