@@ -39,8 +39,15 @@ from_mm = [0, 0, 0]
 to_mm = [1, 0, 0]
 depth_mm = 1
 width_mm = 1
+[[undermining]]
+wound = 0
+distance_mm = 1
+depth_mm = 1
+[[excision]]
+path_mm = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]
+depth_mm = 1
 [[suture]]
-incision = 0
+wound = 0
 every_mm = 1
 [[handle]]
 at_mm = [0, 0, 0]

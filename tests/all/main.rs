@@ -25,6 +25,7 @@ mod scenes;
 mod sheet_tension;
 mod skin_counts;
 mod stability;
+mod steps;
 mod sutures;
 mod tune;
 mod turned_patient;

@@ -32,7 +32,7 @@ fn sewn(suture: &str, lines: &str, set: &[(&str, &str)]) -> LoadedScene {
     scene(SMALL, &[&own[..], set].concat())
 }
 
-const STITCHES: &str = "[{ incision = 0, every_mm = 10, bite_mm = 7, at_s = 0.3, tighten_s = 0.3 }]";
+const STITCHES: &str = "[{ wound = 0, every_mm = 10, bite_mm = 7, at_s = 0.3, tighten_s = 0.3 }]";
 
 /// Threads close the wound and then hold about the tension that the cut set free: 6 N/m over 100
 /// mm. Control: without sutures the wound stays open.
@@ -44,7 +44,7 @@ fn threads_close_the_wound_and_hold_its_tension() {
     let (closed, suture) = (run.report.wound.clone().unwrap(), &run.report.sutures[0]);
     assert!(open.mid_mm > 3.0, "{open:?}");
     assert!(closed.mid_mm < 0.25 * open.mid_mm && closed.mid_mm > -0.1, "{closed:?}, open {open:?}");
-    assert_eq!((suture.incision, suture.stitches), (0, 10));
+    assert_eq!((suture.wound, suture.stitches), (0, 10));
     assert!((0.5 * 0.6..1.1 * 0.6).contains(&suture.force_n), "{suture:?}");
     assert!((suture.force_n_per_cm * 10.0 / suture.force_n - 1.0).abs() < 1e-9, "{suture:?}");
     assert!(suture.largest_n >= suture.force_n / 10.0, "{suture:?}");
@@ -102,7 +102,7 @@ fn a_run_resumes_while_threads_are_tightened() {
     for (formulation, substeps) in [("pbd", "1"), ("xpbd", "20"), ("vbd", "2")] {
         let scene = |stiffness: &str, frames: &str, threads: &str| {
             let suture = format!(
-                "[{{ incision = 0, every_mm = 20, bite_mm = 8, at_s = 0.05, tighten_s = 0.2, \
+                "[{{ wound = 0, every_mm = 20, bite_mm = 8, at_s = 0.05, tighten_s = 0.2, \
                  thread_n_per_m = {stiffness} }}]"
             );
             let own = [
@@ -137,7 +137,7 @@ fn a_gpu_sews_as_the_cpu_does() {
         for (formulation, substeps) in [("xpbd", "20"), ("vbd", "2")] {
             let scene = |stiffness: &str| {
                 let suture = format!(
-                    "[{{ incision = 0, every_mm = 20, bite_mm = 10, at_s = 0.02, tighten_s = 0.05, \
+                    "[{{ wound = 0, every_mm = 20, bite_mm = 10, at_s = 0.02, tighten_s = 0.05, \
                      thread_n_per_m = {stiffness} }}]"
                 );
                 let own = [
@@ -171,12 +171,12 @@ fn sutures_that_are_not_possible_are_refused() {
         let text = error.to_string();
         assert!(words.iter().all(|word| text.contains(word)), "{suture}: {text}");
     };
-    let own = |keys: &str| format!("[{{ incision = 0, every_mm = 10{keys} }}]");
-    refused(CUT, "[{ incision = 1, every_mm = 10 }]", ["suture[0].incision", "there are 1"]);
+    let own = |keys: &str| format!("[{{ wound = 0, every_mm = 10{keys} }}]");
+    refused(CUT, "[{ wound = 1, every_mm = 10 }]", ["suture[0].wound", "there are 1"]);
     let wide = CUT.replace("depth_mm", "width_mm = 7, depth_mm");
-    refused(&wide, &own(""), ["suture[0].incision", "without width_mm"]);
-    refused(CUT, "[{ incision = 0, every_mm = 0 }]", ["suture[0].every_mm", "above 0"]);
-    refused(CUT, "[{ incision = 0, every_mm = 1e-6 }]", ["suture[0]", "too many"]);
+    refused(&wide, &own(""), ["suture[0].wound", "without width_mm"]);
+    refused(CUT, "[{ wound = 0, every_mm = 0 }]", ["suture[0].every_mm", "above 0"]);
+    refused(CUT, "[{ wound = 0, every_mm = 1e-6 }]", ["suture[0]", "too many"]);
     refused(CUT, &own(", bite_mm = -1"), ["suture[0].bite_mm", "-1"]);
     refused(CUT, &own(", tighten_to = 1.5"), ["suture[0].tighten_to", "at most 1"]);
     refused(CUT, &own(", at_s = 1.0, release_s = 0.5"), ["suture[0].release_s", "after at_s"]);

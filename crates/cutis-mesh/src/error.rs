@@ -112,6 +112,14 @@ pub enum MeshError {
         /// Largest allowed distance in mm.
         reach_mm: f64,
     },
+    /// A stitch between two given points cannot be made.
+    #[error("pair {pair} of points to stitch: {why}")]
+    StitchPair {
+        /// Number of the pair, from 0.
+        pair: usize,
+        /// What is wrong.
+        why: String,
+    },
     /// There would be more than 1000 stitches.
     #[error(
         "stitches across incision {incision} every {every_mm} mm are too many; give at least {least_mm:.3} mm"

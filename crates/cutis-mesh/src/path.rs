@@ -10,8 +10,8 @@ const SHARPEST_DEG: f64 = 150.0;
 /// Largest number of points of a path. It limits the time of the checks.
 const MOST_POINTS: usize = 1000;
 
-/// Checks that a path has two points or more, does not turn back, and does not cross itself: the
-/// distance of segments that are not neighbors is at least a lattice step.
+/// Checks that a path has two points or more, does not turn back, and does not cross itself:
+/// segments with two lattice steps or more of the path between them are at least one step apart.
 pub(crate) fn check_path(incision: usize, path_mm: &[[f64; 3]], step_mm: f64) -> Result<(), MeshError> {
     check(path_mm, step_mm, false, "make two incisions")
         .map_err(|why| MeshError::IncisionPath { incision, why })
@@ -49,8 +49,15 @@ fn check(path_mm: &[[f64; 3]], step_mm: f64, closed: bool, remedy: &str) -> Resu
         }
     }
     let segments = points.len() - 1;
+    // Length of the path up to each point.
+    let mut passed = vec![0.0];
+    points.windows(2).for_each(|ends| passed.push(passed[passed.len() - 1] + (ends[1] - ends[0]).norm()));
     for a in 0..segments {
-        for b in (a + 2..segments).filter(|b| !closed || b - a + 1 < segments) {
+        let between = |b: usize| {
+            let forth = passed[b] - passed[a + 1];
+            if closed { forth.min(passed[segments] - passed[b + 1] + passed[a]) } else { forth }
+        };
+        for b in (a + 2..segments).filter(|&b| between(b) >= 2.0 * step_mm) {
             let apart = distance([points[a], points[a + 1]], [points[b], points[b + 1]]);
             if apart < step_mm {
                 return refuse(format!(

@@ -95,6 +95,11 @@ impl Piece {
         Ok(Self { blade: Blade::around(bowl, length), outline, axis })
     }
 
+    /// The straight line between the two points of the outline that are farthest apart.
+    pub fn axis(&self) -> &Slit {
+        &self.axis
+    }
+
     /// Distance in m from a rest position to the walls of the piece, and zero inside it.
     pub fn distance(&self, position: Point3<f32>) -> f64 {
         let inside = self.blade.encloses(position.cast());

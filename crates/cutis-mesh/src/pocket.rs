@@ -3,17 +3,18 @@
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::piece::Piece;
 use crate::sever::{Blade, PocketFloor, longest_edge, stations};
 use crate::slit::{Facet, SkinSurface, Slit, check_indices};
 use crate::{Frame, Lattice, MeshError};
 
-/// An undermining: the skin around an incision is separated from what is below it.
+/// An undermining: the skin around a wound is separated from what is below it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Undermining {
-    /// Number of the incision from which it is made.
-    pub incision: usize,
-    /// How far it reaches from the incision to both sides and beyond its ends, in mm.
+    /// Number of the wound from which it is made: incisions first, then excisions.
+    pub wound: usize,
+    /// How far it reaches from the incision or the outline in all directions, in mm.
     pub distance_mm: f64,
     /// Depth below the skin in mm.
     pub depth_mm: f64,
@@ -24,24 +25,25 @@ pub struct Undermining {
 pub struct Pocket {
     /// What cuts.
     pub(crate) blade: Blade,
-    /// The path of its incision, at the depth of the pocket, in local meters.
+    /// The path of its wound, at the depth of the pocket, in local meters.
     path: Vec<Point3<f64>>,
     /// How far it reaches from the path in m.
     reach: f64,
 }
 
 impl Pocket {
-    /// Places underminings below the skin of a lattice. `slits` are those of [`Slit::on_lattice`]
-    /// for the same `skin`.
+    /// Places underminings below the skin of a lattice. `slits` and `pieces` are those of
+    /// [`Slit::on_lattice`] and [`Piece::on_lattice`] for the same `skin`.
     ///
     /// # Errors
     /// [`MeshError::VertexIndex`] if a triangle names a point that does not exist.
     /// [`MeshError::Undermining`] if a length is not finite and positive, if there is no such
-    /// incision, or if it is not as deep as the undermining.
+    /// wound, or if it is not as deep as the undermining.
     pub fn on_lattice(
         lattice: &Lattice,
         skin: &[[u32; 3]],
         slits: &[Slit],
+        pieces: &[Piece],
         underminings: &[Undermining],
     ) -> Result<Vec<Self>, MeshError> {
         if underminings.is_empty() {
@@ -51,38 +53,44 @@ impl Pocket {
         check_indices(skin, grid.len())?;
         let position = |point: u32| frame.to_local(lattice.mm(grid.point(point as usize)));
         let surface = SkinSurface::new(frame, lattice, skin, &position);
-        let place = |(number, undermining)| Self::place(lattice, &surface, slits, number, undermining);
+        let incisions = slits.chunk_by(|a, b| a.incision == b.incision);
+        let wounds: Vec<&[Slit]> = incisions.chain(pieces.iter().map(|piece| &piece.outline[..])).collect();
+        let closed = wounds.len() - pieces.len();
+        let place = |(number, undermining): (usize, &Undermining)| {
+            let wound = wounds.get(undermining.wound).copied().unwrap_or_default();
+            Self::place(lattice, &surface, (wound, undermining.wound >= closed), number, undermining)
+        };
         underminings.iter().enumerate().map(place).collect()
     }
 
     fn place(
         lattice: &Lattice,
         surface: &SkinSurface<'_>,
-        slits: &[Slit],
+        (slits, closed): (&[Slit], bool),
         number: usize,
         undermining: &Undermining,
     ) -> Result<Self, MeshError> {
         let refuse = |why: String| Err(MeshError::Undermining { undermining: number, why });
-        let Undermining { incision, distance_mm, depth_mm } = *undermining;
+        let Undermining { wound, distance_mm, depth_mm } = *undermining;
         for (key, value) in [("distance_mm", distance_mm), ("depth_mm", depth_mm)] {
             if !(value.is_finite() && value > 0.0) {
                 return refuse(format!("`{key}` is {value}; it must be finite and positive"));
             }
         }
-        let own: Vec<&Slit> = slits.iter().filter(|slit| slit.incision == incision).collect();
+        let own: Vec<&Slit> = slits.iter().collect();
         let Some(first) = own.first() else {
-            return refuse(format!("there is no incision {incision}"));
+            return refuse(format!("there is no wound {wound}"));
         };
         let (depth, distance) = (depth_mm / 1000.0, distance_mm / 1000.0);
         if first.depth() < depth || !first.removes_nothing() {
             return refuse(format!(
-                "it is {depth_mm} mm deep, but incision {incision} is {:.1} mm deep; make the incision as deep, \
-                 and without a width",
+                "it is {depth_mm} mm deep, but wound {wound} is {:.1} mm deep; make the wound as deep, and \
+                 without a width",
                 first.depth() * 1000.0
             ));
         }
-        let Some(stations) = stations(&own, surface.step / 2.0, false) else {
-            return refuse(format!("incision {incision} is not a path"));
+        let Some(stations) = stations(&own, surface.step / 2.0, closed) else {
+            return refuse(format!("wound {wound} is not a path"));
         };
         let path: Vec<Point3<f64>> =
             stations.iter().map(|station| station.skin + station.inward * depth).collect();

@@ -1,15 +1,16 @@
-//! Stitches across an incision: pairs of points of the skin on both sides of it.
+//! Stitches across a wound: pairs of points of the skin.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3, distance};
 
+use crate::piece::Piece;
 use crate::sever::closest_in_triangle;
 use crate::slit::{Facet, Slit};
 use crate::{Cut, MeshError, TetMesh};
 
-/// Largest number of stitches of an incision.
+/// Largest number of stitches of a wound.
 const MOST_STITCHES: f64 = 1000.0;
 
-/// A stitch: a point of the skin on the left side of an incision, and one on its right side.
+/// A stitch: a point of the skin on the left side of a wound, and one on its right side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stitch {
     /// The triangles of the two points, in mesh vertices. They share no vertex.
@@ -18,6 +19,8 @@ pub struct Stitch {
     pub weights: [[f64; 2]; 2],
     /// Distance of the points at rest in m.
     pub rest: f64,
+    /// Distance of the points in m when the edges of the wound meet.
+    pub closed: f64,
 }
 
 impl Stitch {
@@ -28,7 +31,80 @@ impl Stitch {
     }
 }
 
+/// A point of the skin that is close to a wanted one.
+struct End {
+    triangle: [u32; 3],
+    weights: [f64; 3],
+    point: Point3<f64>,
+}
+
+/// The skin on which stitches end.
+struct Skin<'a> {
+    mesh: &'a TetMesh,
+    triangles: Vec<&'a [u32; 3]>,
+    /// Largest distance of an end from its wanted place, in m.
+    reach: f64,
+}
+
+impl Skin<'_> {
+    fn corners(&self, triangle: &[u32; 3]) -> [Point3<f32>; 3] {
+        triangle.map(|v| self.mesh.positions[v as usize])
+    }
+
+    /// The closest point to a wanted one that fits, on a triangle whose area vector fits.
+    fn end(
+        &self,
+        wanted: Point3<f64>,
+        faces: &dyn Fn(&Vector3<f64>) -> bool,
+        fits: &dyn Fn(Point3<f64>) -> bool,
+    ) -> Option<End> {
+        let facing =
+            self.triangles.iter().filter(|triangle| faces(&Facet::of(self.corners(triangle)).area_vector));
+        let ends = facing.map(|triangle| {
+            let corners = self.corners(triangle).map(|corner| corner.cast::<f64>());
+            let weights = closest_in_triangle(&corners, wanted);
+            let sum = corners
+                .iter()
+                .zip(weights)
+                .fold(Vector3::zeros(), |sum, (corner, w)| sum + corner.coords * w);
+            End { triangle: **triangle, weights, point: Point3::from(sum) }
+        });
+        let far = |end: &End| distance(&end.point, &wanted);
+        let near = ends.filter(|end| far(end) <= self.reach && fits(end.point));
+        near.min_by(|a, b| far(a).total_cmp(&far(b)))
+    }
+}
+
+/// The stitch between two ends, if they share no vertex. `closed` is computed from its rest length.
+fn join(left: &End, right: &End, closed: impl Fn(f64) -> f64) -> Option<Stitch> {
+    if left.triangle.iter().any(|v| right.triangle.contains(v)) {
+        return None;
+    }
+    let rest = distance(&left.point, &right.point);
+    let weights = [left.weights, right.weights].map(|[_, b, c]| [b, c]);
+    Some(Stitch { triangles: [left.triangle, right.triangle], weights, rest, closed: closed(rest) })
+}
+
+/// Number of stitches along a wound. The error is the least distance in m.
+fn count(length: f64, every: f64) -> Result<usize, f64> {
+    let count = (length / every).round().max(1.0);
+    if count > MOST_STITCHES { Err(length / MOST_STITCHES) } else { Ok(count as usize) }
+}
+
 impl Cut {
+    fn skin_near<'a>(
+        mesh: &'a TetMesh,
+        skin: &'a [[u32; 3]],
+        bite: f64,
+        near: impl Fn(Point3<f32>, f64) -> bool,
+    ) -> Skin<'a> {
+        // The skin may be bent, and its triangles are those of the lattice.
+        let reach = 2.0 * mesh.lattice.longest_step_mm() / 1000.0 + 0.25 * bite;
+        let corner = |triangle: &[u32; 3]| mesh.positions[triangle[0] as usize];
+        let triangles = skin.iter().filter(|triangle| near(corner(triangle), bite + 2.0 * reach)).collect();
+        Skin { mesh, triangles, reach }
+    }
+
     /// Stitches along an incision at equal distances of about `every`. Their ends are about `bite`
     /// from the incision, both in m. `skin` holds triangles of the mesh, none of them divided by a
     /// cut.
@@ -49,56 +125,130 @@ impl Cut {
     ) -> Result<Vec<Stitch>, MeshError> {
         let slits = self.incisions().nth(incision).expect("the incision exists");
         let length: f64 = slits.iter().map(Slit::length).sum();
-        let count = (length / every).round().max(1.0);
-        if count > MOST_STITCHES {
-            let least_mm = length * 1000.0 / MOST_STITCHES;
-            return Err(MeshError::TooManyStitches { incision, every_mm: every * 1000.0, least_mm });
-        }
-        let count = count as usize;
-        let step = mesh.lattice.longest_step_mm() / 1000.0;
-        // The skin may be bent, and its triangles are those of the lattice.
-        let reach = 2.0 * step + 0.25 * bite;
-        let corners = |triangle: &[u32; 3]| triangle.map(|v| mesh.positions[v as usize]);
-        let near: Vec<&[u32; 3]> = skin
-            .iter()
-            .filter(|triangle| slits.iter().any(|slit| slit.near(corners(triangle)[0], bite + 2.0 * reach)))
-            .collect();
+        let count = count(length, every).map_err(|least| MeshError::TooManyStitches {
+            incision,
+            every_mm: every * 1000.0,
+            least_mm: least * 1000.0,
+        })?;
+        let skin =
+            Self::skin_near(mesh, skin, bite, |p, margin| slits.iter().any(|slit| slit.near(p, margin)));
+        let off_skin = |at: Point3<f64>| MeshError::StitchOffSkin {
+            incision,
+            at_mm: mesh.frame.to_mm(at.cast()).into(),
+            reach_mm: skin.reach * 1000.0,
+        };
         let stitch = |number: usize| {
             let (slit, along) = at_length(slits, length * (number as f64 + 0.5) / count as f64);
             let middle = slit.skin_at(along);
             let end = |side: f64| {
                 let wanted = middle + slit.lateral() * (side * bite);
-                let outside =
-                    |triangle: &[u32; 3]| Facet::of(corners(triangle)).area_vector.dot(&slit.inward()) < 0.0;
+                let faces = |area: &Vector3<f64>| area.dot(&slit.inward()) < 0.0;
                 let on_side = |point: Point3<f64>| side * slit.coordinates(point).lateral > 0.2 * bite;
-                let found = near.iter().filter(|triangle| outside(triangle)).map(|triangle| {
-                    let corners = corners(triangle).map(|corner| corner.cast::<f64>());
-                    let weights = closest_in_triangle(&corners, wanted);
-                    let sum = corners
-                        .iter()
-                        .zip(weights)
-                        .fold(nalgebra::Vector3::zeros(), |sum, (corner, w)| sum + corner.coords * w);
-                    let point = Point3::from(sum);
-                    (nalgebra::distance(&point, &wanted), **triangle, weights, point)
-                });
-                let found = found.filter(|(distance, .., point)| *distance <= reach && on_side(*point));
-                found.min_by(|a, b| a.0.total_cmp(&b.0)).ok_or_else(|| MeshError::StitchOffSkin {
-                    incision,
-                    at_mm: mesh.frame.to_mm(wanted.cast()).into(),
-                    reach_mm: reach * 1000.0,
-                })
+                skin.end(wanted, &faces, &on_side).ok_or_else(|| off_skin(wanted))
             };
-            let [left, right] = [end(-1.0)?, end(1.0)?];
-            if left.1.iter().any(|v| right.1.contains(v)) {
-                let at_mm = mesh.frame.to_mm(middle.cast()).into();
-                return Err(MeshError::StitchOffSkin { incision, at_mm, reach_mm: reach * 1000.0 });
-            }
-            let rest = nalgebra::distance(&left.3, &right.3);
-            let weights = [left.2, right.2].map(|[_, b, c]| [b, c]);
-            Ok(Stitch { triangles: [left.1, right.1], weights, rest })
+            join(&end(-1.0)?, &end(1.0)?, |rest| rest).ok_or_else(|| off_skin(middle))
         };
         (0..count).map(stitch).collect()
     }
+
+    /// Stitches across an excision, along the line between the two points of its outline that are
+    /// farthest apart. Their ends are about `bite` from the outline. For the rest see
+    /// [`Cut::stitches`].
+    ///
+    /// # Errors
+    /// [`MeshError::Excision`] if a stitch has no skin near one of its ends, or for more than 1000
+    /// stitches.
+    ///
+    /// # Panics
+    /// If there is no such excision.
+    pub fn stitches_across(
+        &self,
+        excision: usize,
+        mesh: &TetMesh,
+        skin: &[[u32; 3]],
+        every: f64,
+        bite: f64,
+    ) -> Result<Vec<Stitch>, MeshError> {
+        let piece = &self.pieces[excision];
+        let axis = &piece.axis;
+        let refuse = |why: String| MeshError::Excision { excision, why };
+        let count = count(axis.length(), every).map_err(|least| {
+            let (every_mm, least_mm) = (every * 1000.0, least * 1000.0);
+            refuse(format!("stitches every {every_mm} mm are too many; give at least {least_mm:.3} mm"))
+        })?;
+        let near = |p: Point3<f32>, margin: f64| piece.outline.iter().any(|slit| slit.near(p, margin));
+        let skin = Self::skin_near(mesh, skin, bite, near);
+        let off_skin = |at: Point3<f64>| {
+            let at_mm: [f64; 3] = mesh.frame.to_mm(at.cast()).into();
+            let reach_mm = skin.reach * 1000.0;
+            refuse(format!("a stitch has no skin within {reach_mm:.1} mm of {at_mm:.1?} mm; change bite_mm"))
+        };
+        let stitch = |number: usize| {
+            let along = axis.length() * (number as f64 + 0.5) / count as f64;
+            let [left, right] = sides(piece, along);
+            let middle = axis.skin_at(along);
+            let end = |side: f64, edge: f64| {
+                let wanted = middle + axis.lateral() * (edge + side * bite);
+                let faces = |area: &Vector3<f64>| area.dot(&axis.inward()) < 0.0;
+                let beyond =
+                    |point: Point3<f64>| side * (axis.coordinates(point).lateral - edge) > 0.2 * bite;
+                skin.end(wanted, &faces, &beyond).ok_or_else(|| off_skin(wanted))
+            };
+            let closed = |rest: f64| (rest - (right - left)).max(0.0);
+            join(&end(-1.0, left)?, &end(1.0, right)?, closed).ok_or_else(|| off_skin(middle))
+        };
+        (0..count).map(stitch).collect()
+    }
+
+    /// Stitches between pairs of points near the skin, in mm. The edges of the wound meet when the
+    /// points are `closed` apart, in m. `skin` is as in [`Cut::stitches`].
+    ///
+    /// # Errors
+    /// [`MeshError::StitchPair`] if a point is too far from the skin, or if no cut lies between the
+    /// two points.
+    pub fn stitches_between(
+        &self,
+        pairs_mm: &[[[f64; 3]; 2]],
+        mesh: &TetMesh,
+        skin: &[[u32; 3]],
+        closed: f64,
+    ) -> Result<Vec<Stitch>, MeshError> {
+        let skin = Self::skin_near(mesh, skin, 0.0, |_, _| true);
+        let stitch = |(pair, ends): (usize, &[[f64; 3]; 2])| {
+            let refuse = |why: String| MeshError::StitchPair { pair, why };
+            let end = |mm: [f64; 3]| {
+                let wanted = mesh.frame.to_local(mm.into()).cast();
+                skin.end(wanted, &|_| true, &|_| true).ok_or_else(|| {
+                    let reach_mm = skin.reach * 1000.0;
+                    refuse(format!("there is no whole skin within {reach_mm:.1} mm of {mm:.1?} mm"))
+                })
+            };
+            let [left, right] = [end(ends[0])?, end(ends[1])?];
+            let [a, b]: [Point3<f32>; 2] = [left.point.cast(), right.point.cast()];
+            let mut walls = self.slits.iter().chain(self.pieces.iter().flat_map(|piece| &piece.outline));
+            let cut = walls.any(|slit| slit.crosses(a, b));
+            let stitch = join(&left, &right, |_| closed).filter(|_| cut);
+            stitch.ok_or_else(|| refuse(format!("no cut lies between {:?} and {:?} mm", ends[0], ends[1])))
+        };
+        pairs_mm.iter().enumerate().map(stitch).collect()
+    }
+}
+
+/// Lateral coordinates of the left and right edge of a piece at a length along its axis, in m.
+fn sides(piece: &Piece, along: f64) -> [f64; 2] {
+    let at = |point: Point3<f64>| {
+        let at = piece.axis.coordinates(point);
+        [at.along, at.lateral]
+    };
+    let mut sides = [0.0_f64; 2];
+    for slit in &piece.outline {
+        let [[s, t], [u, v]] = [at(slit.skin_at(0.0)), at(slit.skin_at(slit.length()))];
+        if (s <= along) != (u <= along) {
+            let lateral = t + (v - t) * (along - s) / (u - s);
+            sides = [sides[0].min(lateral), sides[1].max(lateral)];
+        }
+    }
+    sides
 }
 
 /// The slit at a length along a path, and the length along the slit.

@@ -9,14 +9,17 @@ use crate::{SolverError, Vertex};
 
 /// A group of vertices that move along a straight path at constant speed and then stay there.
 ///
-/// The vertices get the inverse mass 0 and the position `rest + move_m·min(t/over_s, 1)`. If
-/// `over_s` is 0, they are at the end of the path from the first substep on.
-#[derive(Clone, Debug, PartialEq)]
+/// The vertices get the inverse mass 0 and the position `rest + move_m·s`, where `s` is
+/// `(t − at_s)/over_s` between 0 and 1. If `over_s` is 0, they are at the end of the path from
+/// `at_s` on.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Handle {
     /// Indices of the vertices to move.
     pub vertices: Vec<u32>,
     /// Displacement at the end of the path, in meters.
     pub move_m: [f64; 3],
+    /// Start of the movement, in seconds. The vertices are held before it.
+    pub at_s: f64,
     /// Duration of the movement, in seconds.
     pub over_s: f64,
 }
@@ -27,6 +30,7 @@ pub struct KinematicHandle<T: Scalar> {
     vertices: Vec<u32>,
     rest: Vec<Point3<T>>,
     move_m: [f64; 3],
+    at_s: f64,
     over_s: f64,
 }
 
@@ -46,9 +50,10 @@ impl<T: Scalar> KinematicHandle<T> {
                 return Err(SolverError::Setting { key, value, expected });
             }
         }
-        if !(handle.over_s.is_finite() && handle.over_s >= 0.0) {
-            let (key, expected) = ("handle over_s", "a finite time, 0 s or more");
-            return Err(SolverError::Setting { key, value: handle.over_s, expected });
+        for (key, value) in [("handle at_s", handle.at_s), ("handle over_s", handle.over_s)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(SolverError::Setting { key, value, expected: "a finite time, 0 s or more" });
+            }
         }
         let mut rest = Vec::with_capacity(handle.vertices.len());
         for &vertex in &handle.vertices {
@@ -60,7 +65,8 @@ impl<T: Scalar> KinematicHandle<T> {
             rest.push(state.position());
             *state = Vertex::new(state.position(), T::zero());
         }
-        Ok(Self { vertices: handle.vertices, rest, move_m: handle.move_m, over_s: handle.over_s })
+        let Handle { vertices, move_m, at_s, over_s } = handle;
+        Ok(Self { vertices, rest, move_m, at_s, over_s })
     }
 
     /// Returns the indices of the vertices that the handle moves.
@@ -76,7 +82,11 @@ impl<T: Scalar> KinematicHandle<T> {
 
     /// Returns the displacement at `time_s`, in meters.
     pub fn path(&self, time_s: f64) -> Vector3<T> {
-        let fraction = if time_s < self.over_s { time_s / self.over_s } else { 1.0 };
+        let since = time_s - self.at_s;
+        let fraction = match since < self.over_s {
+            true => (since / self.over_s).max(0.0),
+            false => 1.0,
+        };
         Vector3::from(self.move_m.map(|d| T::constant(d * fraction)))
     }
 
@@ -85,6 +95,7 @@ impl<T: Scalar> KinematicHandle<T> {
             vertices: self.vertices.clone(),
             rest: self.rest.iter().map(|position| position.map(T::to_f64)).collect(),
             move_m: self.move_m,
+            at_s: self.at_s,
             over_s: self.over_s,
         }
     }

@@ -41,6 +41,20 @@ impl<T: Scalar> System<T> {
         Ok(())
     }
 
+    /// Returns the force of all constraints and loads on some vertices at the present positions, in
+    /// N.
+    ///
+    /// # Errors
+    /// The errors of [`System::constraint_forces`], and [`SolverError::Vertex`] for a vertex that
+    /// does not exist.
+    pub fn forces_on(&self, wanted: &[u32]) -> Result<Vec<Vector3<T>>, SolverError> {
+        self.check_vertices(wanted)?;
+        let mut forces = vec![VertexForce::none(); wanted.len()];
+        add_forces(&self.kinds, &self.vertices, wanted, &mut forces)?;
+        let load = |&vertex: &u32| load_of(&self.loads, vertex as usize);
+        Ok(forces.iter().zip(wanted).map(|(force, vertex)| force.force + load(vertex)).collect())
+    }
+
     /// Returns the force of all constraints on each vertex at the present positions, in N.
     ///
     /// The sum has the operations and the order of vertex block descent. With the negative of the

@@ -115,7 +115,8 @@ impl Plan<'_> {
                 let vertices =
                     (0..count as u32).filter(|&n| n as usize % nx == nx - 1 && n as usize / nx % ny == row);
                 let (vertices, over_s) = (vertices.collect(), 0.03 + row as f64);
-                builder = builder.handle(Handle { vertices, move_m: [0.1, 0.23, -0.07], over_s })?;
+                builder =
+                    builder.handle(Handle { vertices, move_m: [0.1, 0.23, -0.07], at_s: 0.0, over_s })?;
             }
         }
         Ok(builder.build())

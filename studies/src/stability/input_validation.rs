@@ -219,7 +219,9 @@ fn restored(coordinate: f64, velocity: f64) -> Option<SolverError> {
 }
 
 fn handle(move_m: f64, over_s: f64) -> Option<SolverError> {
-    builder().and_then(|b| b.handle(Handle { vertices: vec![1], move_m: [0.0, move_m, 0.0], over_s })).err()
+    builder()
+        .and_then(|b| b.handle(Handle { vertices: vec![1], move_m: [0.0, move_m, 0.0], at_s: 0.0, over_s }))
+        .err()
 }
 
 fn settings(change: fn(&mut Settings)) -> Option<SolverError> {

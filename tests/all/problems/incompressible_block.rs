@@ -37,7 +37,7 @@ fn block<T: Scalar>(softness: f64, scale: f64) -> System<T> {
             &greedy(&lattice.tets, count).unwrap(),
         )
         .unwrap()
-        .handle(Handle { vertices: end, move_m: [1.2 * scale, 0.0, 0.0], over_s: 20.0 })
+        .handle(Handle { vertices: end, move_m: [1.2 * scale, 0.0, 0.0], at_s: 0.0, over_s: 20.0 })
         .unwrap()
         .build()
 }

@@ -58,6 +58,7 @@ fn summary(report: &Report, out: &Path) -> String {
         format!("wound: {:.2} mm -> {:.2} mm ({:.2} mm in the middle)", w.initial_mm, w.final_mm, w.mid_mm)
     }));
     lines.extend(report.sutures.iter().map(|suture| suture.summary()));
+    lines.extend(report.handles.iter().map(|handle| handle.summary()));
     lines.push(format!("run folder: {}", out.display()));
     if report.scene.output.report {
         lines.push(format!("look at:    {}", out.join("report.html").display()));
@@ -112,6 +113,7 @@ fn table(plan: &Plan) -> String {
     ];
     lines.extend(plan.tension.iter().map(|(kind, tension)| format!("tension          {kind}: {tension}")));
     lines.extend(plan.membrane.iter().map(|membrane| format!("lines of tension {}", membrane.summary())));
+    lines.extend(plan.steps.iter().map(|step| format!("step             {}", step.summary())));
     lines.extend(material_lines(&plan.materials));
     lines.extend(cost_lines(plan));
     if !plan.device_memory.is_empty() {

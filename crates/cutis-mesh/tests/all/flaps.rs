@@ -32,8 +32,8 @@ fn plan(
 ) -> Result<Cut, MeshError> {
     let skin: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| mesh.lattice_index[v as usize])).collect();
     let slits = Slit::on_lattice(&mesh.lattice, &skin, incisions)?;
-    let pockets = Pocket::on_lattice(&mesh.lattice, &skin, &slits, underminings)?;
     let pieces = Piece::on_lattice(&mesh.lattice, &skin, excisions)?;
+    let pockets = Pocket::on_lattice(&mesh.lattice, &skin, &slits, &pieces, underminings)?;
     Cut::of_slits(mesh, triangles, slits)?.with(mesh, pockets, pieces)
 }
 
@@ -167,7 +167,7 @@ fn untouched(skin: &[[u32; 3]], growth: &cutis_mesh::sever::Growth) -> usize {
     skin.len() - end.triangles.len()
 }
 
-const UNDERMINING: Undermining = Undermining { incision: 0, distance_mm: 12.0, depth_mm: 6.0 };
+const UNDERMINING: Undermining = Undermining { wound: 0, distance_mm: 12.0, depth_mm: 6.0 };
 
 /// Vertices below the floor of the pocket that can be reached from the skin within a box on one
 /// side of the incision, without going around the pocket.
@@ -232,7 +232,7 @@ fn the_floor_of_a_pocket_follows_curved_skin() {
     let (mut mesh, mut skin) = body(&lattice, |p| p[1].hypot(p[2]) <= 32.0);
     let path_mm = vec![[20.0, 0.0, 32.0], [40.0, 0.0, 32.0]];
     let incision = Incision { path_mm, depth_mm: 8.0, width_mm: None };
-    let undermining = Undermining { incision: 0, distance_mm: 16.0, depth_mm: 6.0 };
+    let undermining = Undermining { wound: 0, distance_mm: 16.0, depth_mm: 6.0 };
     let mut cut = plan(&mesh, &skin, &[incision], &[undermining], &[]).unwrap();
     let severed = cut.sever(&mut mesh, &mut skin).unwrap().unwrap();
     let walls = severed.tet_pieces.points.iter().map(|point| {
@@ -255,8 +255,8 @@ fn cuts_that_cannot_be_made_are_refused_by_name() {
     let undermined = |undermining: Undermining| {
         plan(&mesh, &skin, &[along_x(30.0, 10.0)], &[undermining], &[]).unwrap_err().to_string()
     };
-    let text = undermined(Undermining { incision: 1, ..UNDERMINING });
-    assert!(text.contains("undermining 0") && text.contains("no incision 1"), "{text}");
+    let text = undermined(Undermining { wound: 1, ..UNDERMINING });
+    assert!(text.contains("undermining 0") && text.contains("no wound 1"), "{text}");
     let text = undermined(Undermining { depth_mm: 12.0, ..UNDERMINING });
     assert!(text.contains("12 mm deep") && text.contains("10.0 mm deep"), "{text}");
     let text = undermined(Undermining { distance_mm: f64::NAN, ..UNDERMINING });

@@ -55,7 +55,7 @@ fn body<T: Scalar>(formulation: Formulation) -> System<T> {
             &greedy(&lattice.tets, count).unwrap(),
         )
         .unwrap()
-        .handle(Handle { vertices: held, move_m: [0.1, 0.2, 0.0], over_s: 0.03 })
+        .handle(Handle { vertices: held, move_m: [0.1, 0.2, 0.0], at_s: 0.0, over_s: 0.03 })
         .unwrap()
         .loads(&(0..count).map(|n| Vector3::x() * T::constant((n % 5) as f64)).collect::<Vec<_>>())
         .unwrap()

@@ -100,7 +100,7 @@ pub fn body<T: Scalar>(parts: Parts) -> System<T> {
         let move_m = [0.1 * scale, 0.2 * scale, 0.0];
         for row in 0..2 {
             let vertices = (0..count as u32).filter(|n| n % 12 == 11 && (n / 12) % 9 == 8 * row).collect();
-            builder = builder.handle(Handle { vertices, move_m, over_s: 0.03 }).unwrap();
+            builder = builder.handle(Handle { vertices, move_m, at_s: 0.0, over_s: 0.03 }).unwrap();
         }
     }
     builder.build()

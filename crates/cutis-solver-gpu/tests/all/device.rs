@@ -72,7 +72,7 @@ fn a_failed_measurement_does_not_change_the_run() {
             let springs = [[0, 1], [1, 2]];
             let groups = greedy(&springs, 3).unwrap();
             let soft = Stiffness::compliance(1e-3);
-            let handle = Handle { vertices: vec![0], move_m: [0.0, 0.1, 0.0], over_s: 0.05 };
+            let handle = Handle { vertices: vec![0], move_m: [0.0, 0.1, 0.0], at_s: 0.0, over_s: 0.05 };
             let system = SystemBuilder::<f32>::new(&points, &[1.0f32; 3])
                 .unwrap()
                 .add_from_rest::<NameClash, 2>(&springs, &(), soft, &groups)

@@ -78,7 +78,7 @@ fn a_changed_body_continues_as_one_that_was_built_so() {
 
 #[test]
 fn changes_that_do_not_fit_are_refused_and_change_nothing() {
-    let handle = Handle { vertices: vec![0], move_m: [0.0; 3], over_s: 1.0 };
+    let handle = Handle { vertices: vec![0], move_m: [0.0; 3], at_s: 0.0, over_s: 1.0 };
     let held = springs(builder(&[0.0, 1.0, 1.0, 1.0, 0.0]), &CHAIN, 0.01).handle(handle).unwrap().build();
     let refuse = |change: Change<f64>, expected: &str| {
         let mut solver = SolverReference::new(held.clone(), settings(Formulation::Vbd)).unwrap();

@@ -107,7 +107,12 @@ fn errors_name_invalid_stiffnesses() {
 
 #[test]
 fn errors_name_invalid_handles() {
-    let handle = |vertices: &[u32], over_s| Handle { vertices: vertices.to_vec(), move_m: [1.0; 3], over_s };
+    let handle = |vertices: &[u32], over_s| Handle {
+        vertices: vertices.to_vec(),
+        move_m: [1.0; 3],
+        at_s: 0.0,
+        over_s,
+    };
     let error = builder().handle(handle(&[1, 3], 1.0)).err().unwrap();
     assert!(matches!(error, SolverError::Handle { handle: 0, vertex: 3, .. }), "{error}");
     let error = builder().handle(handle(&[1, 1], 1.0)).err().unwrap();
@@ -121,7 +126,7 @@ fn errors_name_invalid_handles() {
 
 #[test]
 fn a_handle_moves_its_vertices_along_the_path_and_holds_them() {
-    let handle = Handle { vertices: vec![2], move_m: [0.0, 3.0, 0.0], over_s: 1.5 };
+    let handle = Handle { vertices: vec![2], move_m: [0.0, 3.0, 0.0], at_s: 0.0, over_s: 1.5 };
     let system = builder().handle(handle).unwrap().build();
     let settings = Settings { dt_s: 0.5, substeps: 2, gravity_m_s2: [0.0, -1.0, 0.0], ..Settings::default() };
     let mut solver = SolverReference::new(system, settings).unwrap();

@@ -1,8 +1,11 @@
 //! Builds a body from its CT.
 
-use cutis_mesh::{Cut, Incision, Lattice, Skin, Slit, TetMesh, Tissue, TissueMask};
+use cutis_mesh::sever::Severed;
+use cutis_mesh::{Cut, Excision, Incision, Lattice, Piece, Pocket, Skin, Slit, TetMesh, Tissue, TissueMask};
 use cutis_volume::{TableKind, Volume};
+use nalgebra::Point3;
 
+use super::cut_error::cut_error;
 use super::lattice::lattice;
 use super::{Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, region, sutures};
 use crate::Error;
@@ -14,7 +17,7 @@ impl Body {
     /// # Errors
     /// [`Error`] for a section that does not work with this CT.
     pub(crate) fn build(sections: &BodySections<'_>, volume: &Volume) -> Result<Self, Error> {
-        let BodySections { file, tissue, incisions, .. } = *sections;
+        let BodySections { file, tissue, incisions, ref underminings, excisions, .. } = *sections;
         let lattice = lattice(sections, volume)?;
         let hu = lattice.sample(volume)?;
         let air = air(&hu, tissue.air_below_hu);
@@ -25,11 +28,21 @@ impl Body {
         let (skin, skin_report) = skin.map(|skin| (skin.triangles, skin.report)).unzip();
         let skin: Vec<[u32; 3]> = skin.unwrap_or_default();
         let incisions: Vec<Incision> = incisions.iter().map(Incision::from).collect();
-        let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(file.blame("incision"))?;
+        let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(cut_error(file))?;
+        let excisions: Vec<Excision> = excisions.iter().map(Excision::from).collect();
+        let pieces = Piece::on_lattice(&lattice, &skin, &excisions).map_err(cut_error(file))?;
+        let pockets = Pocket::on_lattice(&lattice, &skin, &slits, &pieces, underminings);
+        let pockets = pockets.map_err(cut_error(file))?;
+        let from_cuts_mm = |p: Point3<f32>| {
+            let slits = slits.iter().map(|slit| slit.distance(p));
+            let pockets = pockets.iter().map(|pocket| pocket.distance(p));
+            let pieces = pieces.iter().map(|piece| piece.distance(p));
+            slits.chain(pockets).chain(pieces).fold(f64::INFINITY, f64::min) * 1000.0
+        };
         let membrane =
             sections.membrane.map(|section| Membrane::find(file, section, &whole, &hu, &skin)).transpose()?;
         warnings.extend(membrane.iter().flat_map(|membrane| membrane.warnings.iter().cloned()));
-        let mut mesh = region::mesh(sections, &whole, &hu, &slits)?;
+        let mut mesh = region::mesh(sections, &whole, &hu, &from_cuts_mm)?;
         let mut materials = BodyMaterials::assign(sections, &whole, &hu, &mesh, &skin)?;
         warnings.extend(materials.iter().flat_map(|materials| materials.warnings(&mesh)));
         let (mut skin, mut inactive_skin) = mesh.divide_skin(&skin);
@@ -41,15 +54,15 @@ impl Body {
         let mut masses = mesh.masses(&density);
         region::check_handles(sections, &mesh)?;
         let mut cut = Cut::of_slits(&mesh, &skin, slits).map_err(|e| region::incision_error(sections, e))?;
+        cut = cut.with(&mesh, pockets, pieces).map_err(cut_error(file))?;
         let removed = cut.apply(&mut mesh, &mut skin);
         let (severed, growth) = match sections.cuts_grow {
-            false => (cut.sever(&mut mesh, &mut skin).map_err(file.blame("incision"))?, None),
-            true => cut.sever_growing(&mut mesh, &mut skin).map_err(file.blame("incision"))?.unzip(),
+            false => (cut.sever(&mut mesh, &mut skin).map_err(cut_error(file))?, None),
+            true => cut.sever_growing(&mut mesh, &mut skin).map_err(cut_error(file))?.unzip(),
         };
-        let of_blades = sections.incisions.iter().filter(|section| section.width_mm.is_none());
-        let growing = growth.map(|growth| GrowingCuts::new(growth, of_blades, &mesh, &density));
+        let growing = growth.map(|growth| GrowingCuts::new(growth, sections.times.clone(), &mesh, &density));
         if let Some(severed) = &severed {
-            divide_masses(&mut masses, &mesh, &density);
+            divide_masses(&mut masses, severed, &mesh, &density);
             materials.iter_mut().for_each(|materials| materials.add_nodes(&severed.virtual_nodes));
             inactive_skin.shift(mesh.real_vertices(), severed.virtual_nodes.len());
         }
@@ -100,16 +113,17 @@ fn find_tissue(
     Ok((whole, Some(skin)))
 }
 
-/// Divides the masses of vertices along cuts of no width among the nodes of the copies.
-fn divide_masses(masses: &mut Vec<f32>, mesh: &TetMesh, density: &dyn Fn(f32) -> f32) {
+/// Divides the masses of vertices along cuts of no width among the nodes of the copies. A node
+/// without tissue, as in a piece that is taken out later, keeps the mass of its vertex.
+fn divide_masses(masses: &mut Vec<f32>, severed: &Severed, mesh: &TetMesh, density: &dyn Fn(f32) -> f32) {
     let copies = &mesh.tets[mesh.whole_tets()..];
     let mut points: Vec<u32> = copies.iter().flatten().map(|&v| mesh.lattice_index[v as usize]).collect();
     points.sort_unstable();
     points.dedup();
     let divided = mesh.masses(density);
-    masses.resize(divided.len(), 0.0);
+    let of_virtual: Vec<f32> = severed.virtual_nodes.iter().map(|&v| masses[v as usize]).collect();
+    masses.extend(of_virtual);
     for (v, mass) in masses.iter_mut().enumerate() {
-        // A vertex that lost all its tissue is removed and needs no mass.
         if divided[v] > 0.0 && points.binary_search(&mesh.lattice_index[v]).is_ok() {
             *mass = divided[v];
         }

@@ -3,7 +3,7 @@
 use cutis_mesh::TetMesh;
 use cutis_mesh::sever::{Growth, Stage};
 
-use crate::scene::IncisionSection;
+use crate::scene::Scene;
 
 /// The cuts of a body that are made while it moves.
 pub(crate) struct GrowingCuts {
@@ -18,7 +18,7 @@ pub(crate) struct GrowingCuts {
 
 /// When a blade cuts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Timing {
+pub(crate) struct Timing {
     /// Start, s.
     at_s: f64,
     /// Speed along its path, m/s; none if it cuts at once.
@@ -26,6 +26,24 @@ struct Timing {
 }
 
 impl Timing {
+    /// The times of the cuts of no width of a scene, in the order of their blades.
+    pub(super) fn all(scene: &Scene) -> Vec<Self> {
+        let timing = |at_s: f64, speed_mm_s: Option<f64>| Self {
+            at_s,
+            speed_m_s: speed_mm_s.map(|speed| speed / 1000.0),
+        };
+        let incisions = scene.incision.iter().filter(|section| section.width_mm.is_none());
+        let incisions = incisions.map(|section| timing(section.at_s, section.speed_mm_s));
+        let underminings = scene.undermining.iter().map(|section| timing(section.at_s, section.speed_mm_s));
+        let excisions = scene.excision.iter().map(|section| timing(section.at_s, None));
+        incisions.chain(underminings).chain(excisions).collect()
+    }
+
+    /// Whether the cut is made while the body moves.
+    pub(super) fn is_later(&self) -> bool {
+        self.at_s > 0.0 || self.speed_m_s.is_some()
+    }
+
     /// Length of the path in m that the blade has passed at a time in s, of `length` in all.
     fn reached(&self, time_s: f64, length: f64) -> f64 {
         match self.speed_m_s {
@@ -36,31 +54,20 @@ impl Timing {
     }
 }
 
-impl IncisionSection {
-    /// Whether the incision is made while the body moves, by a blade that removes nothing.
-    pub(crate) fn grows(&self) -> bool {
-        self.width_mm.is_none() && (self.at_s > 0.0 || self.speed_mm_s.is_some())
-    }
-}
-
 impl GrowingCuts {
-    /// `incisions` are those without a width, in the order of the blades. `mesh` is divided.
-    pub(super) fn new<'a>(
+    /// `times` are those of the blades. `mesh` is divided.
+    pub(super) fn new(
         growth: Growth,
-        incisions: impl Iterator<Item = &'a IncisionSection>,
+        times: Vec<Timing>,
         mesh: &TetMesh,
         density: &dyn Fn(f32) -> f32,
     ) -> Self {
-        let timing = |section: &IncisionSection| Timing {
-            at_s: section.at_s,
-            speed_m_s: section.speed_mm_s.map(|speed| speed / 1000.0),
-        };
         let masses = mesh.masses_of(0..mesh.whole_tets(), density);
         let whole = growth.nodes().iter().map(|&node| masses[node as usize]).collect();
         let uncut = growth.stage(&vec![0.0; growth.lengths().len()]);
         let mass = |copy: &cutis_mesh::sever::TetCopy| (copy.tet, mesh.tet_mass(&copy.nodes, density));
         let tets = uncut.tets.iter().map(mass).collect();
-        Self { growth, times: incisions.map(timing).collect(), whole, tets }
+        Self { growth, times, whole, tets }
     }
 
     /// How far each blade has come at a time in s, in m along its path.

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::BodySections;
 use crate::Error;
-use crate::scene::{LatticeSection, Zone};
+use crate::scene::{IncisionSection, LatticeSection, Zone};
 
 impl LatticeSection {
     /// The size of the lattice that the section describes.
@@ -75,6 +75,19 @@ fn fine_zone(sections: &BodySections<'_>, zone: Zone, even: &Grid) -> [[f64; 2];
             for incision in sections.incisions {
                 for point in incision.path() {
                     add(point, around + incision.depth_mm);
+                }
+            }
+            for undermining in &sections.underminings {
+                let incision = sections.incisions.get(undermining.wound);
+                let excision = undermining.wound.checked_sub(sections.incisions.len());
+                let outline = excision.map(|n| sections.excisions[n].path_mm.clone());
+                for point in incision.map(IncisionSection::path).or(outline).unwrap_or_default() {
+                    add(point, around + undermining.distance_mm + undermining.depth_mm);
+                }
+            }
+            for excision in sections.excisions {
+                for &point in &excision.path_mm {
+                    add(point, around + excision.depth_mm);
                 }
             }
             sections.handles.iter().for_each(|handle| add(handle.at_mm, around + handle.radius_mm));

@@ -1,6 +1,7 @@
 //! From the CT to the body at rest: lattice, tissue, skin, incisions, region of interest, handles.
 
 mod build;
+mod cut_error;
 mod find_skin;
 mod fixed;
 mod growing;
@@ -168,7 +169,8 @@ impl Body {
     pub(crate) fn share_around(&self, handles: &[HandleSection], around: f64) -> f64 {
         let mesh = &self.mesh;
         let near = |&local: &Point3<f32>| {
-            region::near_action(handles, &self.cut.slits, local, mesh.frame.to_mm(local), around)
+            let from_cuts = self.cut.distance_mm(local);
+            region::near_action(handles, from_cuts, mesh.frame.to_mm(local), around)
         };
         let inside: Vec<bool> = mesh.positions.iter().map(near).collect();
         let held = mesh.tets.iter().filter(|tet| tet.iter().any(|&vertex| inside[vertex as usize]));

@@ -1,19 +1,21 @@
 //! The region of interest: tissue outside it stays where it is and is not simulated.
 
-use cutis_mesh::{Frame, MeshError, Slit, TetMesh, TissueMask};
+use cutis_mesh::{Frame, MeshError, TetMesh, TissueMask};
 use nalgebra::{Point3, distance};
 
 use super::BodySections;
+use super::cut_error::cut_error;
 use super::handles::Grasp;
 use crate::Error;
 use crate::scene::{HandleSection, LatticeSection, Zone};
 
-/// The mesh of the whole body, or of the scene's region of interest.
+/// The mesh of the whole body, or of the scene's region of interest. `from_cuts_mm` returns the
+/// distance of a place, in local meters, from the cuts.
 pub(super) fn mesh(
     sections: &BodySections<'_>,
     whole: &TissueMask,
     hu: &[f32],
-    slits: &[Slit],
+    from_cuts_mm: &(dyn Fn(Point3<f32>) -> f64 + Sync),
 ) -> Result<TetMesh, Error> {
     let file = sections.file;
     let Some(zone) = region_zone(sections.lattice) else {
@@ -22,7 +24,7 @@ pub(super) fn mesh(
     let frame = Frame::center_of(whole.lattice().grid());
     let holds = |mm: Point3<f64>| match zone {
         Zone::Box(min, max) => (0..3).all(|axis| (min[axis]..=max[axis]).contains(&mm[axis])),
-        Zone::Around(around) => near_action(sections.handles, slits, frame.to_local(mm), mm, around),
+        Zone::Around(around) => near_action(sections.handles, from_cuts_mm(frame.to_local(mm)), mm, around),
     };
     whole.mesh_within(hu, &whole.vertices_where(holds)).map_err(|error| match error {
         MeshError::RegionEmpty { .. } => file.bad_key("lattice.region", &shown(zone), &error.to_string()),
@@ -30,24 +32,18 @@ pub(super) fn mesh(
     })
 }
 
-/// Whether a place, given in local meters and in world mm, lies within `around` mm of an incision
-/// or of a handle's sphere.
-pub(super) fn near_action(
-    handles: &[HandleSection],
-    slits: &[Slit],
-    local: Point3<f32>,
-    mm: Point3<f64>,
-    around: f64,
-) -> bool {
+/// Whether a place in world mm lies within `around` mm of a handle's sphere, or of the cuts, which
+/// are `from_cuts` mm away.
+pub(super) fn near_action(handles: &[HandleSection], from_cuts: f64, mm: Point3<f64>, around: f64) -> bool {
     let near =
         |handle: &HandleSection| distance(&mm, &Point3::from(handle.at_mm)) <= handle.radius_mm + around;
-    slits.iter().any(|slit| slit.distance(local) * 1000.0 <= around) || handles.iter().any(near)
+    from_cuts <= around || handles.iter().any(near)
 }
 
 /// Turns the error of an incision into one that names the section whose zone is too small for it.
 pub(super) fn incision_error(sections: &BodySections<'_>, error: MeshError) -> Error {
     let MeshError::IncisionBeyond { incision, distance_mm, coarse, .. } = error else {
-        return sections.file.blame("incision")(error);
+        return cut_error(sections.file)(error);
     };
     let (name, zone) = if coarse {
         ("lattice.grading", grading_zone(sections.lattice))

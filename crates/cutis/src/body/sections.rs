@@ -1,15 +1,16 @@
 //! The sections of a scene that a body is built from.
 
-use cutis_mesh::{Incision, SkinMode};
+use cutis_mesh::{Excision, Incision, SkinMode, Undermining};
 
+use super::growing::Timing;
 use crate::model::ModelChoice;
 use crate::scene::{
-    HandleSection, IncisionSection, LatticeSection, LoadedScene, MembraneSection, Scene, SceneFile,
-    SutureSection, TissueMaterials, TissueSection,
+    ExcisionSection, HandleSection, IncisionSection, LatticeSection, LoadedScene, MembraneSection, Scene,
+    SceneFile, SutureSection, TissueMaterials, TissueSection, UnderminingSection,
 };
 
 /// The sections of a scene that a body is built from.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct BodySections<'a> {
     pub(crate) file: SceneFile<'a>,
     pub(crate) lattice: &'a LatticeSection,
@@ -22,17 +23,24 @@ pub(crate) struct BodySections<'a> {
     /// The table of materials; none if the scene has none or its model does not use it.
     pub(crate) materials: Option<&'a TissueMaterials>,
     pub(crate) incisions: &'a [IncisionSection],
+    pub(crate) underminings: Vec<Undermining>,
+    pub(crate) excisions: &'a [ExcisionSection],
+    /// When each cut of no width is made: incisions, underminings, excisions.
+    pub(crate) times: Vec<Timing>,
     /// Whether incisions without a width are made at their times. If not, they exist from the
     /// start.
     pub(crate) cuts_grow: bool,
     pub(crate) handles: &'a [HandleSection],
     /// None with a model that has no sutures.
     pub(crate) sutures: &'a [SutureSection],
+    /// The number of the wound that each suture closes: incisions first, then excisions.
+    pub(crate) closes: Vec<usize>,
 }
 
 impl<'a> BodySections<'a> {
     pub(crate) fn of(loaded: &'a LoadedScene) -> Self {
         let scene = &loaded.scene;
+        let times = Timing::all(scene);
         Self {
             file: loaded.file(),
             lattice: &scene.lattice,
@@ -41,9 +49,17 @@ impl<'a> BodySections<'a> {
             membrane: scene.constraints.membrane.as_ref().filter(|_| scene.model == ModelChoice::Pbd),
             materials: scene.used_materials(),
             incisions: &scene.incision,
-            cuts_grow: scene.model == ModelChoice::Pbd && scene.incision.iter().any(IncisionSection::grows),
+            underminings: scene
+                .undermining
+                .iter()
+                .filter_map(|section| undermining(scene, section))
+                .collect(),
+            excisions: &scene.excision,
+            cuts_grow: scene.model == ModelChoice::Pbd && times.iter().any(Timing::is_later),
+            times,
             handles: &scene.handle,
             sutures: if scene.model == ModelChoice::Pbd { &scene.suture } else { &[] },
+            closes: scene.suture.iter().filter_map(|suture| scene.wound(&suture.wound)).collect(),
         }
     }
 }
@@ -51,10 +67,22 @@ impl<'a> BodySections<'a> {
 /// Whether a part of the scene refers to the skin, so that it must be found.
 pub(crate) fn needs_skin(scene: &Scene) -> bool {
     scene.constraints.need_skin()
-        || !scene.incision.is_empty()
+        || scene.cuts()
         || scene.output.surface
         || scene.output.pictures
         || scene.used_materials().is_some_and(TissueMaterials::name_depth)
+}
+
+/// The undermining of a section. None if its wound does not exist.
+fn undermining(scene: &Scene, section: &UnderminingSection) -> Option<Undermining> {
+    let UnderminingSection { distance_mm, depth_mm, .. } = *section;
+    Some(Undermining { wound: scene.wound(&section.wound)?, distance_mm, depth_mm })
+}
+
+impl From<&ExcisionSection> for Excision {
+    fn from(section: &ExcisionSection) -> Self {
+        Self { path_mm: section.path_mm.clone(), depth_mm: section.depth_mm }
+    }
 }
 
 impl From<&IncisionSection> for Incision {

@@ -4,6 +4,7 @@ use cutis_mesh::{Cut, Stitch, TetMesh};
 
 use super::BodySections;
 use crate::Error;
+use crate::scene::SutureSection;
 
 /// The stitches of each suture of the scene.
 ///
@@ -15,10 +16,14 @@ pub(super) fn stitches(
     cut: &Cut,
     skin: &[[u32; 3]],
 ) -> Result<Vec<Vec<Stitch>>, Error> {
-    let place = |(n, suture): (usize, &crate::scene::SutureSection)| {
-        let [every, bite] = [suture.every_mm, suture.bite_mm].map(|mm| mm / 1000.0);
-        let key = format!("suture[{n}]");
-        cut.stitches(suture.incision, mesh, skin, every, bite).map_err(sections.file.blame(&key))
+    let place = |(n, (suture, &wound)): (usize, (&SutureSection, &usize))| {
+        let bite = suture.bite_mm / 1000.0;
+        let placed = match (suture.every_mm, wound.checked_sub(sections.incisions.len())) {
+            (None, _) => cut.stitches_between(&suture.pairs_mm, mesh, skin, 2.0 * bite),
+            (Some(every), None) => cut.stitches(wound, mesh, skin, every / 1000.0, bite),
+            (Some(every), Some(excision)) => cut.stitches_across(excision, mesh, skin, every / 1000.0, bite),
+        };
+        placed.map_err(sections.file.blame(&format!("suture[{n}]")))
     };
-    sections.sutures.iter().enumerate().map(place).collect()
+    sections.sutures.iter().zip(&sections.closes).enumerate().map(place).collect()
 }

@@ -12,7 +12,7 @@ pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
     let gpu = format!("gpu: {}", backend::ABSENT.unwrap_or("no device is opened"));
     let lines = [
         (!needs_skin(scene), "skin: not detected, nothing refers to it"),
-        (scene.incision.is_empty(), "incision: nothing is cut"),
+        (!scene.cuts(), "incision: nothing is cut"),
         (scene.suture.is_empty(), "suture: nothing is closed"),
         (scene.handle.is_empty(), "handle: nothing is dragged"),
         (scene.run.checkpoint_every == 0, "checkpoints: none are written"),

@@ -12,6 +12,7 @@ use crate::ct::source::Source;
 use crate::model::constraints::kinds::{ConstraintKind, KindRow, ScanTension};
 use crate::model::{ModelChoice, ModelCosts, ModelInput};
 use crate::output::report::{Backend, MaterialRow, MembraneReport, MemoryPart, Sizes, Stage};
+use crate::output::step_report::StepReport;
 use crate::run::clock::Clock;
 use crate::run::prepare::{Prepared, prepare};
 use crate::scene::{IncisionSection, LoadedScene, Scene};
@@ -36,6 +37,9 @@ pub struct Plan {
     /// The scene's table of materials, if its model uses one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub materials: Vec<MaterialRow>,
+    /// What is done to the body, in the order of time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub steps: Vec<StepReport>,
     /// Colors per constraint kind; in vertex block descent only the colors of the vertices, as
     /// `descent`.
     pub colors: BTreeMap<String, usize>,
@@ -95,6 +99,7 @@ impl Plan {
             tension: tensions(scene),
             membrane: body.membrane.as_ref().map(Membrane::report),
             materials: body.materials.as_ref().map(|of_body| of_body.report(&body.mesh)).unwrap_or_default(),
+            steps: StepReport::all(scene, body),
             colors,
             costs: CostReport::of_memory(&memory, &device_memory, NO_DEVICE),
             memory,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::backend::Chosen;
 use crate::body::{Body, GrowingCuts};
 use crate::output::report::{MemoryPart, Sizes};
-use crate::scene::Scene;
+use crate::scene::{HandleSection, Scene};
 
 /// The model's part of a plan.
 pub(crate) struct ModelCosts {
@@ -45,11 +45,14 @@ pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> 
     let run_s = f64::from(scene.run.frames) * scene.solver.dt_s;
     let handles = scene.handle.iter().enumerate();
     // The sum of the frames may fall short of the handle's time by rounding.
-    handles.filter(move |(_, handle)| handle.over_s > run_s * (1.0 + 1e-9)).map(move |(n, handle)| {
-        let share = 100.0 * run_s / handle.over_s;
+    let late = move |handle: &HandleSection| handle.at_s + handle.over_s > run_s * (1.0 + 1e-9);
+    handles.filter(move |(_, handle)| late(handle)).map(move |(n, handle)| {
+        let HandleSection { at_s, over_s, .. } = *handle;
+        let share = 100.0 * (run_s - at_s).max(0.0) / over_s;
+        let begins = if at_s > 0.0 { format!("it begins at {at_s} s, ") } else { String::new() };
         format!(
-            "handle[{n}] comes {share:.3} % of its way: its over_s is {} s, and the frames take {run_s} s",
-            handle.over_s
+            "handle[{n}] comes {share:.3} % of its way: {begins}its over_s is {over_s} s, and the frames take \
+             {run_s} s"
         )
     })
 }
@@ -58,11 +61,15 @@ pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> 
 pub(super) fn unfinished_cuts(scene: &Scene, cuts: &GrowingCuts) -> Vec<String> {
     let last_s = f64::from(scene.run.frames.saturating_sub(1)) * scene.solver.dt_s;
     let incisions = scene.incision.iter().enumerate().filter(|(_, section)| section.width_mm.is_none());
-    let blades = incisions.zip(cuts.reached(last_s)).zip(cuts.growth.lengths());
+    let incisions = incisions.map(|(n, _)| format!("incision[{n}]"));
+    let underminings = (0..scene.undermining.len()).map(|n| format!("undermining[{n}]"));
+    let excisions = (0..scene.excision.len()).map(|n| format!("excision[{n}]"));
+    let names = incisions.chain(underminings).chain(excisions);
+    let blades = names.zip(cuts.reached(last_s)).zip(cuts.growth.lengths());
     let unfinished = blades.filter(|((_, reached), length)| reached < length);
-    let line = |(((n, _), reached), length): (((usize, _), f64), f64)| {
+    let line = |((name, reached), length): ((String, f64), f64)| {
         let [reached, length] = [reached, length].map(|m| m * 1000.0);
-        format!("incision[{n}] comes {reached:.1} of {length:.1} mm far in the frames of this run")
+        format!("{name} comes {reached:.1} of {length:.1} mm far in the frames of this run")
     };
     unfinished.map(line).collect()
 }

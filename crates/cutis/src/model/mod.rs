@@ -103,6 +103,12 @@ pub(crate) trait Simulation {
         Ok(Vec::new())
     }
 
+    /// Size of the force in N with which each handle holds its vertices against the body; empty
+    /// without handles, or if the formulation knows no forces.
+    fn handle_forces(&mut self) -> Result<Vec<f64>, Error> {
+        Ok(Vec::new())
+    }
+
     /// The state after `frame` frames. A checkpoint has at least three words per vertex.
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error>;
 

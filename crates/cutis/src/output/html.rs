@@ -8,6 +8,7 @@ use base64::Engine;
 use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
 
 use super::report::{MaterialRow, Report, Wound};
+use super::step_report::StepReport;
 use crate::run::files::{self, RunFolder};
 use crate::run::frames::FrameRow;
 use crate::{CostReport, Error};
@@ -39,7 +40,8 @@ pub(crate) fn write(
     figures: &[Figure],
     folder: &RunFolder,
 ) -> Result<(), Error> {
-    let plots: Vec<String> = opening_plot(rows).into_iter().chain(force_plot(rows)).collect();
+    let plots: Vec<String> =
+        opening_plot(rows).into_iter().chain(force_plot(rows)).chain(handle_plot(rows)).collect();
     let scene = toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string());
     files::write(&folder.html(), page(report, figures, &plots, &scene).as_bytes())
 }
@@ -58,10 +60,7 @@ fn opening_plot(rows: &[FrameRow]) -> Option<String> {
             [(name("mean"), mean), (name("in the middle"), middle)]
         })
         .collect();
-    let series: Vec<Series<'_>> =
-        curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Line }).collect();
-    let axis = |label| Axis { label, scale: Scale::Linear };
-    Some(line_chart("Opening of the wound", axis("time / s"), axis("distance of the lips / mm"), &series))
+    Some(line_plot("Opening of the wound", "distance of the lips / mm", &curves))
 }
 
 /// A plot of the forces of the sutures over time; none without sutures or without frames.
@@ -75,10 +74,29 @@ fn force_plot(rows: &[FrameRow]) -> Option<String> {
         (format!("suture {}", n + 1), points)
     };
     let curves: Vec<(String, Vec<[f64; 2]>)> = (0..sutures).map(curve).collect();
+    Some(line_plot("Force of the sutures", "sum over the threads / N", &curves))
+}
+
+/// A plot of the forces of the handles over time; none without handles or without frames.
+fn handle_plot(rows: &[FrameRow]) -> Option<String> {
+    let handles = rows.first().map_or(0, |row| row.handles.len());
+    if handles == 0 || rows.len() < 2 {
+        return None;
+    }
+    let curve = |n: usize| {
+        let points = rows.iter().map(|row| [row.time_s, row.handles[n]]).collect();
+        (format!("handle {}", n + 1), points)
+    };
+    let curves: Vec<(String, Vec<[f64; 2]>)> = (0..handles).map(curve).collect();
+    Some(line_plot("Force of the handles", "force / N", &curves))
+}
+
+/// A plot of curves over time.
+fn line_plot(title: &str, values: &'static str, curves: &[(String, Vec<[f64; 2]>)]) -> String {
     let series: Vec<Series<'_>> =
         curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Line }).collect();
     let axis = |label| Axis { label, scale: Scale::Linear };
-    Some(line_chart("Force of the sutures", axis("time / s"), axis("sum over the threads / N"), &series))
+    line_chart(title, axis("time / s"), axis(values), &series)
 }
 
 /// The page as HTML.
@@ -144,11 +162,15 @@ fn summary(report: &Report) -> String {
     for suture in &report.sutures {
         let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&suture.summary())));
     }
+    for handle in &report.handles {
+        let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&handle.summary())));
+    }
     text
 }
 
 fn tables(report: &Report) -> String {
-    let mut out = String::from("<h2>Time per stage</h2><table>");
+    let mut out = timeline(&report.steps);
+    out.push_str("<h2>Time per stage</h2><table>");
     for stage in &report.stages {
         let _ = write!(
             out,
@@ -170,6 +192,20 @@ fn tables(report: &Report) -> String {
         );
     }
     out
+}
+
+/// What was done to the body, in the order of time.
+fn timeline(steps: &[StepReport]) -> String {
+    if steps.is_empty() {
+        return String::new();
+    }
+    let row = |step: &StepReport| {
+        let StepReport { section, at_s, until_s, what } = step;
+        let until = if until_s > at_s { format!(" to {until_s:.3}") } else { String::new() };
+        let (section, what) = (escape(section), escape(what));
+        format!("<tr><td class=\"n\">{at_s}{until} s</td><td>{section}</td><td>{what}</td></tr>")
+    };
+    format!("<h2>What was done</h2><table>{}</table>", steps.iter().map(row).collect::<String>())
 }
 
 /// The table of materials, with the source of each row.

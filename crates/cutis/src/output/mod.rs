@@ -6,6 +6,7 @@ mod pictures;
 pub mod report;
 mod resample_run;
 mod skin_lines;
+pub mod step_report;
 pub mod suture_report;
 mod warp;
 

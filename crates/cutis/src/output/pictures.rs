@@ -49,7 +49,9 @@ pub(super) fn draw(
     let depth = depth(ct, air_below_hu)?;
     let depth_after = warp.apply(&depth, stages, progress)?.0;
 
-    let wound = body.cut.incisions().next().map(|slits| Wound::of(slits, &body.mesh.frame));
+    let frame = &body.mesh.frame;
+    let of_piece = || Some(Wound::of(std::slice::from_ref(body.cut.pieces.first()?.axis()), frame));
+    let wound = body.cut.incisions().next().map(|slits| Wound::of(slits, frame)).or_else(of_piece);
     let focus = wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm });
     let [at_rest, now] = [&body.mesh.positions, deformed.positions].map(|p| body.whole_skin(p).0);
     let (_, triangles) = body.whole_skin(&[]);

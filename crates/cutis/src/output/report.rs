@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::ScanTension;
 use crate::model::constraints::kinds::report_name;
+use crate::output::step_report::{HandleReport, StepReport};
 use crate::output::suture_report::SutureReport;
 use crate::run::files;
 use crate::{CostReport, Error, Scene};
@@ -61,8 +62,11 @@ pub struct Report {
     pub stages: Vec<Stage>,
     /// Time per frame.
     pub frames: Frames,
-    /// Opening of each incision. `initial` is the body at rest, also for an incision that is made
-    /// later.
+    /// What is done to the body, in the order of time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub steps: Vec<StepReport>,
+    /// Opening of each incision, then of each excision. `initial` is the body at rest, also for a
+    /// wound that is made later.
     pub wounds: Vec<Wound>,
     /// Opening of the first incision, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -70,6 +74,9 @@ pub struct Report {
     /// The sutures and the forces in them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sutures: Vec<SutureReport>,
+    /// The handles and their forces.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub handles: Vec<HandleReport>,
     /// The resampled CT, if an output needed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resample: Option<Resample>,

@@ -68,7 +68,15 @@ impl<'a> BodyWarp<'a> {
             rest: [mesh.positions.as_slice(), &at_rest].concat(),
             on_device: on_device.and_then(|positions| stages.append(positions, &moved)),
             deformed: [deformed, &moved].concat(),
-            removed: [body.removed.tets.as_slice(), &shell.removed].concat(),
+            removed: body
+                .removed
+                .tets
+                .iter()
+                .chain(&shell.removed)
+                .copied()
+                .chain(body.severed.iter().flat_map(|severed| severed.taken_out.iter().map(behind)))
+                .chain(shell.taken_out.iter().map(in_shell))
+                .collect(),
         })
     }
 

@@ -18,6 +18,8 @@ pub(crate) struct FrameRow {
     pub(crate) gapes: Vec<WoundGape>,
     /// Sum of the forces in the threads of each suture, and the largest one, N.
     pub(crate) sutures: Vec<[f64; 2]>,
+    /// Size of the force of each handle, N.
+    pub(crate) handles: Vec<f64>,
 }
 
 /// Mean and shortest time of the frames. The first row is the state before them.
@@ -56,6 +58,9 @@ pub(crate) fn frames_csv(earlier: &str, rows: &[FrameRow]) -> String {
     for n in 0..rows.first().map_or(0, |row| row.sutures.len()) {
         let _ = write!(out, ",suture_{n}_n,suture_{n}_largest_n");
     }
+    for n in 0..rows.first().map_or(0, |row| row.handles.len()) {
+        let _ = write!(out, ",handle_{n}_n");
+    }
     out.push('\n');
     out.push_str(earlier);
     for row in rows {
@@ -65,6 +70,9 @@ pub(crate) fn frames_csv(earlier: &str, rows: &[FrameRow]) -> String {
         }
         for [sum, largest] in &row.sutures {
             let _ = write!(out, ",{sum:.5},{largest:.5}");
+        }
+        for force in &row.handles {
+            let _ = write!(out, ",{force:.5}");
         }
         out.push('\n');
     }

@@ -74,7 +74,8 @@ impl RunLoop<'_> {
         let row = |simulation: &mut dyn Simulation, frame, ms| {
             let time_s = simulation.time_s();
             let sutures = suture_forces(self.sutures, &simulation.thread_forces()?);
-            Ok::<_, Error>(FrameRow { frame, time_s, ms, gapes: lips.measure(simulation)?, sutures })
+            let handles = simulation.handle_forces()?;
+            Ok::<_, Error>(FrameRow { frame, time_s, ms, gapes: lips.measure(simulation)?, sutures, handles })
         };
         let mut rows = vec![row(simulation, self.done(), 0.0)?];
         let mut times = PartTimes::new(self.timing);

@@ -10,6 +10,7 @@ use crate::Error;
 use crate::backend::DeviceMeter;
 use crate::body::Body;
 use crate::output::report::{Machine, Report, SCHEMA, Wound};
+use crate::output::step_report::HandleReport;
 use crate::output::suture_report::SutureReport;
 use crate::output::{OutputResults, html};
 use crate::scene::{LoadedScene, SutureSection};
@@ -52,7 +53,9 @@ pub(super) fn report(
         frames: frame_times(&rows),
         wound: wounds.first().cloned(),
         wounds,
+        steps: plan.steps,
         sutures: sutures(loaded, body, &rows),
+        handles: handles(body, &rows),
         resample: outputs.resample,
         chainmail: end.chainmail,
         residuals: end.residuals,
@@ -76,10 +79,10 @@ fn sutures(loaded: &LoadedScene, body: &Body, rows: &[FrameRow]) -> Vec<SutureRe
     let forces = rows.last().map(|row| row.sutures.as_slice()).unwrap_or_default();
     let sections = loaded.scene.suture.iter().zip(&body.stitches).zip(forces);
     let report = |((section, stitches), &[force_n, largest_n]): ((&SutureSection, &Vec<_>), &[f64; 2])| {
-        let slits = body.cut.incisions().nth(section.incision).unwrap_or_default();
-        let length_cm = slits.iter().map(Slit::length).sum::<f64>() * 100.0;
+        let wound = loaded.scene.wound(&section.wound).unwrap_or_default();
+        let length_cm = wound_length(body, wound) * 100.0;
         SutureReport {
-            incision: section.incision,
+            wound,
             stitches: stitches.len(),
             force_n,
             force_n_per_cm: force_n / length_cm,
@@ -87,6 +90,20 @@ fn sutures(loaded: &LoadedScene, body: &Body, rows: &[FrameRow]) -> Vec<SutureRe
         }
     };
     sections.map(report).collect()
+}
+
+/// Length of a wound in m: that of an incision, or of the long axis of an excision.
+fn wound_length(body: &Body, wound: usize) -> f64 {
+    let incisions = body.cut.incisions().map(|slits| slits.iter().map(Slit::length).sum::<f64>());
+    let excisions = body.cut.pieces.iter().map(|piece| piece.axis().length());
+    incisions.chain(excisions).nth(wound).unwrap_or_default()
+}
+
+/// The handles with the forces after the last frame.
+fn handles(body: &Body, rows: &[FrameRow]) -> Vec<HandleReport> {
+    let forces = rows.last().map(|row| row.handles.as_slice()).unwrap_or_default();
+    let report = |(grabbed, &force_n): (&Vec<u32>, &f64)| HandleReport { vertices: grabbed.len(), force_n };
+    body.grabbed.iter().zip(forces).map(report).collect()
 }
 
 /// Opening of each wound, in the body at rest and after the last frame.
@@ -108,7 +125,7 @@ fn crossed_lips(wounds: &[Wound]) -> Vec<String> {
     let crossed = least.filter(|(_, least)| *least < 0.0);
     let warnings = crossed.map(|(n, least)| {
         format!(
-            "the lips of incision[{n}] have passed through each other, by {:.2} mm: there is no contact",
+            "the lips of wound {n} have passed through each other, by {:.2} mm: there is no contact",
             -least
         )
     });

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::steps::{self, Steps};
 use crate::{Error, Scene};
 
 /// Longest scene file that is read, bytes. A scene is a page of text, so a longer file is a
@@ -43,18 +44,23 @@ pub struct LoadedScene {
     pub file: PathBuf,
     /// Text as read, for the report's hash.
     pub text: String,
+    /// Where the steps of the scene went.
+    pub(crate) steps: Steps,
 }
 
 impl LoadedScene {
     /// The file, for errors about the scene.
     pub(crate) fn file(&self) -> SceneFile<'_> {
-        SceneFile(&self.file)
+        SceneFile { file: &self.file, steps: &self.steps }
     }
 }
 
 /// The file of a scene, which errors about the scene name.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SceneFile<'a>(pub(crate) &'a Path);
+pub(crate) struct SceneFile<'a> {
+    pub(crate) file: &'a Path,
+    pub(crate) steps: &'a Steps,
+}
 
 impl SceneFile<'_> {
     /// Turns an error into one that names the section of the scene that caused it. An error that
@@ -63,7 +69,8 @@ impl SceneFile<'_> {
         move |error| match error.into() {
             named @ Error::SceneKey { .. } => named,
             source => {
-                Error::SceneSection { file: self.0.into(), section: section.into(), source: Box::new(source) }
+                let section = self.steps.name(section);
+                Error::SceneSection { file: self.file.into(), section, source: Box::new(source) }
             }
         }
     }
@@ -71,7 +78,8 @@ impl SceneFile<'_> {
     /// The error for a key whose value cannot be used. `value` is the value found, or empty if
     /// there is none to show. `why` describes the valid values.
     pub(crate) fn bad_key(self, key: &str, value: &str, why: &str) -> Error {
-        Error::SceneKey { file: self.0.into(), key: key.into(), value: value.into(), why: why.into() }
+        let key = self.steps.name(key);
+        Error::SceneKey { file: self.file.into(), key, value: value.into(), why: why.into() }
     }
 }
 
@@ -128,18 +136,24 @@ impl Scene {
                 why,
             })?;
         }
+        let steps = Steps::take(&mut value).map_err(|(key, value, why)| Error::SceneKey {
+            file: file.into(),
+            key,
+            value: shorten(&value),
+            why,
+        })?;
         let mut scene: Scene = serde_path_to_error::deserialize(value.clone()).map_err(|e| {
             let key = e.path().to_string();
             let found = lookup(&value, &key).map(|v| shorten(&v.to_string())).unwrap_or_default();
             Error::SceneKey {
                 file: file.into(),
-                key,
+                key: steps.name(&key),
                 value: found,
                 why: e.inner().to_string().trim().replace('\n', " "),
             }
         })?;
         crate::model::fill_defaults(&mut scene);
-        scene.validate(SceneFile(file))?;
+        scene.validate(SceneFile { file, steps: &steps })?;
         // Paths in a scene start from its folder, and paths in an override from the present one.
         let strokes =
             scene.constraints.membrane.as_mut().and_then(|skin| skin.directions.as_mut()?.strokes.as_mut());
@@ -152,7 +166,7 @@ impl Scene {
                 *path = directory.join(&*path);
             }
         }
-        Ok(LoadedScene { scene, file: file.into(), text: text.into() })
+        Ok(LoadedScene { scene, file: file.into(), text: text.into(), steps })
     }
 }
 
@@ -213,7 +227,9 @@ fn shorten(text: &str) -> String {
 
 /// JSON schema of a scene.
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(Scene).to_value()
+    let mut schema = schemars::schema_for!(Scene).to_value();
+    steps::add_to_schema(&mut schema);
+    schema
 }
 
 /// A commented scene to start from.

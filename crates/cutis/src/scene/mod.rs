@@ -12,7 +12,9 @@ mod demo;
 mod load;
 mod reference;
 mod sections;
+mod steps;
 pub(crate) mod validate;
+mod validate_cuts;
 
 pub(crate) use choice::OneOr;
 pub use demo::demo;
@@ -70,7 +72,13 @@ pub struct Scene {
     /// Incisions, which cut the body.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incision: Vec<IncisionSection>,
-    /// Sutures, which close incisions.
+    /// Underminings, which separate skin from what is below it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub undermining: Vec<UnderminingSection>,
+    /// Excisions, which take pieces out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub excision: Vec<ExcisionSection>,
+    /// Sutures, which close wounds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub suture: Vec<SutureSection>,
     /// Spheres of tissue that are dragged along.
@@ -85,6 +93,33 @@ pub struct Scene {
     /// The files to write. Left out: everything but the tissue mesh.
     #[serde(default)]
     pub output: OutputSection,
+}
+
+impl Scene {
+    /// The number of the wound that a section refers to: incisions first, then excisions. None if
+    /// there is no such wound.
+    pub fn wound(&self, wound: &WoundRef) -> Option<usize> {
+        match wound {
+            WoundRef::Number(number) => Some(*number).filter(|&number| number < self.wounds()),
+            WoundRef::Name(name) => self.wound_names().position(|of_wound| of_wound == Some(name)),
+        }
+    }
+
+    /// Number of incisions and excisions.
+    pub fn wounds(&self) -> usize {
+        self.incision.len() + self.excision.len()
+    }
+
+    /// The name of each wound that has one: incisions first, then excisions.
+    pub fn wound_names(&self) -> impl Iterator<Item = Option<&str>> {
+        let incisions = self.incision.iter().map(|incision| incision.name.as_deref());
+        incisions.chain(self.excision.iter().map(|excision| excision.name.as_deref()))
+    }
+
+    /// Whether something cuts the body.
+    pub fn cuts(&self) -> bool {
+        self.wounds() > 0
+    }
 }
 
 fn at_rest() -> bool {

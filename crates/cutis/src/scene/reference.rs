@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use serde_json::{Map, Value};
 
 use super::load::schema;
+use super::steps;
 
 const HEAD: &str = "# Scene reference
 
@@ -21,7 +22,7 @@ and values out of range are refused by name. `cutis scene new` prints a scene to
 pub fn reference() -> String {
     let page = Page { schema: schema() };
     let mut out = HEAD.to_owned();
-    let all = properties(&page.schema);
+    let all: Vec<_> = properties(&page.schema).into_iter().filter(|(name, _)| *name != "step").collect();
     let keys: Vec<_> = all.iter().copied().filter(|(_, property)| page.section(property).is_none()).collect();
     if !keys.is_empty() {
         out.push_str("\n## Before the first section\n");
@@ -30,7 +31,7 @@ pub fn reference() -> String {
     for (name, property) in all {
         page.write_section(&mut out, name, property, required(&page.schema, name));
     }
-    out
+    out + &steps::reference()
 }
 
 struct Page {

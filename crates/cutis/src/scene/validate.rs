@@ -91,8 +91,7 @@ impl Scene {
         self.validate_tissue(&check)?;
         self.validate_materials(&check)?;
         model::validate(self, &check)?;
-        self.validate_incisions(&check)?;
-        self.validate_sutures(&check)?;
+        self.validate_cuts(&check)?;
         self.validate_handles(&check)?;
         self.validate_solver(&check)
     }
@@ -122,7 +121,7 @@ impl Scene {
             let why = "must be at least 2 along each axis";
             check.require(n.iter().all(|&n| n >= 2), "lattice.vertices", format!("{n:?}"), why)?;
         }
-        let acts = !self.incision.is_empty() || !self.handle.is_empty();
+        let acts = self.cuts() || !self.handle.is_empty();
         if let Some(region) = &lattice.region {
             let corners = [region.min_mm, region.max_mm];
             check.zone("lattice.region", region.around_mm, corners, region.zone(), acts)?;
@@ -155,109 +154,12 @@ impl Scene {
         Ok(())
     }
 
-    fn validate_incisions(&self, check: &Check<'_>) -> Result<(), Error> {
-        for (n, incision) in self.incision.iter().enumerate() {
-            let key = |field: &str| format!("incision[{n}].{field}");
-            self.validate_path(check, &key, incision)?;
-            check.positive(&key("depth_mm"), incision.depth_mm)?;
-            match incision.width_mm {
-                Some(width_mm) => check.positive(&key("width_mm"), width_mm)?,
-                None => {
-                    let model = serde_json::json!(self.model);
-                    let why = format!("is needed with model = {model}, which cannot cut without a width");
-                    check.require(self.model.cuts_without_width(), &key("width_mm"), "", &why)?;
-                }
-            }
-            self.validate_time(check, &key("at_s"), incision)?;
-            if let Some(speed) = incision.speed_mm_s {
-                let key = key("speed_mm_s");
-                check.positive(&key, speed)?;
-                let why = "must be left out next to width_mm: an incision with a width is made at once";
-                check.require(incision.width_mm.is_none(), &key, speed, why)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// The path of an incision: two ends, or two or more points.
-    fn validate_path(
-        &self,
-        check: &Check<'_>,
-        key: &dyn Fn(&str) -> String,
-        incision: &IncisionSection,
-    ) -> Result<(), Error> {
-        let IncisionSection { from_mm, to_mm, path_mm, .. } = incision;
-        for (name, end) in [("from_mm", from_mm), ("to_mm", to_mm)] {
-            let (key, shown) = (key(name), format!("{:?}", end.unwrap_or_default()));
-            let why = "must be left out next to path_mm, whose points hold the ends";
-            check.require(end.is_none() || path_mm.is_empty(), &key, shown, why)?;
-            let why = "is missing: give from_mm and to_mm, or path_mm";
-            check.require(end.is_some() || !path_mm.is_empty(), &key, "", why)?;
-            end.map_or(Ok(()), |end| check.point(&key, end))?;
-        }
-        if path_mm.is_empty() {
-            let shown = format!("{:?}", to_mm.unwrap_or_default());
-            return check.require(from_mm != to_mm, &key("to_mm"), shown, "must differ from from_mm");
-        }
-        let (key, count) = (key("path_mm"), path_mm.len());
-        check.require(count >= 2, &key, format!("{path_mm:?}"), "must have two points or more")?;
-        path_mm.iter().enumerate().try_for_each(|(n, &point)| check.point(&format!("{key}[{n}]"), point))?;
-        let straight = incision.width_mm.is_none() || count == 2;
-        let why = "must have two points next to width_mm: only a cut without a width can bend";
-        check.require(straight, &key, format!("{count} points"), why)
-    }
-
-    /// The time of an incision. Only some models can remove tissue from a body that has begun to
-    /// move, and an incision after the last frame would never be made.
-    fn validate_time(&self, check: &Check<'_>, key: &str, incision: &IncisionSection) -> Result<(), Error> {
-        let at_s = incision.at_s;
-        check.not_negative(key, at_s)?;
-        let model = serde_json::json!(self.model);
-        let why = format!("must be 0: with model = {model} incisions with a width exist from the start");
-        let later = self.model.cuts_later() || incision.width_mm.is_none();
-        check.require(at_s == 0.0 || later, key, at_s, &why)?;
-        let last = f64::from(self.run.frames.saturating_sub(1)) * self.solver.dt_s;
-        let why = format!("must not lie after the beginning of the last frame, at {last} s (run.frames)");
-        check.require(at_s <= last || at_s == 0.0, key, at_s, &why)
-    }
-
-    fn validate_sutures(&self, check: &Check<'_>) -> Result<(), Error> {
-        for (n, suture) in self.suture.iter().enumerate() {
-            let key = |field: &str| format!("suture[{n}].{field}");
-            let count = self.incision.len();
-            let why = format!("must be the number of an incision, from 0; there are {count}");
-            let incision = self.incision.get(suture.incision);
-            check.require(incision.is_some(), &key("incision"), suture.incision, &why)?;
-            let closes = incision.is_some_and(|incision| incision.width_mm.is_none());
-            let why =
-                "must be an incision without width_mm: a suture cannot close a slit whose tissue is gone";
-            check.require(
-                closes || !self.model.cuts_without_width(),
-                &key("incision"),
-                suture.incision,
-                why,
-            )?;
-            check.positive(&key("every_mm"), suture.every_mm)?;
-            check.positive(&key("bite_mm"), suture.bite_mm)?;
-            check.positive(&key("thread_n_per_m"), suture.thread_n_per_m)?;
-            check.not_negative(&key("at_s"), suture.at_s)?;
-            check.not_negative(&key("tighten_s"), suture.tighten_s)?;
-            check.positive(&key("tighten_to"), suture.tighten_to)?;
-            let why = "must be at most 1: a longer thread does not close the wound";
-            check.require(suture.tighten_to <= 1.0, &key("tighten_to"), suture.tighten_to, why)?;
-            let Some(release_s) = suture.release_s else { continue };
-            check.not_negative(&key("release_s"), release_s)?;
-            let why = format!("must be after at_s = {} s", suture.at_s);
-            check.require(release_s > suture.at_s, &key("release_s"), release_s, &why)?;
-        }
-        Ok(())
-    }
-
     fn validate_handles(&self, check: &Check<'_>) -> Result<(), Error> {
         for (n, handle) in self.handle.iter().enumerate() {
             check.point(&format!("handle[{n}].at_mm"), handle.at_mm)?;
             check.point(&format!("handle[{n}].move_mm"), handle.move_mm)?;
             check.positive(&format!("handle[{n}].radius_mm"), handle.radius_mm)?;
+            check.not_negative(&format!("handle[{n}].at_s"), handle.at_s)?;
             check.positive(&format!("handle[{n}].over_s"), handle.over_s)?;
         }
         Ok(())

@@ -143,7 +143,8 @@ impl Baseline<'_> {
         };
         let incisions = scene.incision.iter().map(|incision| extent(incision.path()));
         let handles = scene.handle.iter().map(|handle| 2.0 * handle.radius_mm);
-        incisions.chain(handles).reduce(f64::max)
+        let excisions = scene.excision.iter().map(|excision| extent(excision.path_mm.clone()));
+        incisions.chain(excisions).chain(handles).reduce(f64::max)
     }
 
     /// Runs a variant.

@@ -30,7 +30,7 @@ pub fn pulled(size: [usize; 3]) -> Result<Problem, Failure> {
         .map(|n| n as u32)
         .collect();
     let length = (size[0] - 1) as f64 * STEP;
-    let handle = Handle { vertices: face, move_m: [STRETCH * length, 0.0, 0.0], over_s: 0.1 };
+    let handle = Handle { vertices: face, move_m: [STRETCH * length, 0.0, 0.0], at_s: 0.0, over_s: 0.1 };
     Ok(Problem {
         name: "block",
         what: format!(

@@ -181,7 +181,12 @@ impl Sheets {
         cases.push(self.case("substeps of 1e0 s", body, self.end()).run(run).unresolved().quick());
         let mut body = self.sheet(TRUNK);
         let corner = if self.at_rest { body.rest.len() - 1 } else { body.rest.len() / 2 };
-        body.handles.push(Handle { vertices: vec![corner as u32], move_m: [20.0, 15.0, 10.0], over_s: 0.0 });
+        body.handles.push(Handle {
+            vertices: vec![corner as u32],
+            move_m: [20.0, 15.0, 10.0],
+            at_s: 0.0,
+            over_s: 0.0,
+        });
         cases.push(self.case("a vertex torn off by five body sizes at once", body, End::Bounded).quick());
         let mut random = Random::new(8);
         let mut body = placed(self.sheet(TRUNK), |x| x + random.vector() * 0.1);

@@ -48,7 +48,7 @@ fn forces(cases: &mut Vec<Case>, law: Law) {
     cases.push(Case::new(format!("1000 g, {of}"), body, End::Rests).run(run).quick());
     let mut body = Body::block(BLOCK, law);
     let last = body.rest.len() as u32 - 1;
-    body.handles.push(Handle { vertices: vec![last], move_m: [20.0, 15.0, 10.0], over_s: 0.0 });
+    body.handles.push(Handle { vertices: vec![last], move_m: [20.0, 15.0, 10.0], at_s: 0.0, over_s: 0.0 });
     // A stiff solid that is torn through itself stays tangled, because each step decreases the
     // energy.
     let end = if law == Law::STIFF_DESCENT { End::Rests } else { End::Recovers(0.05) };

@@ -15,7 +15,7 @@ use super::wound::{self, GrowingWound, WholeParts};
 use crate::Error;
 use crate::body::GrowingCuts;
 use crate::model::ModelInput;
-use crate::scene::{Scene, SolverSection};
+use crate::scene::{HandleSection, Scene, SolverSection};
 
 impl SolverSection {
     /// The solver settings that the section describes.
@@ -90,7 +90,8 @@ impl ConstraintModel {
         }
         for (n, (handle, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {
             let move_m = (Vector3::from(handle.move_mm) / 1000.0).into();
-            let handle = Handle { vertices: grabbed.clone(), move_m, over_s: handle.over_s };
+            let HandleSection { at_s, over_s, .. } = *handle;
+            let handle = Handle { vertices: grabbed.clone(), move_m, at_s, over_s };
             builder = builder.handle(handle).map_err(file.blame(&format!("handle[{n}]")))?;
         }
         let mut system = builder.build();

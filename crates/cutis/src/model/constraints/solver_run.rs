@@ -1,6 +1,6 @@
 //! A simulation by a solver of constraints.
 
-use cutis_solver::{Change, StepProfile, System};
+use cutis_solver::{Change, Formulation, StepProfile, System};
 use nalgebra::{Point3, Vector3};
 
 use super::start::StartedSolver;
@@ -133,6 +133,21 @@ impl Simulation for SolverRun<'_> {
         let Some(threads) = &self.threads else { return Ok(Vec::new()) };
         let positions = self.solver.solver().positions_of(threads.vertices())?;
         Ok(threads.sutures().zip(threads.forces(&positions)).collect())
+    }
+
+    fn handle_forces(&mut self) -> Result<Vec<f64>, Error> {
+        let ModelInput { scene, body, .. } = self.input;
+        if scene.handle.is_empty() || scene.solver.formulation == Formulation::Pbd {
+            return Ok(Vec::new());
+        }
+        let vertices = body.grabbed.concat();
+        let forces = self.solver.solver().system()?.forces_on(&vertices)?;
+        let mut of_vertices = forces.iter();
+        let force = |grabbed: &Vec<u32>| {
+            let own = of_vertices.by_ref().take(grabbed.len());
+            own.fold(Vector3::zeros(), |sum: Vector3<f64>, force| sum + force.cast()).norm()
+        };
+        Ok(body.grabbed.iter().map(force).collect())
     }
 
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {

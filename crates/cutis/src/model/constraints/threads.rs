@@ -161,9 +161,9 @@ impl ThreadState {
     }
 
     /// Length after a part of the tightening, from 0 to 1. In the end it is `to` times the distance
-    /// of the ends in the scan.
+    /// of the ends when the wound is closed.
     fn length_at(&self, part: f32, to: f32) -> f32 {
-        let end = self.stitch.rest as f32 * to;
+        let end = self.stitch.closed as f32 * to;
         let start = self.start.unwrap_or(end).max(end);
         start + (end - start) * part
     }

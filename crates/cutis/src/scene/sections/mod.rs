@@ -2,11 +2,15 @@
 
 mod actions;
 mod body;
+mod cuts;
 mod material_presets;
 mod materials;
 mod running;
+mod sutures;
 
 pub use actions::*;
 pub use body::*;
+pub use cuts::*;
 pub use materials::*;
 pub use running::*;
+pub use sutures::*;

@@ -1,0 +1,24 @@
+//! Errors of cuts, with the section of the scene that made each.
+
+use cutis_mesh::MeshError;
+
+use crate::Error;
+use crate::scene::SceneFile;
+
+/// Turns an error of a cut into one that names its section, with the number.
+pub(super) fn cut_error(file: SceneFile<'_>) -> impl Fn(MeshError) -> Error {
+    move |error| {
+        let section = match &error {
+            MeshError::IncisionSize { incision, .. }
+            | MeshError::IncisionPath { incision, .. }
+            | MeshError::IncisionOffSkin { incision, .. }
+            | MeshError::IncisionThroughSkin { incision, .. }
+            | MeshError::IncisionEmpty { incision, .. }
+            | MeshError::IncisionWithoutLips { incision, .. } => format!("incision[{incision}]"),
+            MeshError::Undermining { undermining, .. } => format!("undermining[{undermining}]"),
+            MeshError::Excision { excision, .. } => format!("excision[{excision}]"),
+            _ => "incision".to_owned(),
+        };
+        file.blame(&section)(error)
+    }
+}
