@@ -6,6 +6,8 @@ pub const DISTANCE: &str = include_str!("../wgsl/constraints/distance.wgsl");
 pub const VOLUME: &str = include_str!("../wgsl/constraints/volume.wgsl");
 /// Source of `Thread`, with six vertices.
 pub const THREAD: &str = include_str!("../wgsl/constraints/thread.wgsl");
+/// Source of `LipContact`, with four vertices.
+pub const LIP_CONTACT: &str = include_str!("../wgsl/constraints/lip_contact.wgsl");
 /// Source of `SkinTension`, with three vertices.
 pub const SKIN_TENSION: &str = concat!(
     include_str!("../wgsl/constraints/triangle.wgsl"),

@@ -29,6 +29,7 @@ tension_across_n_per_m = 0
 modulus_along_n_per_m = 50
 modulus_across_n_per_m = 30
 directions = { along = [0, 0, 1] }
+[constraints.contact]
 [chainmail]
 materials = [{ from_hu = -1024, shortest = 0.5, longest = 1.5, shear = 0.5 }]
 [fixed]

@@ -6,11 +6,11 @@ use cutis_test_kit::gpu::on_each_adapter;
 use crate::gpu::{agree, run_on};
 use crate::scenes::{Run, SMALL, column, frames, overrides, run_in, scene};
 
-const CUT: &str = "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], depth_mm = 20 }]";
+pub const CUT: &str = "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], depth_mm = 20 }]";
 
 /// The small phantom at rest with a cut of 100 mm and sutures, given as the value of `suture`.
 /// `lines` is the axis of the lines of tension: `around` the trunk, across the cut, or `along` it.
-fn sewn(suture: &str, lines: &str, set: &[(&str, &str)]) -> LoadedScene {
+pub fn sewn(suture: &str, lines: &str, set: &[(&str, &str)]) -> LoadedScene {
     let constraints = format!(
         "{{ distance = {{ youngs_modulus_pa = 2e4 }}, volume = {{ bulk_modulus_pa = 1e5 }}, membrane = {{ \
          tension_along_n_per_m = 6, tension_across_n_per_m = 2, modulus_along_n_per_m = 60, \

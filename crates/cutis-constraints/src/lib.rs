@@ -13,6 +13,7 @@
 //! | [`SkinStripAtRest`] | 3 | the same for a body at rest in the scan, m | as above |
 //! | [`SkinStripTurn`] | 3 | turn of the image against a constant load, m | as above |
 //! | [`Thread`] | 6 | distance of two points of triangles beyond a length, m | 1/stiffness, m/N |
+//! | [`LipContact`] | 4 | overlap of the sides of a cut over the length of a severed edge, 1 | [`lip_contact_compliance`], 1/J |
 //!
 //! Each formula is written once and runs as `f32`, as `f64` and in SIMD lanes of both ([`Real`]).
 //! Every lane has the bits of a scalar evaluation. No formula contains an absolute length or an
@@ -35,6 +36,7 @@
 
 mod constraint;
 mod distance;
+mod lip_contact;
 mod material;
 mod real;
 mod skin_strip;
@@ -50,8 +52,10 @@ mod volume;
 
 pub use constraint::{Constraint, Eval, Params};
 pub use distance::{Distance, DistanceMaterial};
+pub use lip_contact::{LipContact, LipContactMaterial};
 pub use material::{
-    MaterialError, distance_compliance, skin_compliance, skin_strip_compliance, volume_compliance,
+    MaterialError, distance_compliance, lip_contact_compliance, skin_compliance, skin_strip_compliance,
+    volume_compliance,
 };
 pub use real::{Real, Scalar};
 pub use skin_strip::SkinStrip;

@@ -166,6 +166,21 @@ pub fn skin_strip_compliance(
     finite("skin strip", length, length / modulus_n_per_m * (length / projected_area))
 }
 
+/// Returns the compliance of a [`LipContact`](crate::LipContact) in 1/J: `α = 1/(M A L)`.
+///
+/// `A` is `area`, the area of the cut that the contact stands for, in m². `L` is `length`, that of
+/// the severed edge, in m. `M` is `modulus_pa` in Pa. Pressed sides overlap by the share `C = p/M`
+/// of the edge under the pressure `p`: as a layer of the modulus `M` and the thickness `L` does.
+///
+/// # Errors
+/// [`MaterialError::NotPositive`] and [`MaterialError::ComplianceOutOfRange`].
+pub fn lip_contact_compliance(area: f64, length: f64, modulus_pa: f64) -> Result<f64, MaterialError> {
+    check_positive("area of a contact", "m²", area)?;
+    check_positive("length of a severed edge", "m", length)?;
+    check_modulus("modulus of a contact", "Pa", modulus_pa)?;
+    finite("contact", area * length, 1.0 / (modulus_pa * area * length))
+}
+
 /// Fails unless `value` is finite and above 0.
 pub(crate) fn check_positive(
     quantity: &'static str,

@@ -1,15 +1,15 @@
 //! The passes of the solver, for each constraint.
 
 use cutis_shaders::constraints::{
-    DISTANCE, SKIN_STRIP, SKIN_STRIP_AT_REST, SKIN_STRIP_TURN, SKIN_TENSION, SKIN_TENSION_PAPER, THREAD,
-    VOLUME,
+    DISTANCE, LIP_CONTACT, SKIN_STRIP, SKIN_STRIP_AT_REST, SKIN_STRIP_TURN, SKIN_TENSION, SKIN_TENSION_PAPER,
+    THREAD, VOLUME,
 };
 use cutis_shaders::solver::{self, Loads, Multiplier, Rule, Stiffness};
 
 use crate::{assert_baseline, size_of_struct, validated};
 
 /// Name, arity, number of parameters, source.
-const KINDS: [(&str, usize, u32, &str); 8] = [
+const KINDS: [(&str, usize, u32, &str); 9] = [
     ("distance", 2, 1, DISTANCE),
     ("volume", 4, 1, VOLUME),
     ("stc", 3, 2, SKIN_TENSION),
@@ -18,6 +18,7 @@ const KINDS: [(&str, usize, u32, &str); 8] = [
     ("skin_strip_at_rest", 3, 9, SKIN_STRIP_AT_REST),
     ("skin_strip_turn", 3, 9, SKIN_STRIP_TURN),
     ("thread", 6, 5, THREAD),
+    ("lip_contact", 4, 4, LIP_CONTACT),
 ];
 
 #[test]

@@ -111,6 +111,7 @@ fn table(plan: &Plan) -> String {
         format!("projections      {}", plan.projections),
         format!("memory, CT       {:.1} MB", plan.volume_bytes as f64 / 1e6),
     ];
+    lines.extend((sizes.lip_pairs > 0).then(|| format!("lip pairs        {}", sizes.lip_pairs)));
     lines.extend(plan.tension.iter().map(|(kind, tension)| format!("tension          {kind}: {tension}")));
     lines.extend(plan.membrane.iter().map(|membrane| format!("lines of tension {}", membrane.summary())));
     lines.extend(plan.steps.iter().map(|step| format!("step             {}", step.summary())));

@@ -2,9 +2,9 @@
 
 use cutis_conformance::{Subject, conformance};
 use cutis_constraints::{
-    Distance, DistanceMaterial, SkinStrip, SkinStripAtRest, SkinStripLaw, SkinStripMaterial, SkinStripTurn,
-    SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Thread, ThreadMaterial,
-    Volume, VolumeMaterial,
+    Distance, DistanceMaterial, LipContact, LipContactMaterial, SkinStrip, SkinStripAtRest, SkinStripLaw,
+    SkinStripMaterial, SkinStripTurn, SkinTension, SkinTensionMaterial, SkinTensionPaper,
+    SkinTensionPaperMaterial, Thread, ThreadMaterial, Volume, VolumeMaterial,
 };
 
 conformance!(mod distance: Distance, 2, Subject::new([
@@ -32,6 +32,12 @@ conformance!(mod thread: Thread, 6, Subject::new([
     ThreadMaterial { ends: [[0.0, 0.0], [1.0, 0.0]], length_scale: 0.1 },
     ThreadMaterial { ends: [[0.3, 0.3], [0.1, 0.6]], length_scale: 1.5 },
 ]));
+
+conformance!(mod lip_contact: LipContact, 4, Subject::new([
+    LipContactMaterial { part: 0.3, normal: [0.6, 0.0, 0.8] },
+    LipContactMaterial { part: 0.0, normal: [0.0, -1.0, 0.0] },
+    LipContactMaterial { part: 0.9, normal: [-0.48, 0.6, -0.64] },
+]).oriented());
 
 /// Strips with low to high tension, with and without stiffening and resistance to compression.
 fn strips() -> Vec<SkinStripMaterial> {

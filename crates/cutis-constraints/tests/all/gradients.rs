@@ -2,8 +2,8 @@
 //! of its energy.
 
 use cutis_constraints::{
-    Constraint, Distance, Eval, SkinStrip, SkinStripAtRest, SkinStripTurn, SkinTension, SkinTensionPaper,
-    Volume,
+    Constraint, Distance, Eval, LipContact, SkinStrip, SkinStripAtRest, SkinStripTurn, SkinTension,
+    SkinTensionPaper, Volume,
 };
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
@@ -56,13 +56,13 @@ fn check<const N: usize>(eval: &impl Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shap
     assert!(torque_error(&couple, shape) > 1e-6);
 }
 
-/// Checks the gradient and the momentum of a strip, not its torque.
-fn check_forces(eval: &dyn Fn(&[Point3<f64>; 3]) -> Eval<f64, 3>, shape: &Shape<3>) {
+/// Checks the gradient and the momentum of a constraint with a direction in space, not its torque.
+fn check_forces<const N: usize>(eval: &dyn Fn(&[Point3<f64>; N]) -> Eval<f64, N>, shape: &Shape<N>) {
     let grad = eval(&shape.x).grad;
     let error = gradient_error(eval, shape);
     assert!(error < EXACT, "gradient is off by {error}");
     assert!(momentum_error(&grad) < ROUNDING);
-    let longer = |x: &[Point3<f64>; 3]| Eval { c: eval(x).c, grad: grad.map(|g| g * 1.001) };
+    let longer = |x: &[Point3<f64>; N]| Eval { c: eval(x).c, grad: grad.map(|g| g * 1.001) };
     assert!(gradient_error(longer, shape) > 0.9e-3);
 }
 
@@ -96,6 +96,22 @@ proptest! {
     #[test]
     fn skin_tension_gradient(shape in shape::<3>(), ratio in rest_ratio(), beta in 0.0..100.0f64) {
         check(&with::<3, SkinTension>([ratio * area(&shape.x), beta]), &shape);
+    }
+
+    /// Sides that overlap are pushed apart along the normal. Open ones have no contact.
+    #[test]
+    fn lip_contact_gradient(shape in shape::<4>(), part in 0.0..1.0f64, normal in proptest::array::uniform3(-1.0..1.0f64)) {
+        let contact = with::<4, LipContact>([part, normal[0], normal[1], normal[2]]);
+        let gap = ((shape.x[0] - shape.x[2]) * (1.0 - part) + (shape.x[1] - shape.x[3]) * part)
+            .dot(&Vector3::from(normal));
+        prop_assume!(gap.abs() > 1e-2 * shape.scale * Vector3::from(normal).norm());
+        let Eval { c, grad } = contact(&shape.x);
+        if gap < 0.0 {
+            prop_assert!((c - gap).abs() <= 1e-12 * shape.scale);
+            check_forces(&contact, &shape);
+        } else {
+            prop_assert!(c == 0.0 && grad == [Vector3::zeros(); 4]);
+        }
     }
 
     /// The slope of a triangle along the strip has a direction in space, so its torque is not zero.

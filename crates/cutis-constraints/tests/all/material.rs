@@ -2,7 +2,7 @@
 
 use cutis_constraints::{
     MaterialError, SkinStripLaw, SkinStripMaterial, SkinTensionPaperMaterial, distance_compliance,
-    skin_compliance, skin_strip_compliance, volume_compliance,
+    lip_contact_compliance, skin_compliance, skin_strip_compliance, volume_compliance,
 };
 use nalgebra::Point3;
 
@@ -32,6 +32,19 @@ fn energy_density_does_not_depend_on_the_mesh() {
         let area = change * change / (2.0 * skin_compliance(size, 50.0).unwrap());
         assert!(near(area / size, 0.5 * 50.0 * strain * strain));
     }
+}
+
+/// A pressure makes the same relative overlap in any mesh.
+#[test]
+fn overlap_under_a_pressure_does_not_depend_on_the_mesh() {
+    let (pressure, modulus) = (500.0, 1e5);
+    for (area, length) in [(1e-6, 1e-3), (1.6e-5, 4e-3), (1.0, 1.0)] {
+        // The gradient of the overlap is 1/L.
+        let force = (pressure / modulus) / lip_contact_compliance(area, length, modulus).unwrap() / length;
+        assert!((force / area / pressure - 1.0).abs() < 1e-12, "{area} {length}");
+    }
+    assert_eq!(lip_contact_compliance(1e-6, 1e-3, f64::INFINITY), Ok(0.0));
+    assert!(lip_contact_compliance(0.0, 1e-3, 1e5).is_err());
 }
 
 #[test]

@@ -6,6 +6,7 @@
 
 use super::components::{EDGES, count, parts_of};
 use super::divide::{Divided, LEAST_CUT, share_of_cut};
+use super::lip_pairs::LipSite;
 use super::nodes::Classes;
 use super::section::{Border, Section};
 use super::severing::{Severing, Sides};
@@ -16,11 +17,13 @@ use crate::TetMesh;
 #[derive(Debug)]
 pub struct Growth {
     blades: Vec<GrowingBlade>,
-    tets: Vec<GrowingTet>,
+    pub(super) tets: Vec<GrowingTet>,
     edges: Vec<GrowingEdge>,
     triangles: Vec<DividedTriangle>,
     /// The corners of the divided tets and the nodes of their copies, ascending.
     nodes: Vec<u32>,
+    /// What each tet needs to name pairs of points for the contact of the lips.
+    pub(super) sites: Vec<LipSite>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -31,12 +34,12 @@ struct GrowingBlade {
 
 /// A tet that the finished wound divides.
 #[derive(Debug)]
-struct GrowingTet {
+pub(super) struct GrowingTet {
     tet: u32,
     /// Its corners, as positions in [`Growth::nodes`].
     corners: [u32; 4],
     /// The part of each corner in the finished wound.
-    parts: [u8; 4],
+    pub(super) parts: [u8; 4],
     /// For each part: the number of its copy, and its nodes as positions in [`Growth::nodes`].
     copies: [Option<(u8, [u32; 4])>; 4],
     /// Share of the volume of each part.
@@ -82,7 +85,7 @@ pub struct Stage {
 
 /// A tet at a stage: the share of its section that is cut, and the group of each part. Parts of one
 /// group are not separated yet. None if it is not cut.
-type Cut = Option<(f64, [u8; 4])>;
+pub(super) type Cut = Option<(f64, [u8; 4])>;
 
 impl Severing {
     /// The wound after all blades have cut to their ends, and what it needs to grow to that.
@@ -133,7 +136,8 @@ impl Severing {
         }
         let edges = self.growing_edges(mesh, wound, &local);
         let triangles = wound.areas(mesh, triangles);
-        Growth { blades: blades.collect(), tets, edges, triangles, nodes }
+        let sites = self.lip_sites(mesh, wound);
+        Growth { blades: blades.collect(), tets, edges, triangles, nodes, sites }
     }
 
     /// Divided tets across the faces of one: number, and the corners of the face here and there.
@@ -205,32 +209,20 @@ impl Growth {
         &self.nodes
     }
 
+    /// Whether a blade has come so far that it takes out what it encloses.
+    pub(super) fn takes_out(&self, blade: u32, reached: &[f64]) -> bool {
+        reached[blade as usize] >= self.blades[blade as usize].length
+    }
+
     /// The wound after each blade has cut up to a length in m along its path. A blade that has not
     /// begun has a length of 0.
     ///
     /// # Panics
     /// If there is not one length per blade.
     pub fn stage(&self, reached: &[f64]) -> Stage {
-        assert_eq!(reached.len(), self.blades.len(), "one length per blade");
-        let cuts: Vec<Cut> = self.tets.iter().map(|tet| tet.cut(&self.blades, reached)).collect();
-        let mut classes = Classes::new(self.nodes.len());
-        for (tet, cut) in self.tets.iter().zip(&cuts) {
-            tet.join(cut, &mut classes);
-            for (other, face) in &tet.across {
-                let (other, cut_there) = (&self.tets[*other as usize], &cuts[*other as usize]);
-                // Each corner of the face names the copies that hold it on both sides.
-                for [here, there] in face {
-                    let named = (tet.holding(cut, *here), other.holding(cut_there, *there));
-                    let (Some(a), Some(b)) = named else { continue };
-                    face.iter().for_each(|[p, q]| {
-                        classes.join(a[usize::from(*p)] as usize, b[usize::from(*q)] as usize);
-                    });
-                }
-            }
-        }
-        let root: Vec<usize> = (0..self.nodes.len()).map(|node| classes.root(node)).collect();
+        let (cuts, root) = self.joined(reached);
         let node = |local: u32| self.nodes[root[local as usize]];
-        let taken = |blade: u32| reached[blade as usize] >= self.blades[blade as usize].length;
+        let taken = |blade: u32| self.takes_out(blade, reached);
         let mut stage = Stage::default();
         let apart = (0..self.nodes.len()).filter(|&n| root[n] != n);
         stage.follows = apart.map(|n| [self.nodes[n], self.nodes[root[n]]]).collect();
@@ -250,6 +242,30 @@ impl Growth {
             triangle.copies_at(number, tet, &cuts[split], &node, &taken, &mut stage.triangles);
         }
         stage
+    }
+
+    /// How far each tet is cut, and the place in [`Growth::nodes`] of the node that each node
+    /// follows.
+    pub(super) fn joined(&self, reached: &[f64]) -> (Vec<Cut>, Vec<usize>) {
+        assert_eq!(reached.len(), self.blades.len(), "one length per blade");
+        let cuts: Vec<Cut> = self.tets.iter().map(|tet| tet.cut(&self.blades, reached)).collect();
+        let mut classes = Classes::new(self.nodes.len());
+        for (tet, cut) in self.tets.iter().zip(&cuts) {
+            tet.join(cut, &mut classes);
+            for (other, face) in &tet.across {
+                let (other, cut_there) = (&self.tets[*other as usize], &cuts[*other as usize]);
+                // Each corner of the face names the copies that hold it on both sides.
+                for [here, there] in face {
+                    let named = (tet.holding(cut, *here), other.holding(cut_there, *there));
+                    let (Some(a), Some(b)) = named else { continue };
+                    face.iter().for_each(|[p, q]| {
+                        classes.join(a[usize::from(*p)] as usize, b[usize::from(*q)] as usize);
+                    });
+                }
+            }
+        }
+        let root = (0..self.nodes.len()).map(|node| classes.root(node)).collect();
+        (cuts, root)
     }
 }
 
@@ -298,7 +314,7 @@ impl GrowingTet {
     }
 
     /// The nodes of the copy that holds a corner. None if its part is too thin for a copy.
-    fn holding(&self, cut: &Cut, corner: u8) -> Option<[u32; 4]> {
+    pub(super) fn holding(&self, cut: &Cut, corner: u8) -> Option<[u32; 4]> {
         let Some((_, groups)) = cut else { return Some(self.corners) };
         let group = groups[usize::from(self.parts[usize::from(corner)])];
         let mut held = (0..4).filter(|&part| groups[part] == group);
@@ -322,7 +338,7 @@ impl GrowingTet {
     }
 
     /// Whether a part is taken out of the body, by the blades that have taken out their pieces.
-    fn is_gone(&self, part: usize, taken: &dyn Fn(u32) -> bool) -> bool {
+    pub(super) fn is_gone(&self, part: usize, taken: &dyn Fn(u32) -> bool) -> bool {
         self.gone[part].is_some_and(taken)
     }
 

@@ -2,6 +2,7 @@
 
 use super::blade::Blade;
 use super::growth::Growth;
+use super::lip_pairs::LipPair;
 use super::pieces::Pieces;
 use super::severing::{Severing, longest_edge};
 use super::stations::stations;
@@ -23,6 +24,8 @@ pub struct Severed {
     pub copies: Vec<TriangleCopy>,
     /// The blades: those of the incisions without a width, of pockets, and of pieces.
     pub blades: Vec<Blade>,
+    /// The pairs of points on both sides of the finished cuts.
+    pub lip_pairs: Vec<LipPair>,
     /// The shapes of the parts of divided tets. They fill the divided tets, but for those that are
     /// taken out.
     pub tet_pieces: Pieces<4>,
@@ -58,9 +61,12 @@ impl Cut {
     ) -> Result<Option<Severed>, MeshError> {
         let severed = self.sever_with(mesh, triangles, |severing, mesh, _| {
             severing.cut_all();
-            Ok((severing.wound(mesh)?, ()))
+            let wound = severing.wound(mesh)?;
+            let pairs = severing.lip_pairs(mesh, &wound);
+            Ok((wound, pairs))
         })?;
-        let Some((severed, ())) = severed else { return Ok(None) };
+        let Some((mut severed, lip_pairs)) = severed else { return Ok(None) };
+        severed.lip_pairs = lip_pairs;
         // A vertex that a blade touches may lose all its tets.
         let mut held = vec![false; mesh.positions.len()];
         mesh.tets.iter().flatten().for_each(|&v| held[v as usize] = true);
@@ -78,7 +84,11 @@ impl Cut {
         mesh: &mut TetMesh,
         triangles: &mut Vec<[u32; 3]>,
     ) -> Result<Option<(Severed, Growth)>, MeshError> {
-        self.sever_with(mesh, triangles, Severing::grow)
+        let mut severed = self.sever_with(mesh, triangles, Severing::grow)?;
+        if let Some((severed, growth)) = &mut severed {
+            severed.lip_pairs = growth.lip_pairs(&growth.lengths());
+        }
+        Ok(severed)
     }
 
     fn sever_with<G>(
@@ -157,8 +167,17 @@ impl Cut {
         triangles.extend(copies.iter().map(|copy| copy.nodes));
         let divided = divided.into_iter().map(|(_, triangle)| triangle).collect();
         let virtual_nodes = wound.virtual_nodes;
-        let severed =
-            Severed { virtual_nodes, triangles: divided, copies, blades, tet_pieces, taken_out, skin_pieces };
+        let lip_pairs = Vec::new();
+        let severed = Severed {
+            virtual_nodes,
+            triangles: divided,
+            copies,
+            blades,
+            lip_pairs,
+            tet_pieces,
+            taken_out,
+            skin_pieces,
+        };
         Ok(Some((severed, growth)))
     }
 }

@@ -200,7 +200,7 @@ impl Severing {
 }
 
 /// The edges of a tet whose ends are on different sides, in order around the section.
-fn around_section(distances: &[f32; 4]) -> Vec<(usize, usize)> {
+pub(super) fn around_section(distances: &[f32; 4]) -> Vec<(usize, usize)> {
     let positive = |corner: usize| distances[corner] >= 0.0;
     let mut edges: Vec<(usize, usize)> =
         EDGES.into_iter().filter(|&(a, b)| positive(a) != positive(b)).collect();

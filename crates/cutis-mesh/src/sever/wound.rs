@@ -128,6 +128,13 @@ impl Wound {
         Walls { distances: &self.distances[first..first + count], parts: split.parts, kept: split.kept }
     }
 
+    /// The blades in a divided tet, with the distances of its corners.
+    pub(super) fn walls_of(&self, split: &SplitTet) -> Vec<(u32, [f32; 4])> {
+        let first = split.walls.0 as usize;
+        let rows = first..first + usize::from(split.walls.1);
+        rows.map(|row| (self.blades[row], self.distances[row])).collect()
+    }
+
     /// Distances of the corners of a divided tet to a blade. None if they are on one side of it.
     pub(super) fn distances_to(&self, split: &SplitTet, blade: usize) -> Option<&[f32; 4]> {
         let first = split.walls.0 as usize;

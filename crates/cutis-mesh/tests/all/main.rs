@@ -7,6 +7,7 @@ mod graded;
 mod growth;
 mod incision;
 mod lattice;
+mod lip_pairs;
 mod oracle;
 mod real_data;
 mod region;

@@ -29,7 +29,7 @@ pub fn blade(path: &[[f64; 3]], inward: [f64; 3], depth: f64) -> Blade {
 }
 
 /// A plane through a point that cuts the whole block.
-fn plane(at: [f64; 3], along: [f64; 3], inward: [f64; 3]) -> Blade {
+pub fn plane(at: [f64; 3], along: [f64; 3], inward: [f64; 3]) -> Blade {
     let along = Vector3::from(along).normalize();
     let inward = Vector3::from(inward);
     let inward = (inward - along * inward.dot(&along)).normalize();
@@ -37,7 +37,7 @@ fn plane(at: [f64; 3], along: [f64; 3], inward: [f64; 3]) -> Blade {
     blade(&[(middle - along * 0.1).into(), (middle + along * 0.1).into()], inward.into(), 0.2)
 }
 
-fn cut(mesh: &TetMesh, blades: &[Blade]) -> Wound {
+pub fn cut(mesh: &TetMesh, blades: &[Blade]) -> Wound {
     let mut severing = Severing::new(mesh);
     blades.iter().for_each(|blade| {
         severing.add(mesh, blade);
@@ -47,14 +47,14 @@ fn cut(mesh: &TetMesh, blades: &[Blade]) -> Wound {
 }
 
 /// All tets of the cut body, in nodes.
-fn tets(mesh: &TetMesh, wound: &Wound) -> Vec<[u32; 4]> {
+pub fn tets(mesh: &TetMesh, wound: &Wound) -> Vec<[u32; 4]> {
     let split: BTreeSet<u32> = wound.split.iter().map(|split| split.tet).collect();
     let whole = (0..).zip(&mesh.tets).filter(|(n, _)| !split.contains(n)).map(|(_, tet)| *tet);
     whole.chain(wound.copies.iter().map(|copy| copy.nodes)).collect()
 }
 
 /// Sets of nodes that tets connect.
-fn pieces(tets: &[[u32; 4]]) -> Vec<BTreeSet<u32>> {
+pub fn pieces(tets: &[[u32; 4]]) -> Vec<BTreeSet<u32>> {
     let mut piece_of: HashMap<u32, usize> = HashMap::new();
     let mut pieces: Vec<BTreeSet<u32>> = Vec::new();
     for tet in tets {

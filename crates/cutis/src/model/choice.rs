@@ -66,10 +66,10 @@ pub(crate) fn validate(scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
     constraints::validate(scene, check)
 }
 
-/// Adds the default section of the scene's model, so that reports show it.
+/// Adds the default sections of the scene's model, so that reports show them.
 pub(crate) fn fill_defaults(scene: &mut Scene) {
     match scene.model {
-        ModelChoice::Pbd => {}
+        ModelChoice::Pbd => constraints::fill_default(scene),
         ModelChoice::Chainmail => {
             scene.chainmail.get_or_insert_default();
         }

@@ -33,6 +33,7 @@ pub(super) fn sizes(body: &Body, fixed: usize) -> Sizes {
         edges: mesh.edges.len(),
         tets: mesh.tets.len(),
         skin_triangles: body.skin.len(),
+        lip_pairs: 0,
         removed_vertices: body.removed_vertices(),
         fixed_vertices: fixed,
         frozen_vertices: inactive.map_or(0, |inactive| inactive.vertices),

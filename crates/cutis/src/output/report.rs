@@ -147,6 +147,10 @@ pub struct Sizes {
     pub tets: usize,
     /// Skin triangles.
     pub skin_triangles: usize,
+    /// Pairs of points on both sides of incisions without a width that touch in the end; 0 without
+    /// contact.
+    #[serde(default)]
+    pub lip_pairs: usize,
     /// Vertices that the incisions removed from all constraints.
     pub removed_vertices: usize,
     /// Vertices that do not move.

@@ -9,6 +9,7 @@ use super::simulate::{Setup, Simulated, warn};
 use crate::Error;
 use crate::backend::DeviceMeter;
 use crate::body::Body;
+use crate::model::ModelChoice;
 use crate::output::report::{Machine, Report, SCHEMA, Wound};
 use crate::output::step_report::HandleReport;
 use crate::output::suture_report::SutureReport;
@@ -29,7 +30,7 @@ pub(super) fn report(
     let Simulated { mut plan, device, resumed, result } = simulated;
     let (rows, end) = (result.rows, result.end);
     let wounds = wounds(body, &rows);
-    warn(&mut plan, &crossed_lips(&wounds), clock.progress);
+    warn(&mut plan, &crossed_lips(loaded, body, &wounds), clock.progress);
     let rest = &body.mesh.positions;
     let moved = rest.iter().zip(&end.positions).map(|(a, b)| f64::from((b - a).norm()) * 1e3);
     let report = Report {
@@ -119,15 +120,34 @@ fn wounds(body: &Body, rows: &[FrameRow]) -> Vec<Wound> {
     before.zip(after).map(wound).collect()
 }
 
-/// Warnings about wounds whose lips have passed through each other.
-fn crossed_lips(wounds: &[Wound]) -> Vec<String> {
-    let least = wounds.iter().map(|wound| wound.final_mm.min(wound.mid_mm)).enumerate();
-    let crossed = least.filter(|(_, least)| *least < 0.0);
-    let warnings = crossed.map(|(n, least)| {
-        format!(
-            "the lips of wound {n} have passed through each other, by {:.2} mm: there is no contact",
-            -least
-        )
-    });
-    warnings.collect()
+/// Overlap of lips that touch above which it is reported, over the longest lattice step.
+const PRESSED: f64 = 0.05;
+
+/// Warnings about wounds whose lips have passed through each other, or are pressed together too
+/// hard.
+fn crossed_lips(loaded: &LoadedScene, body: &Body, wounds: &[Wound]) -> Vec<String> {
+    let scene = &loaded.scene;
+    let acts = scene.model == ModelChoice::Pbd
+        && scene.constraints.contact.as_ref().is_some_and(|contact| contact.acts);
+    let step_mm = body.mesh.lattice.longest_step_mm();
+    let line = |(n, wound): (usize, &Wound)| {
+        let depth = -wound.final_mm.min(wound.mid_mm);
+        // The walls of an excision have no pairs of points that touch.
+        let paired = scene.incision.get(n).is_some_and(|incision| incision.width_mm.is_none());
+        if acts && paired {
+            let pressed = depth > PRESSED * step_mm;
+            return pressed.then(|| {
+                format!(
+                    "the lips of wound {n} overlap by {depth:.2} mm although they touch: they are \
+                     pressed together harder than the tissue withstands, or the solver needs more iterations"
+                )
+            });
+        }
+        (depth > 0.0).then(|| {
+            format!(
+                "the lips of wound {n} have passed through each other, by {depth:.2} mm: there is no contact"
+            )
+        })
+    };
+    wounds.iter().enumerate().filter_map(line).collect()
 }

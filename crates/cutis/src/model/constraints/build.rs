@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::ConstraintModel;
 use super::elements::Elements;
-use super::kinds::BodyParts;
+use super::kinds::{BodyParts, contact};
 use super::threads::{self, Threads};
 use super::wound::{self, GrowingWound, WholeParts};
 use crate::Error;
@@ -62,6 +62,7 @@ impl ConstraintModel {
         let parts = BodyParts {
             file,
             solver: &scene.solver,
+            constraints: &scene.constraints,
             at_rest: scene.scan_is_at_rest,
             body,
             elements: if grows { Elements::Whole(body) } else { Elements::All(body) },
@@ -82,6 +83,9 @@ impl ConstraintModel {
         }
         if scene.solver.formulation == Formulation::Vbd {
             let mut colors = body.mesh.vertex_colors();
+            if scene.constraints.contact.as_ref().is_some_and(|contact| contact.acts) {
+                contact::separate(&mut colors, &body.mesh);
+            }
             let stitches: Vec<&Stitch> = body.stitches.iter().flatten().collect();
             if !stitches.is_empty() {
                 threads::separate(&mut colors, &body.mesh, &stitches);

@@ -2,7 +2,7 @@
 //! from the others.
 
 use cutis_mesh::TetMesh;
-use cutis_mesh::sever::{Stage, TriangleCopy};
+use cutis_mesh::sever::{LipPair, Stage, TriangleCopy};
 
 use crate::body::Body;
 
@@ -30,6 +30,8 @@ pub(crate) struct WoundElements {
     divided: Vec<[u32; 3]>,
     /// Shares of the area of the copies.
     shares: Vec<f32>,
+    /// Pairs of points on both sides of the cuts, if their contact acts.
+    lip_pairs: Vec<LipPair>,
 }
 
 /// Skin triangles that a cut of no width divides.
@@ -43,7 +45,12 @@ pub(crate) struct DividedSkin<'a> {
 
 impl WoundElements {
     /// The elements of a stage. `triangles` are the skin triangles that the finished cuts divide.
-    pub(crate) fn new(mesh: &TetMesh, triangles: &[[u32; 3]], stage: &Stage) -> Self {
+    pub(crate) fn new(
+        mesh: &TetMesh,
+        triangles: &[[u32; 3]],
+        stage: &Stage,
+        lip_pairs: Vec<LipPair>,
+    ) -> Self {
         let (uncut, copies): (Vec<&TriangleCopy>, Vec<_>) =
             stage.triangles.iter().partition(|copy| copy.part.is_none() && copy.share == 1.0);
         let mut divided: Vec<u32> = copies.iter().map(|copy| copy.triangle).collect();
@@ -58,6 +65,7 @@ impl WoundElements {
             skin: uncut.iter().chain(&copies).map(|copy| copy.nodes).collect(),
             divided: divided.into_iter().map(|number| triangles[number as usize]).collect(),
             shares: copies.iter().map(|copy| copy.share).collect(),
+            lip_pairs,
         }
     }
 }
@@ -129,6 +137,15 @@ impl<'a> Elements<'a> {
                 let uncut = wound.skin.len() - wound.shares.len();
                 triangle.checked_sub(uncut).map_or(1.0, |copy| f64::from(wound.shares[copy]))
             }
+        }
+    }
+
+    /// Pairs of points on both sides of cuts of no width.
+    pub(crate) fn lip_pairs(&self) -> &'a [LipPair] {
+        match *self {
+            Self::All(body) => body.severed.as_ref().map_or(&[], |severed| &severed.lip_pairs),
+            Self::Whole(_) => &[],
+            Self::Wound(wound) => &wound.lip_pairs,
         }
     }
 

@@ -17,12 +17,14 @@ use cutis_solver::{Formulation, Settings, StepProfile, System};
 use super::costs::{lines_that_hold, sizes, unfinished_cuts, unfinished_handles, unfinished_sutures};
 use super::{Model, ModelCosts, ModelInput, Started};
 use crate::backend::{Chosen, Request};
+use crate::output::report::Sizes;
 use crate::run::clock::Clock;
 use crate::scene::validate::Check;
 use crate::scene::{Scene, TissueMaterials};
 use crate::{CostReport, Error, Progress};
 
 pub(crate) use estimate::CostEstimate;
+pub(super) use kinds::contact::fill_default;
 use solver_run::SolverRun;
 pub(crate) use start::{device_memory, start};
 use threads::Threads;
@@ -71,7 +73,10 @@ impl Model for ConstraintModel {
         Ok(ModelCosts {
             device_memory: device_memory(&backend, system, settings),
             backend,
-            sizes: sizes(input.body, motionless - input.body.removed_vertices() - followers),
+            sizes: Sizes {
+                lip_pairs: scene.constraints.contact.as_ref().map_or(0, |contact| contact.pairs(input.body)),
+                ..sizes(input.body, motionless - input.body.removed_vertices() - followers)
+            },
             colors,
             memory: estimate.memory,
             projections: work.projections,
@@ -143,6 +148,11 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
         (
             gravity && scene.scan_is_at_rest,
             "solver.gravity_m_s2 moves nothing: the scan is at rest under its weight (scan_is_at_rest)",
+        ),
+        (
+            scene.constraints.contact.as_ref().is_some_and(|contact| contact.acts)
+                && scene.incision.iter().all(|cut| cut.width_mm.is_some()),
+            "constraints.contact has no effect without an incision without width_mm",
         ),
         (
             scene.materials.is_some() && scene.solver.formulation == Formulation::Pbd,

@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 use super::elements::{Elements, WoundElements};
 use super::kinds::BodyParts;
 use crate::Error;
-use crate::body::{Body, GrowingCuts};
+use crate::body::GrowingCuts;
 use crate::model::ModelInput;
 
 /// The state of cuts that grow.
@@ -135,10 +135,11 @@ impl GrowingWound {
             self.inverse_masses[node as usize] = inverse_mass;
         }
         let ModelInput { file, scene, body } = *input;
-        let elements = wound_elements(body, &stage);
+        let elements = self.elements(input, cuts, &stage);
         let parts = BodyParts {
             file,
             solver: &scene.solver,
+            constraints: &scene.constraints,
             at_rest: scene.scan_is_at_rest,
             body,
             elements: Elements::Wound(&elements),
@@ -178,6 +179,15 @@ impl GrowingWound {
         Ok(WoundParts { kinds, inverse_masses, loads, follows })
     }
 
+    /// The elements along the cuts at a stage.
+    fn elements(&self, input: &ModelInput<'_>, cuts: &GrowingCuts, stage: &Stage) -> WoundElements {
+        let body = input.body;
+        let triangles = body.severed.as_ref().map_or(&[][..], |severed| &severed.triangles);
+        let touch = input.scene.constraints.contact.as_ref().is_some_and(|contact| contact.acts);
+        let pairs = if touch { cuts.growth.lip_pairs(&self.reached) } else { Vec::new() };
+        WoundElements::new(&body.mesh, triangles, stage, pairs)
+    }
+
     fn inverse_masses_at(&self, cuts: &GrowingCuts, stage: &Stage) -> Vec<f32> {
         let masses = cuts.masses(stage).into_iter().zip(&self.held);
         masses.map(|(mass, held)| if *held || mass <= 0.0 { 0.0 } else { 1.0 / mass as f32 }).collect()
@@ -199,12 +209,6 @@ impl GrowingWound {
             values[node as usize] = values[of as usize];
         }
     }
-}
-
-/// The elements along the cuts of a body at a stage.
-fn wound_elements(body: &Body, stage: &Stage) -> WoundElements {
-    let triangles = body.severed.as_ref().map_or(&[][..], |severed| &severed.triangles);
-    WoundElements::new(&body.mesh, triangles, stage)
 }
 
 /// The vertices of a body at rest with their inverse masses.

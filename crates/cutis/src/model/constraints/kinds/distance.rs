@@ -6,7 +6,7 @@ use cutis_solver::{Stiffness, SystemBuilder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::moduli::{self, springs_over_body};
+use super::moduli::{self, Moduli, springs_over_body};
 use super::{BodyParts, ConstraintKind, KindFacts, compliances, one};
 use crate::Error;
 use crate::scene::validate::Check;
@@ -37,6 +37,13 @@ impl DistanceSection {
             [body.mesh.edges.len(), body.mesh.inactive.as_ref().map_or(0, |inactive| inactive.edges)]
         },
     };
+
+    /// The moduli of the springs.
+    pub(super) fn moduli<'a>(&self, parts: &BodyParts<'a>) -> Result<Moduli<'a>, Error> {
+        let factor = springs_over_body(parts.body.mesh.lattice.split());
+        let of_row = |row: &TissueMaterialSection| factor * row.youngs_modulus_pa;
+        parts.moduli(MODULUS_KEY, self.youngs_modulus_pa, of_row)
+    }
 }
 
 impl ConstraintKind for DistanceSection {
@@ -50,14 +57,11 @@ impl ConstraintKind for DistanceSection {
         builder: SystemBuilder<f32>,
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
-        let mesh = &parts.body.mesh;
         let elements = &parts.elements;
         let groups = Groups::from_colors(&elements.edge_colors())?;
         let stiffness = if parts.compliant() {
             let volumes = elements.edge_volumes();
-            let factor = springs_over_body(mesh.lattice.split());
-            let of_row = |row: &TissueMaterialSection| factor * row.youngs_modulus_pa;
-            let moduli = parts.moduli(MODULUS_KEY, self.youngs_modulus_pa, of_row)?;
+            let moduli = self.moduli(parts)?;
             compliances(elements.edges(), |n, [a, b]| {
                 let length = nalgebra::distance(&parts.position(a), &parts.position(b));
                 cutis_constraints::distance_compliance(length, moduli.of([a, b]), f64::from(volumes[n]))

@@ -4,6 +4,7 @@
 //! folder, with its section of the scene, the range of its values and the way it is built. The
 //! scene format, the plan, the reports, `--without` and `cutis tune` follow from the row.
 
+pub(crate) mod contact;
 mod distance;
 mod freed;
 mod membrane;
@@ -20,6 +21,7 @@ use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use contact::ContactSection;
 pub use distance::DistanceSection;
 pub use membrane::{MembraneDirections, MembraneSection};
 pub use skin_tension::{NearIncisionSection, StcForm, StcSection};
@@ -51,7 +53,10 @@ macro_rules! constraint_kinds {
             KindRow {
                 key: stringify!($key),
                 facts: <$section>::FACTS,
-                section: |all| all.$key.as_ref().map(|section| section as &dyn ConstraintKind),
+                section: |all| {
+                    let section = all.$key.as_ref().map(|section| section as &dyn ConstraintKind);
+                    section.filter(|section| section.acts())
+                },
                 remove: |all| all.$key = None,
             },
         )*];
@@ -67,6 +72,8 @@ constraint_kinds! {
     stc: StcSection,
     /// The skin as a membrane with tension and modulus along and across its lines.
     membrane: MembraneSection,
+    /// Contact of the lips of incisions without a width. Scenes with sutures have it by default.
+    contact: ContactSection,
 }
 
 /// One row of the table of constraint kinds.
@@ -74,7 +81,7 @@ pub(crate) struct KindRow {
     /// Key of its section under `constraints`, and its name in all reports.
     pub(crate) key: &'static str,
     pub(crate) facts: KindFacts,
-    /// Its section of a scene; none if the scene does not name it.
+    /// Its section of a scene; none if the scene does not name it, or if it does not act.
     pub(crate) section: fn(&ConstraintsSection) -> Option<&dyn ConstraintKind>,
     remove: fn(&mut ConstraintsSection),
 }
@@ -93,6 +100,11 @@ pub(crate) struct KindFacts {
 
 /// A section of a scene that names a constraint kind.
 pub(crate) trait ConstraintKind {
+    /// Whether the kind acts. One that does not is left out.
+    fn acts(&self) -> bool {
+        true
+    }
+
     /// Checks the values of the section.
     ///
     /// # Errors
@@ -158,6 +170,8 @@ impl fmt::Display for ScanTension {
 pub(crate) struct BodyParts<'a> {
     pub(crate) file: SceneFile<'a>,
     pub(crate) solver: &'a SolverSection,
+    /// All kinds of the scene.
+    pub(crate) constraints: &'a ConstraintsSection,
     /// Whether the scan shows the body in equilibrium.
     pub(crate) at_rest: bool,
     pub(crate) body: &'a Body,

@@ -6,6 +6,7 @@ use cutis_solver::{Stiffness, SystemBuilder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::moduli::Moduli;
 use super::{BodyParts, ConstraintKind, KindFacts, compliances, moduli, one};
 use crate::Error;
 use crate::scene::Scene;
@@ -35,6 +36,11 @@ impl VolumeConstraintSection {
             [body.mesh.tets.len(), body.mesh.inactive.as_ref().map_or(0, |inactive| inactive.tets)]
         },
     };
+
+    /// The moduli of the tetrahedra.
+    pub(super) fn moduli<'a>(&self, parts: &BodyParts<'a>) -> Result<Moduli<'a>, Error> {
+        parts.moduli(MODULUS_KEY, self.bulk_modulus_pa, |row| row.bulk_modulus_pa)
+    }
 }
 
 impl ConstraintKind for VolumeConstraintSection {
@@ -52,7 +58,7 @@ impl ConstraintKind for VolumeConstraintSection {
         let groups = Groups::from_colors(&elements.tet_colors())?;
         let stiffness = if parts.compliant() {
             let volumes = elements.tet_volumes();
-            let moduli = parts.moduli(MODULUS_KEY, self.bulk_modulus_pa, |row| row.bulk_modulus_pa)?;
+            let moduli = self.moduli(parts)?;
             compliances(elements.tets(), |n, tet| {
                 cutis_constraints::volume_compliance(f64::from(volumes[n]), moduli.of(tet))
             })?
