@@ -7,7 +7,7 @@ use cutis::{Error, LoadedScene, Scene};
 
 use crate::scenes::overrides;
 
-/// A scene with every section, so that each key can be set on its own.
+/// A scene with every section but sutures, so that each key can be set on its own.
 const EVERYTHING: &str = r#"
 model = "chainmail"
 [volume]
@@ -41,21 +41,26 @@ to_mm = [1, 0, 0]
 depth_mm = 1
 width_mm = 1
 [[undermining]]
-wound = 0
+wound = 1
 distance_mm = 1
 depth_mm = 1
+at_s = 2
 [[excision]]
 path_mm = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]
 depth_mm = 1
-[[suture]]
-wound = 0
-every_mm = 1
 [[handle]]
 at_mm = [0, 0, 0]
 radius_mm = 1
 move_mm = [1, 0, 0]
 [solver]
 dt_s = 0.1
+"#;
+
+/// The section that the scene with every section cannot have: ChainMail knows no sutures.
+const SUTURE: &str = r#"
+[[suture]]
+wound = 0
+every_mm = 1
 "#;
 
 /// The section that replaces the moduli of the constraint kinds.
@@ -79,10 +84,21 @@ fn with_materials() -> String {
     EVERYTHING.replace("youngs_modulus_pa = 1e4\n", "").replace("bulk_modulus_pa = 1e5\n", "") + MATERIALS
 }
 
-/// The scene with every section. Overrides of `materials` change the scene that has it.
+/// The scene with the other model and a suture.
+fn with_suture() -> String {
+    EVERYTHING.replace("\"chainmail\"", "\"pbd\"").replace("width_mm = 1\n", "") + SUTURE
+}
+
+/// The scene with every section. Overrides of `materials` and `suture` change the scene that has
+/// them. A speed is for an incision without a width.
 fn parse(set: &[(&str, &str)]) -> Result<LoadedScene, Error> {
-    let materials = set.iter().any(|(key, _)| key.starts_with("materials"));
-    let text = if materials { with_materials() } else { EVERYTHING.to_owned() };
+    let sets = |section: &str| set.iter().any(|(key, _)| key.starts_with(section));
+    let without_width = sets("suture") || sets("incision.0.speed_mm_s");
+    let text = match (sets("materials"), without_width) {
+        (true, _) => with_materials(),
+        (false, true) => with_suture(),
+        (false, false) => EVERYTHING.to_owned(),
+    };
     Scene::parse(&text, Path::new("every.toml"), Path::new(""), &overrides(set))
 }
 
@@ -132,10 +148,9 @@ fn the_scene_with_everything_is_valid_and_has_every_section() {
     let keys = keys();
     assert!(keys.len() > 60, "{} keys: the reference is not read", keys.len());
     for (key, _, kind) in keys.iter().filter(|(_, _, kind)| kind == "number") {
-        // 1 is a valid number for every key, but `1` is not a preset name, and an incision with a
-        // width has no speed.
+        // 1 is a valid number for every key.
         let set = parse(&[(key, "1.0")]);
-        let other = key.starts_with("lattice.") || key.ends_with("speed_mm_s");
+        let other = key.starts_with("lattice.");
         assert!(set.is_ok() || other, "{key} ({kind}): {:?}", set.err());
     }
 }
@@ -162,6 +177,10 @@ fn nan_infinity_and_wrong_types_are_refused() {
             "whole number" => &["-1", "1.5", "nan", "\"text\"", "[1]", "99999999999999999999"],
             "boolean" => &["1", "\"true\"", "[true]"],
             "string" => &["1", "[\"a\"]"],
+            "whole number or string" => &["-1", "1.5", "99", "\"unheard of\"", "[1]"],
+            _ if kind.starts_with("list of [[") => {
+                &["1.0", "[1]", "[[[1, 2, 3]]]", "[[[0, 0, 0], [0, 0, nan]]]"]
+            }
             _ if kind.starts_with("section") => &["1", "\"text\"", "{ unheard_of = 1 }"],
             _ if kind.starts_with("list of sections") => &["1", "\"text\"", "[1]", "[{ unheard_of = 1 }]"],
             _ if kind.starts_with("string or list") => &["1", "[1]", "[[1]]", "[[\"a\", 1]]"],

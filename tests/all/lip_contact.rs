@@ -13,7 +13,7 @@ const STEP: f64 = 7.0;
 
 /// Threads of nine tenths of the length that would close the wound.
 const TIGHT: &str =
-    "[{ incision = 0, every_mm = 10, bite_mm = 7, at_s = 0.1, tighten_s = 0.2, tighten_to = 0.9 }]";
+    "[{ wound = 0, every_mm = 10, bite_mm = 7, at_s = 0.1, tighten_s = 0.2, tighten_to = 0.9 }]";
 
 /// Settings of the three formulations.
 fn formulations() -> [[(&'static str, &'static str); 4]; 3] {
@@ -117,7 +117,7 @@ fn a_gpu_presses_lips_as_the_cpu_does() {
             for speed in ["", ", speed_mm_s = 2000.0"] {
                 let incision = CUT.replace("depth_mm = 20", &format!("depth_mm = 20{speed}"));
                 let scene = |more: &[(&str, &str)]| {
-                    let suture = "[{ incision = 0, every_mm = 20, bite_mm = 10, at_s = 0.05, tighten_s = 0.02, \
+                    let suture = "[{ wound = 0, every_mm = 20, bite_mm = 10, at_s = 0.05, tighten_s = 0.02, \
                                    tighten_to = 0.6 }]";
                     let own = [
                         formulation,
@@ -158,7 +158,7 @@ fn contact_comes_with_sutures() {
         assert!(stored == (plan.sizes.lip_pairs > 0) && left_out != stored, "{:?}", plan.left_out);
         stored
     };
-    let sutures = "[{ incision = 0, every_mm = 20, bite_mm = 12 }]";
+    let sutures = "[{ wound = 0, every_mm = 20, bite_mm = 12 }]";
     let with = plan(sutures, &[("solver.formulation", "xpbd")]);
     assert!(acts(&with) && with.colors["contact"] > 0);
     assert!(with.costs.parts.iter().any(|part| part.part == "contact" && part.host_bytes > 0));

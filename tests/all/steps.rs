@@ -176,7 +176,7 @@ fn a_run_resumes_between_steps() {
     for file in ["checkpoint.bin", "skin.vtu"] {
         assert!(read(&whole, file) == read(&halves, file), "{file}");
     }
-    run("0.03", "10", "1", other.path(), false);
+    run("0.0", "10", "1", other.path(), false);
     assert!(read(&whole, "skin.vtu") != read(&other, "skin.vtu"));
 }
 

@@ -5,6 +5,7 @@ mod cuts;
 mod drags;
 mod materials;
 mod model;
+mod no_width;
 mod random;
 mod refused;
 mod resume;

@@ -125,6 +125,18 @@ fn invalid_times_zones_and_handles_are_refused() {
     cutis::check(&chain(&[("handle", &allowed)]), &Silent).unwrap();
 }
 
+/// A thread needs a force, and links have none. Control: the other model has sutures.
+#[test]
+fn sutures_are_refused() {
+    let incision = "[{ from_mm = [0, 110, -50], to_mm = [0, 110, 50], depth_mm = 20 }]";
+    let suture = "[{ wound = 0, every_mm = 20 }]";
+    let (key, text) = refused(&[("incision", incision), ("suture", suture)]);
+    assert_eq!(key, "suture", "{text}");
+    assert!(["1 suture", "must be left out", "pbd"].iter().all(|word| text.contains(word)), "{text}");
+    let set = [("incision", incision), ("suture", suture), ("lattice.spacing_mm", "16")];
+    cutis::check(&scenes::scene(SMALL, &set), &Silent).unwrap();
+}
+
 #[test]
 fn a_chain_has_no_system_to_build_or_to_tune() {
     let out = tempfile::tempdir().unwrap();

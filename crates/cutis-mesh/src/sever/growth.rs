@@ -4,6 +4,9 @@
 //! grows. Nodes that a blade has not separated yet are one: all but the lowest *follow* it. The
 //! elements depend only on how far each blade has come, not on the steps in which it came there.
 
+mod virtual_nodes;
+
+use super::axis_edges::AxisEdge;
 use super::components::{EDGES, count, parts_of};
 use super::divide::{Divided, LEAST_CUT, share_of_cut};
 use super::lip_pairs::LipSite;
@@ -12,6 +15,8 @@ use super::section::{Border, Section};
 use super::severing::{Severing, Sides};
 use super::wound::{DividedTriangle, EdgeCopy, TetCopy, TooManyBlades, TriangleCopy, Wound};
 use crate::TetMesh;
+
+pub use virtual_nodes::VirtualNode;
 
 /// What a wound needs to know to grow. [`Growth::stage`] returns its elements.
 #[derive(Debug)]
@@ -24,6 +29,8 @@ pub struct Growth {
     nodes: Vec<u32>,
     /// What each tet needs to name pairs of points for the contact of the lips.
     pub(super) sites: Vec<LipSite>,
+    /// The edges along the axes of the lattice that each blade severs.
+    axis_edges: Vec<Vec<AxisEdge>>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -136,8 +143,8 @@ impl Severing {
         }
         let edges = self.growing_edges(mesh, wound, &local);
         let triangles = wound.areas(mesh, triangles);
-        let sites = self.lip_sites(mesh, wound);
-        Growth { blades: blades.collect(), tets, edges, triangles, nodes, sites }
+        let (axis_edges, sites) = (self.axis_edges(mesh), self.lip_sites(mesh, wound));
+        Growth { blades: blades.collect(), tets, edges, triangles, nodes, axis_edges, sites }
     }
 
     /// Divided tets across the faces of one: number, and the corners of the face here and there.
@@ -220,7 +227,8 @@ impl Growth {
     /// # Panics
     /// If there is not one length per blade.
     pub fn stage(&self, reached: &[f64]) -> Stage {
-        let (cuts, root) = self.joined(reached);
+        let cuts = self.cuts(reached);
+        let root = self.roots(&cuts);
         let node = |local: u32| self.nodes[root[local as usize]];
         let taken = |blade: u32| self.takes_out(blade, reached);
         let mut stage = Stage::default();
@@ -244,13 +252,16 @@ impl Growth {
         stage
     }
 
-    /// How far each tet is cut, and the place in [`Growth::nodes`] of the node that each node
-    /// follows.
-    pub(super) fn joined(&self, reached: &[f64]) -> (Vec<Cut>, Vec<usize>) {
+    /// How far the blades have cut each tet.
+    pub(super) fn cuts(&self, reached: &[f64]) -> Vec<Cut> {
         assert_eq!(reached.len(), self.blades.len(), "one length per blade");
-        let cuts: Vec<Cut> = self.tets.iter().map(|tet| tet.cut(&self.blades, reached)).collect();
+        self.tets.iter().map(|tet| tet.cut(&self.blades, reached)).collect()
+    }
+
+    /// For each of [`Growth::nodes`], the position of the lowest node that is one with it.
+    pub(super) fn roots(&self, cuts: &[Cut]) -> Vec<usize> {
         let mut classes = Classes::new(self.nodes.len());
-        for (tet, cut) in self.tets.iter().zip(&cuts) {
+        for (tet, cut) in self.tets.iter().zip(cuts) {
             tet.join(cut, &mut classes);
             for (other, face) in &tet.across {
                 let (other, cut_there) = (&self.tets[*other as usize], &cuts[*other as usize]);
@@ -264,8 +275,7 @@ impl Growth {
                 }
             }
         }
-        let root = (0..self.nodes.len()).map(|node| classes.root(node)).collect();
-        (cuts, root)
+        (0..self.nodes.len()).map(|node| classes.root(node)).collect()
     }
 }
 

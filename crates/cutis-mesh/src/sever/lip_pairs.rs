@@ -120,7 +120,8 @@ impl Growth {
     /// # Panics
     /// If there is not one length per blade.
     pub fn lip_pairs(&self, reached: &[f64]) -> Vec<LipPair> {
-        let (cuts, root) = self.joined(reached);
+        let cuts = self.cuts(reached);
+        let root = self.roots(&cuts);
         let node = |local: u32| self.nodes()[root[local as usize]];
         let taken = |blade: u32| self.takes_out(blade, reached);
         let of_tet = |(tet, cut): (&GrowingTet, &Cut)| {

@@ -6,6 +6,7 @@
 //! the other parts (Molino, Bao and Fedkiw 2004, doi:10.1145/1015706.1015734). Tissue is never
 //! removed, and a body that is cut but not moved is the body before the cut.
 
+mod axis_edges;
 mod blade;
 mod bowl;
 mod components;
@@ -28,9 +29,10 @@ mod tet_index;
 mod walls;
 mod wound;
 
+pub use axis_edges::AxisEdge;
 pub use blade::{Blade, Station};
 pub(crate) use bowl::Bowl;
-pub use growth::{Growth, Stage};
+pub use growth::{Growth, Stage, VirtualNode};
 pub use incise::Severed;
 pub use lip_pairs::LipPair;
 pub use pieces::{Embedded, LipPoint, Pieces};

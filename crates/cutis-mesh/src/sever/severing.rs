@@ -74,6 +74,12 @@ impl Sides {
         let same = |crossing: &&Crossing| crossing.vertex == vertex && crossing.direction == direction;
         self.crossings.iter().find(same).map(|crossing| crossing.at)
     }
+
+    /// The edges that the blade severs, in this order: vertex, direction, and length along the path
+    /// in m.
+    pub fn all_crossings(&self) -> impl Iterator<Item = (u32, u8, f64)> {
+        self.crossings.iter().map(|crossing| (crossing.vertex, crossing.direction, crossing.at))
+    }
 }
 
 impl Severing {

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use cutis_mesh::sever::{Blade, Growth, Severing, Stage, Wound};
 use cutis_mesh::{Split, TetMesh};
+use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use crate::sever::{RandomBlades, blade, blades, block, colors_are_valid, random_cut};
@@ -135,6 +136,11 @@ proptest! {
     fn random_cuts_grow_through_valid_stages((mesh, random) in random_cut(), share in 0.0..1.0_f64) {
         check_growth(&mesh, &random, share)?;
     }
+
+    #[test]
+    fn virtual_nodes_come_apart_from_their_vertices((mesh, random) in random_cut()) {
+        check_virtual_nodes(&mesh, &random)?;
+    }
 }
 
 /// Two nodes that a cut will separate are one until it reaches them.
@@ -156,4 +162,86 @@ fn nodes_come_apart_behind_the_tip() {
         assert!(behind.iter().any(|node| !follow.contains(node)), "{split:?}");
         assert!(ahead.iter().filter(|&&node| x(node) > 0.006).all(|node| follow.contains(node)));
     }
+}
+
+/// Virtual nodes for a model that moves only vertices of the mesh: at each stage those that no
+/// blade has separated are with the vertices at their places, and the others follow vertices on
+/// their side.
+fn check_virtual_nodes(mesh: &TetMesh, random: &RandomBlades) -> Result<(), TestCaseError> {
+    let blades = &blades(random)[..1];
+    let (wound, growth) = grow(mesh, blades);
+    let first = mesh.positions.len() as u32;
+    for step in 0..=10 {
+        let reached = growth.lengths()[0] * f64::from(step) / 10.0;
+        let nodes = growth.virtual_nodes(&[reached]);
+        prop_assert!(nodes.iter().map(|node| node.node).eq(first..first + wound.virtual_nodes.len() as u32));
+        prop_assert!(nodes.iter().map(|node| node.vertex).eq(wound.virtual_nodes.iter().copied()));
+        let stage = growth.stage(&[reached]);
+        let with_real: BTreeSet<u32> =
+            stage.follows.iter().filter(|[_, of]| *of < first).map(|[node, _]| *node).collect();
+        for node in &nodes {
+            prop_assert_eq!(node.share == 0.0, with_real.contains(&node.node));
+            prop_assert_eq!(node.share == 0.0, node.own_side.is_empty());
+            prop_assert!((0.0..=1.0).contains(&node.share), "{}", node.share);
+            // The copies with the node have these vertices.
+            let root = stage.follows.iter().find(|[n, _]| *n == node.node).map_or(node.node, |[_, of]| *of);
+            let copies = stage.tets.iter().filter(|copy| !copy.whole && copy.nodes.contains(&root));
+            let around: BTreeSet<u32> = copies.flat_map(|copy| copy.nodes).collect();
+            prop_assert!(node.own_side.iter().all(|v| *v < first && around.contains(v)));
+            prop_assert!(!node.own_side.contains(&node.vertex));
+            // All are on the side of the blade on which the vertex of the node is not.
+            let severed = |&v: &u32| {
+                wound.split.iter().any(|split| {
+                    let corners = &mesh.tets[split.tet as usize];
+                    let of = |v: u32| corners.iter().position(|&c| c == v).map(|n| split.parts[n]);
+                    of(v).zip(of(node.vertex)).is_some_and(|(a, b)| a != b)
+                })
+            };
+            prop_assert!(node.own_side.iter().all(severed));
+        }
+    }
+    // Edges along the axes are those that the blade crosses, in its order.
+    let edges = &growth.axis_edges()[0];
+    prop_assert!(edges.is_sorted_by(|a, b| a.at <= b.at));
+    let all: BTreeSet<[u32; 2]> = mesh.edges.iter().copied().collect();
+    for edge in edges {
+        let [p, q] = edge.ends.map(|v| mesh.point(v));
+        let apart: usize = (0..3).map(|axis| p[axis].abs_diff(q[axis])).sum();
+        prop_assert!(apart == 1 && all.contains(&edge.ends), "{edge:?}");
+        prop_assert!((0.0..=growth.lengths()[0]).contains(&edge.at));
+    }
+    Ok(())
+}
+
+/// A node moves with the vertex at its place, then in part, then with its own side. If all vertices
+/// move alike by whole steps of a chain, it does too, exactly. It comes apart without a jump.
+#[test]
+fn a_virtual_node_moves_with_its_own_side() {
+    let mesh = block([12, 8, 6], Split::Kuhn6);
+    let path = [[-0.012, 0.0007, 0.015], [0.012, 0.0007, 0.015]];
+    let (_, growth) = grow(&mesh, &[blade(&path, [0.0, 0.0, -1.0], 0.012)]);
+    assert!(growth.axis_edges()[0].len() > 10);
+    let left = |v: u32| mesh.positions[v as usize].y < 0.0007;
+    let of = |left: bool| if left { Vector3::new(0.0, -1.0, 0.25) } else { Vector3::zeros() };
+    let by = |v: u32| of(left(v));
+    let (mut whole, mut in_part) = (0, 0);
+    let mut before = vec![0.0; growth.virtual_nodes(&[0.0]).len()];
+    for step in 0..=240 {
+        let reached = 1e-4 * f64::from(step);
+        for (node, before) in growth.virtual_nodes(&[reached]).into_iter().zip(&mut before) {
+            // Shares below 1 % and above 99 % count as 0 and as 1. A border is as wide as a step of
+            // 3 mm, so that a share grows by at most a thirtieth here.
+            let grown = node.share - *before;
+            assert!((-1e-12..0.06).contains(&grown), "{grown} at {reached}");
+            *before = node.share;
+            let expected = by(node.vertex).lerp(&of(!left(node.vertex)), node.share);
+            assert!((node.displacement(by) - expected).norm() < 1e-12, "{node:?}");
+            let alike = Vector3::new(0.5, 3.25, -0.125);
+            assert_eq!(node.displacement(|_| alike), alike);
+            whole += usize::from(node.share == 1.0);
+            in_part += usize::from(node.share > 0.0 && node.share < 1.0);
+        }
+        assert!(step > 0 || whole + in_part == 0, "{whole} {in_part}");
+    }
+    assert!(whole > 10 && in_part > 10, "{whole} {in_part}");
 }

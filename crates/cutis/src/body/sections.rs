@@ -55,7 +55,7 @@ impl<'a> BodySections<'a> {
                 .filter_map(|section| undermining(scene, section))
                 .collect(),
             excisions: &scene.excision,
-            cuts_grow: scene.model == ModelChoice::Pbd && times.iter().any(Timing::is_later),
+            cuts_grow: times.iter().any(|time| scene.model.cuts_while_moving(time.is_later())),
             times,
             handles: &scene.handle,
             sutures: if scene.model == ModelChoice::Pbd { &scene.suture } else { &[] },

@@ -31,11 +31,13 @@ impl ModelChoice {
         }
     }
 
-    /// Whether an incision may leave out its width, so that it removes nothing.
-    pub(crate) fn cuts_without_width(self) -> bool {
+    /// Whether a cut of no width is made while the body moves. ChainMail makes all of them like
+    /// that: also those that exist from the start are made in the first frame. `later` tells
+    /// whether it begins after the start, or grows.
+    pub(crate) fn cuts_while_moving(self, later: bool) -> bool {
         match self {
-            Self::Pbd => true,
-            Self::Chainmail => false,
+            Self::Pbd => later,
+            Self::Chainmail => true,
         }
     }
 }

@@ -132,20 +132,24 @@ fn crossed_lips(loaded: &LoadedScene, body: &Body, wounds: &[Wound]) -> Vec<Stri
     let step_mm = body.mesh.lattice.longest_step_mm();
     let line = |(n, wound): (usize, &Wound)| {
         let depth = -wound.final_mm.min(wound.mid_mm);
+        let section = match n.checked_sub(scene.incision.len()) {
+            None => format!("incision[{n}]"),
+            Some(n) => format!("excision[{n}]"),
+        };
         // The walls of an excision have no pairs of points that touch.
         let paired = scene.incision.get(n).is_some_and(|incision| incision.width_mm.is_none());
         if acts && paired {
             let pressed = depth > PRESSED * step_mm;
             return pressed.then(|| {
                 format!(
-                    "the lips of wound {n} overlap by {depth:.2} mm although they touch: they are \
+                    "the lips of {section} overlap by {depth:.2} mm although they touch: they are \
                      pressed together harder than the tissue withstands, or the solver needs more iterations"
                 )
             });
         }
         (depth > 0.0).then(|| {
             format!(
-                "the lips of wound {n} have passed through each other, by {depth:.2} mm: there is no contact"
+                "the lips of {section} have passed through each other, by {depth:.2} mm: there is no contact"
             )
         })
     };

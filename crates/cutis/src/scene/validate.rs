@@ -91,9 +91,9 @@ impl Scene {
         self.validate_tissue(&check)?;
         self.validate_materials(&check)?;
         model::validate(self, &check)?;
+        self.validate_solver(&check)?;
         self.validate_cuts(&check)?;
-        self.validate_handles(&check)?;
-        self.validate_solver(&check)
+        self.validate_handles(&check)
     }
 
     fn validate_volume(&self, check: &Check<'_>) -> Result<(), Error> {

@@ -12,8 +12,8 @@ impl Scene {
     pub(super) fn validate_cuts(&self, check: &Check<'_>) -> Result<(), Error> {
         self.validate_incisions(check)?;
         self.validate_names(check)?;
-        self.validate_underminings(check)?;
         self.validate_excisions(check)?;
+        self.validate_underminings(check)?;
         self.validate_sutures(check)
     }
 
@@ -22,14 +22,7 @@ impl Scene {
             let key = |field: &str| format!("incision[{n}].{field}");
             self.validate_path(check, &key, incision)?;
             check.positive(&key("depth_mm"), incision.depth_mm)?;
-            match incision.width_mm {
-                Some(width_mm) => check.positive(&key("width_mm"), width_mm)?,
-                None => {
-                    let model = serde_json::json!(self.model);
-                    let why = format!("is needed with model = {model}, which cannot cut without a width");
-                    check.require(self.model.cuts_without_width(), &key("width_mm"), "", &why)?;
-                }
-            }
+            incision.width_mm.map_or(Ok(()), |width_mm| check.positive(&key("width_mm"), width_mm))?;
             let later = self.model.cuts_later() || incision.width_mm.is_none();
             let model = serde_json::json!(self.model);
             let why = format!("must be 0: with model = {model} incisions with a width exist from the start");
@@ -154,7 +147,6 @@ impl Scene {
             let closes = incision.is_none_or(|incision| incision.width_mm.is_none());
             let why =
                 "must be an incision without width_mm: a suture cannot close a slit whose tissue is gone";
-            let closes = closes || !self.model.cuts_without_width();
             check.require(closes, &key("wound"), &suture.wound, why)?;
             self.validate_stitches(check, &key, suture)?;
             check.positive(&key("bite_mm"), suture.bite_mm)?;
@@ -180,6 +172,12 @@ impl Scene {
         suture: &SutureSection,
     ) -> Result<(), Error> {
         let SutureSection { every_mm, pairs_mm, .. } = suture;
+        for (n, [a, b]) in pairs_mm.iter().enumerate() {
+            let key = format!("{}[{n}]", key("pairs_mm"));
+            check.point(&key, *a)?;
+            check.point(&key, *b)?;
+            check.require(a != b, &key, format!("{a:?}"), "must be two different points")?;
+        }
         let one = every_mm.is_some() == pairs_mm.is_empty();
         let shown = every_mm.map(|mm| mm.to_string()).unwrap_or_default();
         check.require(
@@ -189,12 +187,6 @@ impl Scene {
             "must be given, or pairs_mm in its place, and not both",
         )?;
         every_mm.map_or(Ok(()), |every| check.positive(&key("every_mm"), every))?;
-        for (n, [a, b]) in pairs_mm.iter().enumerate() {
-            let key = format!("{}[{n}]", key("pairs_mm"));
-            check.point(&key, *a)?;
-            check.point(&key, *b)?;
-            check.require(a != b, &key, format!("{a:?}"), "must be two different points")?;
-        }
         Ok(())
     }
 }

@@ -41,7 +41,8 @@ impl ChainmailModel {
             elements.iter().zip(&fixed).filter(|(_, fixed)| **fixed).map(|(element, _)| *element).collect();
         chain.fix(&held).map_err(|error| file.blame("chainmail")(Error::Chain(error)))?;
         let cuts = cuts(&scene.incision, body);
-        let motionless = (0..fixed.len()).filter(|&vertex| fixed[vertex] && !body.is_removed(vertex as u32));
+        let real = 0..mesh.real_vertices();
+        let motionless = real.filter(|&vertex| fixed[vertex] && !body.is_removed(vertex as u32));
         Ok(Self {
             chain,
             elements,
@@ -83,14 +84,16 @@ fn axis_bit(apart: u32, [nx, ny, _]: [usize; 3]) -> u8 {
     }
 }
 
-/// The handles of the scene, with the elements that they grab.
+/// The handles of the scene, with the elements that they grab. Virtual vertices have no element of
+/// their own.
 fn handles(input: &ModelInput<'_>) -> Result<Vec<ChainHandle>, Error> {
     let ModelInput { file, scene, body } = *input;
     let grid = body.mesh.lattice.grid();
     let mut grabbed_by = HashMap::new();
     let mut handles = Vec::new();
     for (n, (handle, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {
-        let elements: Vec<u32> = grabbed.iter().map(|&v| body.mesh.lattice_index[v as usize]).collect();
+        let real = grabbed.iter().filter(|&&v| (v as usize) < body.mesh.real_vertices());
+        let elements: Vec<u32> = real.map(|&v| body.mesh.lattice_index[v as usize]).collect();
         if let Some(other) = elements.iter().find_map(|&element| grabbed_by.insert(element, n)) {
             let why = format!("it grabs vertices that handle[{other}] grabs already");
             return Err(file.bad_key(&format!("handle[{n}].at_mm"), &format!("{:?}", handle.at_mm), &why));
@@ -114,11 +117,13 @@ fn handles(input: &ModelInput<'_>) -> Result<Vec<ChainHandle>, Error> {
     Ok(handles)
 }
 
-/// The links that each incision cuts: those that are in no tetrahedron any more. The first incision
-/// that takes a tetrahedron removes it.
+/// The links that each incision with a width cuts: those that are in no tetrahedron any more. The
+/// first incision that takes a tetrahedron removes it.
 fn cuts(incisions: &[IncisionSection], body: &Body) -> Vec<ChainCut> {
     let mesh = &body.mesh;
-    let slits = incisions.iter().zip(&body.cut.slits);
+    // Such an incision has one segment.
+    let wide = incisions.iter().filter(|incision| incision.width_mm.is_some());
+    let slits = wide.zip(body.cut.slits.iter().filter(|slit| !slit.removes_nothing()));
     let mut slits: Vec<(f64, &Slit)> = slits.map(|(cut, slit)| (cut.at_s, slit)).collect();
     slits.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let mut cuts: Vec<ChainCut> =

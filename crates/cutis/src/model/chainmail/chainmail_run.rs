@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::device::Relaxer;
+use super::wound::ChainWound;
 use super::{ChainHandle, ChainmailModel};
 use crate::Error;
 use crate::body::Body;
@@ -38,8 +39,10 @@ pub(super) struct ChainmailRun<'a> {
     frame: u32,
     /// The last frame in which a handle moves.
     last_drag: u32,
-    /// Number of cuts that have been made.
+    /// Number of cuts with a width that have been made.
     cuts_made: usize,
+    /// The cuts of no width; none if the scene has none.
+    wound: Option<ChainWound<'a>>,
     /// True if relaxation has ended.
     settled: bool,
     report: ChainmailReport,
@@ -81,12 +84,14 @@ impl<'a> ChainmailRun<'a> {
             relaxer,
             frame: 0,
             cuts_made: 0,
+            wound: body.growing.as_ref().map(|cuts| ChainWound::new(cuts, &body.mesh)),
             settled: false,
             report: ChainmailReport::default(),
         })
     }
 
-    /// Makes the cuts that are due at the beginning of a frame. Returns whether there were any.
+    /// Makes the cuts that are due at the beginning of a frame. Returns whether there were any that
+    /// may have cut a link.
     fn cut(&mut self) -> bool {
         let time_s = f64::from(self.frame) * self.dt_s;
         let first = self.cuts_made;
@@ -94,7 +99,11 @@ impl<'a> ChainmailRun<'a> {
             self.report.cut_links += self.model.chain.cut_links(&cut.links);
             self.cuts_made += 1;
         }
-        self.cuts_made > first
+        let edges = self.wound.as_mut().map_or_else(Vec::new, |wound| wound.cut_to(time_s));
+        let element = |vertex: u32| self.model.elements[vertex as usize];
+        let links: Vec<[u32; 2]> = edges.iter().map(|edge| edge.ends.map(element)).collect();
+        self.report.cut_links += self.model.chain.cut_links(&links);
+        self.cuts_made > first || !links.is_empty()
     }
 
     /// Targets of the grabbed elements at the end of a frame.
@@ -138,10 +147,18 @@ impl<'a> ChainmailRun<'a> {
         Ok(())
     }
 
-    /// Position of a vertex, local meters: exactly the rest position if its element has not moved.
+    /// Displacement of a vertex in lattice steps. A vertex that is not virtual has that of its
+    /// element.
+    fn displacement(&self, vertex: u32) -> [f64; 3] {
+        let of = |vertex: u32| self.model.chain.displacement(self.model.elements[vertex as usize]);
+        let of_node = |wound: &ChainWound<'_>| wound.displacement(vertex, |vertex| of(vertex).into());
+        self.wound.as_ref().and_then(of_node).map_or_else(|| of(vertex), Into::into)
+    }
+
+    /// Position of a vertex, local meters: exactly the rest position if it has not moved.
     fn position(&self, vertex: u32) -> Point3<f32> {
         let rest = self.body.mesh.positions[vertex as usize];
-        match self.model.chain.displacement(self.model.elements[vertex as usize]) {
+        match self.displacement(vertex) {
             [0.0, 0.0, 0.0] => rest,
             by => {
                 let moved = (0..3).fold(rest.cast::<f64>(), |at, axis| at + self.steps_m[axis] * by[axis]);
@@ -156,7 +173,8 @@ impl<'a> ChainmailRun<'a> {
 
     /// Number of elements of the cut body that have left their rest positions.
     fn moved(&self) -> usize {
-        let (chain, elements) = (&self.model.chain, self.model.elements.iter().enumerate());
+        let real = self.body.mesh.real_vertices();
+        let (chain, elements) = (&self.model.chain, self.model.elements[..real].iter().enumerate());
         let at_rest = |element: u32| chain.displacement(element) == [0.0; 3];
         elements.filter(|&(v, &element)| !self.body.is_removed(v as u32) && !at_rest(element)).count()
     }
@@ -210,7 +228,7 @@ impl Simulation for ChainmailRun<'_> {
 
     fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error> {
         let mut changed = false;
-        if !self.model.cuts.is_empty() {
+        if !self.model.cuts.is_empty() || self.wound.is_some() {
             changed = profile.time(CUTS, || self.cut());
         }
         self.frame += 1;

@@ -5,13 +5,14 @@ mod build;
 mod chainmail_run;
 mod device;
 pub(crate) mod section;
+mod wound;
 
 use std::collections::BTreeMap;
 
 use cutis_chainmail::Chain;
 use nalgebra::Vector3;
 
-use super::costs::{lines_that_hold, sizes, unfinished_handles};
+use super::costs::{lines_that_hold, sizes, unfinished_cuts, unfinished_handles};
 use super::{Model, ModelCosts, ModelInput, Simulation, Started};
 use crate::backend::{Chosen, Request};
 use crate::output::report::{MemoryPart, Sizes};
@@ -24,10 +25,10 @@ use chainmail_run::ChainmailRun;
 /// A chain over the lattice of a body. Its element numbers are those of lattice points.
 pub(crate) struct ChainmailModel {
     chain: Chain,
-    /// Element of each mesh vertex.
+    /// Element of each mesh vertex. A virtual vertex has that of the vertex at its lattice point.
     elements: Vec<u32>,
     handles: Vec<ChainHandle>,
-    /// In the order in which they are made.
+    /// The cuts with a width, in the order in which they are made.
     cuts: Vec<ChainCut>,
     /// Vertices that do not move.
     fixed: usize,
@@ -43,7 +44,7 @@ struct ChainHandle {
     over_s: f64,
 }
 
-/// Links that an incision cuts.
+/// Links that an incision with a width cuts.
 struct ChainCut {
     at_s: f64,
     links: Vec<[u32; 2]>,
@@ -58,6 +59,7 @@ impl Model for ChainmailModel {
             .fold(body.mesh.positions.len() as u64, |product, &n| product.saturating_mul(n.into()));
         let mut warnings = scene_warnings(scene);
         warnings.extend(unfinished_handles(scene));
+        warnings.extend(body.growing.iter().flat_map(|cuts| unfinished_cuts(scene, cuts)));
         let reason = "auto: ChainMail propagates on the CPU, and relaxation on a GPU was not measured to be \
                       faster on any GPU";
         let backend = request.settle_on_cpu(&scene.solver, reason);
@@ -131,7 +133,6 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
             scene.solver.gravity_m_s2 != [0.0; 3],
             "solver.gravity_m_s2 has no effect with model = \"chainmail\"",
         ),
-        (!scene.suture.is_empty(), "suture has no effect with model = \"chainmail\", which knows no forces"),
         (
             scene.handle.is_empty(),
             "there is no handle: with model = \"chainmail\" nothing else moves the body",

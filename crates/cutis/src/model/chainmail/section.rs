@@ -101,10 +101,17 @@ pub(crate) fn validate(scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
     if let Some(chainmail) = &scene.chainmail {
         chainmail.table(check.file, &scene.tissue)?;
     }
-    let even = scene.model != ModelChoice::Chainmail || scene.lattice.grading.is_none();
+    if scene.model != ModelChoice::Chainmail {
+        return Ok(());
+    }
     let why =
         "must be left out with model = \"chainmail\", whose links all have the length of one lattice step";
-    check.require(even, "lattice.grading", "", why)
+    check.require(scene.lattice.grading.is_none(), "lattice.grading", "", why)?;
+    let why = "must be left out with model = \"chainmail\", whose links have no force that a thread could \
+               hold; model = \"pbd\" has sutures";
+    let count = scene.suture.len();
+    let shown = format!("{count} suture{}", if count == 1 { "" } else { "s" });
+    check.require(count == 0, "suture", shown, why)
 }
 
 impl ChainmailSection {

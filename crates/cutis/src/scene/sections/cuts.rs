@@ -30,8 +30,8 @@ pub struct IncisionSection {
     /// width is made at 0.
     #[serde(default)]
     pub at_s: f64,
-    /// Speed at which the incision grows from one end to the other, mm/s (model `pbd`, without a
-    /// width). Left out: it is made at once.
+    /// Speed at which the incision grows from one end to the other, mm/s (without a width). Left
+    /// out: it is made at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_mm_s: Option<f64>,
 }
@@ -63,7 +63,7 @@ impl std::fmt::Display for WoundRef {
     }
 }
 
-/// Skin around a wound that is separated from what is below it (model `pbd`).
+/// Skin around a wound that is separated from what is below it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UnderminingSection {
@@ -82,7 +82,7 @@ pub struct UnderminingSection {
     pub speed_mm_s: Option<f64>,
 }
 
-/// A piece of tissue below a closed outline on the skin that is taken out (model `pbd`).
+/// A piece of tissue below a closed outline on the skin that is taken out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExcisionSection {
