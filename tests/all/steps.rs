@@ -34,7 +34,7 @@ const SEW: &str =
 
 /// The small phantom at rest with a list of steps. Lines of tension run around the trunk: 15 N/m
 /// along them, 3 N/m across.
-fn stepped(steps: &[&str], set: &[(&str, &str)]) -> LoadedScene {
+fn operated(steps: &[&str], set: &[(&str, &str)]) -> LoadedScene {
     let steps = format!("[{}]", steps.join(", "));
     let constraints = "{ distance = { youngs_modulus_pa = 1e4 }, volume = { bulk_modulus_pa = 1e5 }, membrane = { \
          tension_along_n_per_m = 15, tension_across_n_per_m = 3, modulus_along_n_per_m = 60, \
@@ -62,7 +62,7 @@ fn stepped(steps: &[&str], set: &[(&str, &str)]) -> LoadedScene {
 #[test]
 fn an_excision_is_closed_by_sutures() {
     let lesion = excise(&ellipse(LENGTH, WIDTH), ", at_s = 0.1");
-    let run = Run::of(&stepped(&[&lesion, SEW], &[]));
+    let run = Run::of(&operated(&[&lesion, SEW], &[]));
     let (time, middle) = (column(&run, "time_s"), column(&run, "gape_0_mid_mm"));
     assert!((middle[0] / (2.0 * WIDTH) - 1.0).abs() < 0.03, "{}", middle[0]);
     // A frame takes 1/60 s.
@@ -77,7 +77,7 @@ fn an_excision_is_closed_by_sutures() {
     // The tension alone, and the elastic skin and fat that are stretched by the width of the piece.
     let tension = 3.0 * 2.0 * LENGTH / 1000.0;
     assert!((tension..20.0 * tension).contains(&suture.force_n), "{suture:?}, tension {tension} N");
-    let without = Run::of(&stepped(&[&lesion], &[])).report.wound.unwrap();
+    let without = Run::of(&operated(&[&lesion], &[])).report.wound.unwrap();
     assert!(without.mid_mm > 2.0 * WIDTH + 1.0, "{without:?}");
     let sections: Vec<&str> = run.report.steps.iter().map(|step| step.section.as_str()).collect();
     assert_eq!(sections, ["excision[0]", "suture[0]"]);
@@ -92,7 +92,7 @@ fn undermining_and_the_lines_of_tension_change_the_force() {
         let lesion = excise(path, "");
         let steps = [lesion.as_str(), UNDERMINE, SEW];
         let steps: Vec<&str> = steps.into_iter().filter(|step| undermined || *step != UNDERMINE).collect();
-        let run = Run::of(&stepped(&steps, &[]));
+        let run = Run::of(&operated(&steps, &[]));
         let gape = run.report.wound.unwrap().mid_mm;
         assert!(gape < 0.25 * 2.0 * WIDTH, "{gape}");
         run.report.sutures[0].force_n
@@ -112,7 +112,7 @@ fn an_excision_changes_only_the_voxels_of_its_piece() {
     let lesion = excise(&ellipse(LENGTH, WIDTH), ", at_s = 0.02");
     let files = "{ volume = true, report = true }";
     let set = [("run.frames", "4"), ("constraints", slack), ("output", files)];
-    let run = Run::of(&stepped(&[&lesion], &set));
+    let run = Run::of(&operated(&[&lesion], &set));
     assert_eq!(run.report.max_displacement_mm, 0.0);
     let (before, after) = (original(), run.deformed());
     let (grid, spacing) = (before.grid(), before.grid().affine.spacing_mm());
@@ -138,7 +138,7 @@ fn a_hook_pulls_with_a_force() {
         let hook = format!(
             "{{ kind = 'hook', at_mm = [5, 100, 0], radius_mm = 9, move_mm = [0, {move_mm}, 0], at_s = 0.1, over_s = 0.4 }}"
         );
-        Run::of(&stepped(&[&hook], &[]))
+        Run::of(&operated(&[&hook], &[]))
     };
     let run = pull(8.0);
     let (time, force) = (column(&run, "time_s"), column(&run, "handle_0_n"));
@@ -166,7 +166,7 @@ fn a_run_resumes_between_steps() {
             ("solver.threads", threads),
             ("output", "{ surface = true }"),
         ];
-        run_in(folder, &stepped(&[&lesion, &undermine, &sew], &set), resume).unwrap();
+        run_in(folder, &operated(&[&lesion, &undermine, &sew], &set), resume).unwrap();
     };
     let [whole, halves, other] = [(); 3].map(|()| tempfile::tempdir().unwrap());
     run("0.02", "10", "1", whole.path(), false);
@@ -196,7 +196,7 @@ fn a_gpu_does_the_same_steps() {
                     ("run.checkpoint_every", "5"),
                     ("output", "{}"),
                 ];
-                stepped(&[&lesion, &undermine, &sew], &set)
+                operated(&[&lesion, &undermine, &sew], &set)
             };
             let [cpu, on_gpu, control] = [(); 3].map(|()| tempfile::tempdir().unwrap());
             run_in(cpu.path(), &scene("16,"), false).unwrap();

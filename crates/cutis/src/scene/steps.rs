@@ -92,7 +92,7 @@ pub(super) fn add_to_schema(schema: &mut serde_json::Value) {
 /// The part of the scene reference about steps.
 pub(super) fn reference() -> String {
     let mut out = "\n## `[[step]]`\n\n\
-        What is done to the body, as one list in the order of time. A step has the keys of a section \
+        What is done to the body, as one list in the order of time. A step has the keys of a section\n\
         and a `kind`. The section may also be written by itself.\n\n\
         | kind | section |\n|---|---|\n"
         .to_owned();

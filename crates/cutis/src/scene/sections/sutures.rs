@@ -33,8 +33,8 @@ pub struct SutureSection {
     #[serde(default = "SutureSection::default_tighten_s")]
     pub tighten_s: f64,
     /// Length of a tightened thread over the distance of its ends when the lips meet, at most 1.
-    /// That distance is the one in the scan for an incision, and 2 `bite_mm` otherwise. Skin between
-    /// the stitches and the edge is free and recoils, so lips meet below 1.
+    /// That distance is the one in the scan for an incision, and 2 `bite_mm` otherwise. Skin
+    /// between the stitches and the edge is free and recoils, so lips meet below 1.
     #[serde(default = "SutureSection::default_tighten_to")]
     pub tighten_to: f64,
     /// Time at which they are cut, s. Left out: they stay.
