@@ -50,8 +50,9 @@ pub(super) fn draw(
     let depth_after = warp.apply(&depth, stages, progress)?.0;
 
     let frame = &body.mesh.frame;
-    let of_piece = || Some(Wound::of(std::slice::from_ref(body.cut.pieces.first()?.axis()), frame));
-    let wound = body.cut.incisions().next().map(|slits| Wound::of(slits, frame)).or_else(of_piece);
+    let pieces = body.cut.pieces.iter().map(|piece| std::slice::from_ref(piece.axis()));
+    let wounds: Vec<&[Slit]> = body.cut.incisions().chain(pieces).collect();
+    let wound = wounds.first().map(|slits| Wound::of(slits, frame));
     let focus = wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm });
     let [at_rest, now] = [&body.mesh.positions, deformed.positions].map(|p| body.whole_skin(p).0);
     let (_, triangles) = body.whole_skin(&[]);
@@ -82,7 +83,7 @@ pub(super) fn draw(
     let view = View {
         width: PIXELS,
         height: PIXELS,
-        focus,
+        focus: if wounds.len() > 1 { Some(around(&wounds, frame)) } else { focus },
         depth: Some(&depth),
         threshold_hu: air_below_hu,
         ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))
@@ -147,6 +148,18 @@ fn add_lines(
 fn depth(ct: &Volume, air_below_hu: f32) -> Result<Volume, Error> {
     let finest = ct.grid().affine.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
     Ok(skin_depth(ct, air_below_hu, finest, DEEPEST_MM)?)
+}
+
+/// A close-up of several wounds: the middle of the box around their ends, and its diagonal.
+fn around(wounds: &[&[Slit]], frame: &cutis_mesh::Frame) -> Focus {
+    let ends = wounds.iter().flat_map(|slits| *slits);
+    let ends = ends.flat_map(|slit| [slit.skin_at(0.0), slit.skin_at(slit.length())]);
+    let (mut low, mut high) = (Point3::from([f64::INFINITY; 3]), Point3::from([f64::NEG_INFINITY; 3]));
+    for end in ends {
+        (low, high) = (low.inf(&end), high.sup(&end));
+    }
+    let middle = frame.origin_mm + nalgebra::center(&low, &high).coords * 1000.0;
+    Focus { center_mm: middle.into(), size_mm: CLOSE_UP * (high - low).norm() * 1000.0 }
 }
 
 /// The place of a wound, for the choice of a view.
