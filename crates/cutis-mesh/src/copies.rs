@@ -1,7 +1,7 @@
 //! Meshes whose divided tets are replaced by copies.
 
 use crate::TetMesh;
-use crate::sever::Wound;
+use crate::sever::{Classes, Wound};
 
 /// The vertices and elements of a mesh that came with copies of divided tets. They follow those of
 /// the mesh before.
@@ -61,6 +61,22 @@ impl TetMesh {
                 inactive.border.push(inactive.border[twin]);
             }
         }
+    }
+
+    /// Volumes in m³ of the parts of the mesh that share no vertex, the largest first. A cut that
+    /// goes through the body adds a part.
+    pub fn part_volumes(&self) -> Vec<f64> {
+        let mut classes = Classes::new(self.positions.len());
+        for tet in &self.tets {
+            tet[1..].iter().for_each(|&v| classes.join(tet[0] as usize, v as usize));
+        }
+        let mut of_root = vec![0.0; self.positions.len()];
+        for (tet, volume) in self.tets.iter().zip(self.tet_volumes()) {
+            of_root[classes.root(tet[0] as usize)] += f64::from(volume);
+        }
+        of_root.retain(|&volume| volume > 0.0);
+        of_root.sort_by(|a, b| b.total_cmp(a));
+        of_root
     }
 
     /// Number of vertices that are not virtual.

@@ -35,6 +35,7 @@ pub(crate) use bowl::Bowl;
 pub use growth::{Growth, Stage, VirtualNode};
 pub use incise::Severed;
 pub use lip_pairs::LipPair;
+pub(crate) use nodes::Classes;
 pub use pieces::{Embedded, LipPoint, Pieces};
 pub(crate) use pocket::PocketFloor;
 pub use severing::Severing;

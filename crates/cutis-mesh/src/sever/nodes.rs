@@ -82,14 +82,14 @@ impl Severing {
 }
 
 /// Disjoint sets whose root is their lowest element.
-pub(super) struct Classes(Vec<usize>);
+pub(crate) struct Classes(Vec<usize>);
 
 impl Classes {
-    pub(super) fn new(size: usize) -> Self {
+    pub(crate) fn new(size: usize) -> Self {
         Self((0..size).collect())
     }
 
-    pub(super) fn root(&mut self, mut element: usize) -> usize {
+    pub(crate) fn root(&mut self, mut element: usize) -> usize {
         while self.0[element] != element {
             self.0[element] = self.0[self.0[element]];
             element = self.0[element];
@@ -97,7 +97,7 @@ impl Classes {
         element
     }
 
-    pub(super) fn join(&mut self, a: usize, b: usize) {
+    pub(crate) fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b)] = a.min(b);
     }

@@ -283,3 +283,26 @@ fn cuts_that_cannot_be_made_are_refused_by_name() {
     assert!(text.contains("depth_mm"), "{text}");
     assert!(plan(&mesh, &skin, &[along_x(30.0, 10.0)], &[UNDERMINING], &[ellipse(8.0)]).is_ok());
 }
+
+/// A cut through the body sets a piece free, and an excision does not. Control: a cut that ends in
+/// the body.
+#[test]
+fn a_cut_through_the_body_sets_a_piece_free() {
+    let parts = |incision: Incision, excisions: &[Excision]| {
+        let (mut mesh, mut skin) = block(Split::Five);
+        let all = volume_mm3(&mesh);
+        let mut cut = plan(&mesh, &skin, &[incision], &[], excisions).unwrap();
+        cut.sever(&mut mesh, &mut skin).unwrap();
+        (mesh.part_volumes().iter().map(|volume| volume * 1e9).collect::<Vec<f64>>(), all)
+    };
+    let through = |depth_mm| {
+        let path_mm = vec![[-6.0, 20.3, 24.0], [86.0, 20.3, 24.0]];
+        Incision { path_mm, depth_mm, width_mm: None }
+    };
+    let (volumes, all) = parts(through(30.0), &[]);
+    assert_eq!(volumes.len(), 2);
+    assert!((volumes[1] / all - 20.3 / 60.0).abs() < 0.01, "{volumes:?} of {all}");
+    assert!((volumes[0] + volumes[1] - all).abs() < 1e-4 * all);
+    assert_eq!(parts(through(10.0), &[]).0.len(), 1);
+    assert_eq!(parts(along_x(50.0, 10.0), &[ellipse(8.0)]).0.len(), 1);
+}

@@ -66,6 +66,8 @@ impl Body {
             materials.iter_mut().for_each(|materials| materials.add_nodes(&severed.virtual_nodes));
             inactive_skin.shift(mesh.real_vertices(), severed.virtual_nodes.len());
         }
+        let free_pieces_ml = free_pieces_ml(severed.as_ref(), &mesh);
+        warnings.extend(free_pieces(&free_pieces_ml));
         let grabbed = handles::grabbed(sections, &mesh, &cut)?;
         let copies = severed.as_ref().map_or(0, |severed| severed.copies.len());
         let stitches = sutures::stitches(sections, &mesh, &cut, &skin[..skin.len() - copies])?;
@@ -81,6 +83,7 @@ impl Body {
             severed,
             growing,
             stitches,
+            free_pieces_ml,
             membrane,
             grabbed,
             materials,
@@ -128,6 +131,24 @@ fn divide_masses(masses: &mut Vec<f32>, severed: &Severed, mesh: &TetMesh, densi
             *mass = divided[v];
         }
     }
+}
+
+/// Volumes in ml of the parts of the body that its cuts separate from the largest one.
+fn free_pieces_ml(severed: Option<&Severed>, mesh: &TetMesh) -> Vec<f64> {
+    let parts = severed.map(|_| mesh.part_volumes()).unwrap_or_default();
+    parts.iter().skip(1).map(|volume| volume * 1e6).collect()
+}
+
+/// Warning about parts of the body that its cuts set free.
+fn free_pieces(pieces_ml: &[f64]) -> Option<String> {
+    let all: Vec<String> = pieces_ml.iter().map(|ml| format!("{ml:.2}")).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "the cuts separate {} pieces from the body, of {} ml: no tissue holds them in their place",
+            all.len(),
+            all.join(", ")
+        )
+    })
 }
 
 /// Warning about tissue that is not connected with the largest part.

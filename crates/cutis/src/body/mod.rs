@@ -56,6 +56,8 @@ pub(crate) struct Body {
     pub(crate) severed: Option<Severed>,
     /// The cuts that are made while the body moves; none if the scene has none.
     pub(crate) growing: Option<GrowingCuts>,
+    /// Volumes of the parts of the body that its cuts separate from the largest one, ml.
+    pub(crate) free_pieces_ml: Vec<f64>,
     /// The stitches of each suture of the scene.
     pub(crate) stitches: Vec<Vec<Stitch>>,
     /// Normals and directions of the whole skin before the incisions; none if the scene has no

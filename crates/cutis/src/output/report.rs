@@ -71,6 +71,9 @@ pub struct Report {
     /// Opening of the first incision, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wound: Option<Wound>,
+    /// Volumes of the parts of the body that the cuts separate from the largest one, ml.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub free_pieces_ml: Vec<f64>,
     /// The sutures and the forces in them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sutures: Vec<SutureReport>,

@@ -24,8 +24,8 @@ impl StepReport {
     pub(crate) fn all(scene: &Scene, body: &Body) -> Vec<Self> {
         let mut steps = Vec::new();
         steps.extend(incisions(scene, body));
-        steps.extend(underminings(scene));
         steps.extend(excisions(scene, body));
+        steps.extend(underminings(scene));
         steps.extend(sutures(scene, body));
         steps.extend(handles(scene, body));
         steps.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));

@@ -55,6 +55,7 @@ pub(super) fn report(
         wound: wounds.first().cloned(),
         wounds,
         steps: plan.steps,
+        free_pieces_ml: body.free_pieces_ml.clone(),
         sutures: sutures(loaded, body, &rows),
         handles: handles(body, &rows),
         resample: outputs.resample,
