@@ -10,7 +10,8 @@ use crate::neighbors::Neighbors;
 use crate::piece::Piece;
 use crate::pocket::Pocket;
 use crate::sever::{Blade, longest_edge};
-use crate::slit::{Facet, Slit, check_indices};
+use crate::skin_surface::{Facet, check_indices};
+use crate::slit::Slit;
 use crate::{MeshError, NO_VERTEX, TetMesh};
 
 /// An incision along straight segments on or near the skin, in world millimeters.

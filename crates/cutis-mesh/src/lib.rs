@@ -25,6 +25,7 @@ mod select;
 pub mod sever;
 mod shell;
 pub mod skin;
+mod skin_surface;
 mod slit;
 mod stencil;
 mod stitch;

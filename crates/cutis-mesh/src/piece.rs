@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::incision::Incision;
 use crate::path::check_outline;
 use crate::sever::{Blade, Bowl, longest_edge, stations};
-use crate::slit::{Facet, SkinSurface, Slit, check_indices};
-use crate::{Frame, Lattice, MeshError};
+use crate::skin_surface::{Facet, SkinSurface};
+use crate::slit::Slit;
+use crate::{Lattice, MeshError};
 
 /// An excision: tissue below a closed outline on the skin is taken out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,10 +47,7 @@ impl Piece {
         if excisions.is_empty() {
             return Ok(Vec::new());
         }
-        let (grid, frame) = (lattice.grid(), Frame::center_of(lattice.grid()));
-        check_indices(skin, grid.len())?;
-        let position = |point: u32| frame.to_local(lattice.mm(grid.point(point as usize)));
-        let surface = SkinSurface::new(frame, lattice, skin, &position);
+        let surface = SkinSurface::new(lattice, skin)?;
         let place = |(number, excision)| Self::place(lattice, &surface, number, excision);
         excisions.iter().enumerate().map(place).collect()
     }

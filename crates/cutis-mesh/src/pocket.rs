@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::piece::Piece;
 use crate::sever::{Blade, PocketFloor, longest_edge, stations};
-use crate::slit::{Facet, SkinSurface, Slit, check_indices};
-use crate::{Frame, Lattice, MeshError};
+use crate::skin_surface::{Facet, SkinSurface};
+use crate::slit::Slit;
+use crate::{Lattice, MeshError};
 
 /// An undermining: the skin around a wound is separated from what is below it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,10 +50,7 @@ impl Pocket {
         if underminings.is_empty() {
             return Ok(Vec::new());
         }
-        let (grid, frame) = (lattice.grid(), Frame::center_of(lattice.grid()));
-        check_indices(skin, grid.len())?;
-        let position = |point: u32| frame.to_local(lattice.mm(grid.point(point as usize)));
-        let surface = SkinSurface::new(frame, lattice, skin, &position);
+        let surface = SkinSurface::new(lattice, skin)?;
         let incisions = slits.chunk_by(|a, b| a.incision == b.incision);
         let wounds: Vec<&[Slit]> = incisions.chain(pieces.iter().map(|piece| &piece.outline[..])).collect();
         let closed = wounds.len() - pieces.len();

@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::incision::Incision;
 use crate::path::check_path;
-use crate::{Frame, Lattice, MeshError};
+use crate::skin_surface::{Facet, SkinSurface};
+use crate::{Lattice, MeshError};
 
 /// Largest number of sample points and bins along one slit. It limits the work for very long
 /// segments.
@@ -64,10 +65,7 @@ impl Slit {
         skin: &[[u32; 3]],
         incisions: &[Incision],
     ) -> Result<Vec<Self>, MeshError> {
-        let (grid, frame) = (lattice.grid(), Frame::center_of(lattice.grid()));
-        check_indices(skin, grid.len())?;
-        let position = |point: u32| frame.to_local(lattice.mm(grid.point(point as usize)));
-        let surface = SkinSurface::new(frame, lattice, skin, &position);
+        let surface = SkinSurface::new(lattice, skin)?;
         let mut slits = Vec::new();
         for (number, incision) in incisions.iter().enumerate() {
             check_path(number, &incision.path_mm, lattice.longest_step_mm())?;
@@ -174,7 +172,7 @@ impl Slit {
         vertices.sort_unstable();
         vertices.dedup();
         for vertex in vertices {
-            let from_start = (surface.position)(vertex).cast::<f64>() - self.start;
+            let from_start = surface.position(vertex).cast::<f64>() - self.start;
             let (s, t, q) =
                 (from_start.dot(&self.along), from_start.dot(&self.lateral), from_start.dot(&self.inward));
             let over_slit =
@@ -305,62 +303,6 @@ impl Slit {
     /// Unit vector into the body.
     pub fn inward(&self) -> Vector3<f64> {
         self.inward
-    }
-}
-
-/// The skin on which slits are placed.
-pub(crate) struct SkinSurface<'a> {
-    pub frame: Frame,
-    /// Longest lattice step in m.
-    pub step: f64,
-    triangles: &'a [[u32; 3]],
-    /// Rest position of a corner in local meters.
-    position: &'a dyn Fn(u32) -> Point3<f32>,
-    pub facets: Vec<Facet>,
-}
-
-impl<'a> SkinSurface<'a> {
-    pub fn new(
-        frame: Frame,
-        lattice: &Lattice,
-        triangles: &'a [[u32; 3]],
-        position: &'a dyn Fn(u32) -> Point3<f32>,
-    ) -> Self {
-        let facets = triangles.iter().map(|triangle| Facet::of(triangle.map(position))).collect();
-        Self { frame, step: lattice.longest_step_mm() / 1000.0, triangles, position, facets }
-    }
-}
-
-/// Center and area vector (outward normal times area) of a skin triangle.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Facet {
-    pub center: Point3<f64>,
-    pub area_vector: Vector3<f64>,
-}
-
-impl Facet {
-    /// True unless it faces into the body, as the far side of a thin part does.
-    pub fn faces_out(&self, inward: &Vector3<f64>) -> bool {
-        self.area_vector.dot(inward) < 0.5 * self.area_vector.norm()
-    }
-
-    pub fn of(corners: [Point3<f32>; 3]) -> Self {
-        let [a, b, c] = corners.map(|corner| corner.cast::<f64>());
-        Self {
-            center: Point3::from((a.coords + b.coords + c.coords) / 3.0),
-            area_vector: (b - a).cross(&(c - a)) / 2.0,
-        }
-    }
-}
-
-/// Returns an error if a triangle names a vertex that does not exist.
-pub(crate) fn check_indices(triangles: &[[u32; 3]], vertices: usize) -> Result<(), MeshError> {
-    let outside = |triangle: &[u32; 3]| triangle.iter().copied().find(|&vertex| vertex as usize >= vertices);
-    match triangles.iter().enumerate().find_map(|(n, triangle)| Some((n, outside(triangle)?))) {
-        None => Ok(()),
-        Some((position, vertex)) => {
-            Err(MeshError::VertexIndex { array: "triangles", position, vertex, vertices })
-        }
     }
 }
 

@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3, distance};
 
 use crate::piece::Piece;
 use crate::sever::closest_in_triangle;
-use crate::slit::{Facet, Slit};
+use crate::skin_surface::Facet;
+use crate::slit::Slit;
 use crate::{Cut, MeshError, TetMesh};
 
 /// Largest number of stitches of a wound.

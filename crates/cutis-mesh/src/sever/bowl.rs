@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::blade::{Shape, Station};
 use super::depth::SkinDepth;
 use super::ribbon::Ribbon;
-use crate::slit::Facet;
+use crate::skin_surface::Facet;
 
 /// The surface around a piece of tissue below a closed outline on the skin, down to a depth. The
 /// inside is negative.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::slit::Facet;
+use crate::skin_surface::Facet;
 
 /// Radius over which the skin is averaged, beyond the distance to it, in lattice steps.
 const SPREAD_STEPS: f64 = 2.5;

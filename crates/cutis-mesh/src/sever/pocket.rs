@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::blade::Shape;
 use super::depth::SkinDepth;
 use crate::pocket::distance_to;
-use crate::slit::Facet;
+use crate::skin_surface::Facet;
 
 /// A surface at an even depth below the skin. It cuts what is close enough to a path. Its positive
 /// side is the deeper one.
