@@ -23,9 +23,9 @@ fn impossible_scenes_are_refused_with_file_and_section() {
         (
             "incision",
             "[{ from_mm = [30, 300, 0], to_mm = [30, 300, 50], depth_mm = 20, width_mm = 7 }]",
-            &["`incision`", "from the skin", "300.0"],
+            &["`incision[0]`", "from the skin", "300.0"],
         ),
-        ("incision.0.from_mm", "[1e300, 0, 0]", &["`incision`", "length"]),
+        ("incision.0.from_mm", "[1e300, 0, 0]", &["`incision[0]`", "length"]),
         (
             "handle",
             "[{ at_mm = [0, 0, 500], radius_mm = 1, move_mm = [1, 0, 0] }]",

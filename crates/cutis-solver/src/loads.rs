@@ -12,7 +12,7 @@
 
 use cutis_coloring::{Incidence, Tuples};
 use cutis_constraints::Scalar;
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use crate::batch::VertexChunk;
 use crate::descent::{VertexForce, check_compliances, groups_error};
@@ -41,16 +41,50 @@ impl<T: Scalar> System<T> {
         Ok(())
     }
 
-    /// Returns the force of all constraints and loads on some vertices at the present positions, in
-    /// N.
+    /// Returns the vertices of all constraints that have one of some vertices, in ascending order.
     ///
     /// # Errors
-    /// The errors of [`System::constraint_forces`], and [`SolverError::Vertex`] for a vertex that
-    /// does not exist.
-    pub fn forces_on(&self, wanted: &[u32]) -> Result<Vec<Vector3<T>>, SolverError> {
+    /// [`SolverError::Vertex`] for a vertex that does not exist.
+    pub fn vertices_around(&self, wanted: &[u32]) -> Result<Vec<u32>, SolverError> {
         self.check_vertices(wanted)?;
+        let mut held = vec![false; self.vertices.len()];
+        wanted.iter().for_each(|&vertex| held[vertex as usize] = true);
+        let mut around = held.clone();
+        for kind in &self.kinds {
+            let tuples = kind.indices().chunks_exact(kind.arity());
+            let touching = tuples.filter(|tuple| tuple.iter().any(|&vertex| held[vertex as usize]));
+            touching.flatten().for_each(|&vertex| around[vertex as usize] = true);
+        }
+        Ok((0..).zip(around).filter(|(_, around)| *around).map(|(vertex, _)| vertex).collect())
+    }
+
+    /// Returns the force of all constraints and loads on some vertices, in N. `around` are the
+    /// vertices of [`System::vertices_around`], and `positions` their positions in the caller's
+    /// coordinates (m).
+    ///
+    /// # Errors
+    /// The errors of [`System::constraint_forces`], [`SolverError::Vertex`] for a vertex that does
+    /// not exist, and [`SolverError::VertexLength`] unless there is one position per vertex of
+    /// `around`.
+    pub fn forces_on(
+        &self,
+        wanted: &[u32],
+        around: &[u32],
+        positions: &[Point3<T>],
+    ) -> Result<Vec<Vector3<T>>, SolverError> {
+        self.check_vertices(wanted)?;
+        self.check_vertices(around)?;
+        if around.len() != positions.len() {
+            let (found, expected) = (positions.len(), around.len());
+            return Err(SolverError::VertexLength { what: "positions", found, expected });
+        }
+        let mut vertices = self.vertices.clone();
+        let origin = self.origin().coords;
+        for (&vertex, position) in around.iter().zip(positions) {
+            vertices[vertex as usize].set_position(position - origin);
+        }
         let mut forces = vec![VertexForce::none(); wanted.len()];
-        add_forces(&self.kinds, &self.vertices, wanted, &mut forces)?;
+        add_forces(&self.kinds, &vertices, wanted, &mut forces)?;
         let load = |&vertex: &u32| load_of(&self.loads, vertex as usize);
         Ok(forces.iter().zip(wanted).map(|(force, vertex)| force.force + load(vertex)).collect())
     }

@@ -135,8 +135,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "report: the depth of crossed lips has the wrong sign",
         "crates/cutis/src/run/summary.rs",
-        "            -least\n",
-        "            least\n",
+        "let depth = -wound.final_mm.min(wound.mid_mm);",
+        "let depth = wound.final_mm.min(wound.mid_mm);",
     ),
     mutation(
         Outputs,

@@ -14,7 +14,7 @@ pub fn column(run: &Finished, name: &str) -> Vec<f64> {
 fn columns_are_named_in_order() {
     let head = finished().text("frames.csv").lines().next().unwrap();
     let gapes = "gape_0_mean_mm,gape_0_mid_mm,gape_1_mean_mm,gape_1_mid_mm";
-    assert_eq!(head, format!("frame,time_s,ms,{gapes}"));
+    assert_eq!(head, format!("frame,time_s,ms,{gapes},handle_0_n"));
 }
 
 #[test]

@@ -104,7 +104,7 @@ pub(crate) trait Simulation {
     }
 
     /// Size of the force in N with which each handle holds its vertices against the body; empty
-    /// without handles, or if the formulation knows no forces.
+    /// without handles, without a report, or if the formulation knows no forces.
     fn handle_forces(&mut self) -> Result<Vec<f64>, Error> {
         Ok(Vec::new())
     }

@@ -52,6 +52,9 @@ pub(super) fn draw(
     let frame = &body.mesh.frame;
     let pieces = body.cut.pieces.iter().map(|piece| std::slice::from_ref(piece.axis()));
     let wounds: Vec<&[Slit]> = body.cut.incisions().chain(pieces).collect();
+    // Incisions next to an excision make a flap, which is seen as a whole. Otherwise the first
+    // incision is seen.
+    let flap = wounds.len() > 1 && !body.cut.pieces.is_empty();
     let wound = wounds.first().map(|slits| Wound::of(slits, frame));
     let focus = wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm });
     let [at_rest, now] = [&body.mesh.positions, deformed.positions].map(|p| body.whole_skin(p).0);
@@ -83,7 +86,7 @@ pub(super) fn draw(
     let view = View {
         width: PIXELS,
         height: PIXELS,
-        focus: if wounds.len() > 1 { Some(around(&wounds, frame)) } else { focus },
+        focus: if flap { Some(around(&wounds, frame)) } else { focus },
         depth: Some(&depth),
         threshold_hu: air_below_hu,
         ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))

@@ -137,11 +137,16 @@ impl Simulation for SolverRun<'_> {
 
     fn handle_forces(&mut self) -> Result<Vec<f64>, Error> {
         let ModelInput { scene, body, .. } = self.input;
-        if scene.handle.is_empty() || scene.solver.formulation == Formulation::Pbd {
+        let pbd = scene.solver.formulation == Formulation::Pbd;
+        if scene.handle.is_empty() || pbd || !scene.output.report {
             return Ok(Vec::new());
         }
         let vertices = body.grabbed.concat();
-        let forces = self.solver.solver().system()?.forces_on(&vertices)?;
+        // A GPU sends only the vertices that the forces depend on.
+        let solver = self.solver.solver();
+        let around = solver.simulation().system().vertices_around(&vertices)?;
+        let positions = solver.positions_of(&around)?;
+        let forces = solver.simulation().system().forces_on(&vertices, &around, &positions)?;
         let mut of_vertices = forces.iter();
         let force = |grabbed: &Vec<u32>| {
             let own = of_vertices.by_ref().take(grabbed.len());
