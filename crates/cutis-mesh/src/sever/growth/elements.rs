@@ -105,10 +105,10 @@ impl GrowingTet {
         };
         let all_gone = self.is_all_gone(taken);
         let Some((cut, groups)) = cut else {
-            return if all_gone {
-            } else {
-                add(0, self.corners, 1.0, true)
-            };
+            if !all_gone {
+                add(0, self.corners, 1.0, true);
+            }
+            return;
         };
         for (part, copy) in self.copies.iter().enumerate() {
             let Some((number, nodes)) = copy else { continue };
@@ -184,10 +184,10 @@ impl DividedTriangle {
         };
         let all_gone = tet.is_all_gone(taken);
         let Some((cut, groups)) = cut else {
-            return if all_gone {
-            } else {
-                add(&tet.corners, None, 1.0)
-            };
+            if !all_gone {
+                add(&tet.corners, None, 1.0);
+            }
+            return;
         };
         for (part, copy) in tet.copies.iter().enumerate() {
             let Some((_, nodes)) = copy else { continue };
