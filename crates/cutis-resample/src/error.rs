@@ -52,6 +52,22 @@ pub enum ResampleError {
         /// Largest number of tets.
         limit: usize,
     },
+    /// The list of tets next to walls names a tet that does not exist.
+    #[error("at_walls names tet {tet}, but there are {tets} tets, numbered from 0")]
+    NoSuchTet {
+        /// Index of the tet.
+        tet: u32,
+        /// Number of tets.
+        tets: usize,
+    },
+    /// A resampled volume does not lie on the grid of its input.
+    #[error("the resampled volume has the shape {found:?}: its grid must be that of the input, {expected:?}")]
+    OtherGrid {
+        /// Shape of the input.
+        expected: [usize; 3],
+        /// Shape of the resampled volume.
+        found: [usize; 3],
+    },
     /// The volume is too large for the kernels, which number voxels along an axis in 16 bits.
     #[error("the shape of the volume is {shape:?}: a GPU resamples at most {limit} voxels along each axis")]
     TooLarge {

@@ -12,6 +12,9 @@
 //! * values stay within the range of the input;
 //! * the result has the same bits for any number of threads.
 //!
+//! [`blend_walls`] then gives the voxels that the wall of a wound crosses the mean over the voxel, as
+//! a scanner would, so that walls look smooth.
+//!
 //! With the feature `gpu`, the same rules hold on a GPU: `resample_gpu` resamples through one state
 //! of a mesh, and `ResamplerGpu` through many.
 //!
@@ -44,6 +47,7 @@ mod buckets;
 mod error;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod partial_volume;
 mod raster;
 mod report;
 mod sample;
@@ -54,6 +58,7 @@ mod warp;
 pub use error::ResampleError;
 #[cfg(feature = "gpu")]
 pub use gpu::{GridUniform, ResamplerGpu, ResamplerOptions, Setup, SlabState, resample_gpu};
+pub use partial_volume::blend_walls;
 pub use report::ResampleReport;
 pub use warp::{Warp, resample};
 

@@ -139,14 +139,15 @@ impl<'a> Slab<'a> {
 }
 
 /// The map from deformed to rest voxel indices inside one tet.
-struct RestMap {
+pub struct RestMap {
     corners: [Point3<f64>; 4],
     linear: Matrix3<f64>,
     offset: Vector3<f64>,
 }
 
 impl RestMap {
-    fn new(raster: &TetRaster, corners: [Point3<f64>; 4]) -> Self {
+    /// The map of a tet with these corners at rest.
+    pub fn new(raster: &TetRaster, corners: [Point3<f64>; 4]) -> Self {
         let mut linear = Matrix3::zeros();
         let mut offset = corners[0].coords;
         for c in 1..4 {
@@ -157,8 +158,9 @@ impl RestMap {
         Self { corners, linear, offset }
     }
 
+    /// The rest index of a deformed index.
     #[inline]
-    fn at(&self, index: [f64; 3]) -> [f64; 3] {
+    pub fn at(&self, index: [f64; 3]) -> [f64; 3] {
         (self.linear * Vector3::from(index) + self.offset).into()
     }
 

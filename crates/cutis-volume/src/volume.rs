@@ -45,6 +45,11 @@ impl Volume {
         &self.voxels
     }
 
+    /// Stored values in flat order, index `i` fastest.
+    pub fn into_voxels(self) -> Vec<i16> {
+        self.voxels
+    }
+
     /// Converts a stored value to HU: `slope · stored + intercept`.
     pub fn hu(&self, stored: i16) -> f32 {
         self.slope * f32::from(stored) + self.intercept

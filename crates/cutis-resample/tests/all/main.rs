@@ -5,3 +5,4 @@ mod errors;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod identities;
+mod walls;

@@ -47,7 +47,7 @@ pub(super) fn draw(
     let air_below_hu = scene.tissue.air_below_hu;
     let before = warp.cut_at_rest(ct, stages, progress)?;
     let depth = depth(ct, air_below_hu)?;
-    let depth_after = warp.apply(&depth, stages, progress)?.0;
+    let depth_after = warp.apply_to_centers(&depth, stages, progress)?.0;
 
     let frame = &body.mesh.frame;
     let pieces = body.cut.pieces.iter().map(|piece| std::slice::from_ref(piece.axis()));

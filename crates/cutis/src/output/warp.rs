@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use cutis_mesh::Shell;
 use cutis_mesh::sever::Pieces;
-use cutis_resample::Warp;
+use cutis_resample::{Warp, blend_walls};
 use cutis_volume::Volume;
 use nalgebra::Point3;
 
@@ -22,6 +22,8 @@ pub(crate) struct BodyWarp<'a> {
     rest: Vec<Point3<f32>>,
     deformed: Vec<Point3<f32>>,
     removed: Vec<[u32; 4]>,
+    /// The tets next to the walls of wounds, as indices into `tets`.
+    at_walls: Vec<u32>,
     /// The deformed positions of mesh and shell on the GPU, if the simulation left the positions of
     /// the mesh there.
     on_device: Option<DevicePositions>,
@@ -61,10 +63,18 @@ impl<'a> BodyWarp<'a> {
             followed.iter().copied().chain(points).collect::<Vec<_>>()
         };
         let (at_rest, moved) = (extra(&mesh.positions), extra(deformed));
+        let (divided, whole) = (mesh.tets[mesh.whole_tets()..].as_flattened(), body_tets.len());
+        let tets: Vec<[u32; 4]> = body_tets.into_iter().chain(around).collect();
+        let pieces = tets[mesh.whole_tets()..whole].iter().chain(&tets[whole + shell.tets.len()..]);
+        let mut on_walls = vec![false; mesh.positions.len() + at_rest.len()];
+        divided.iter().chain(pieces.flatten()).for_each(|&v| on_walls[v as usize] = true);
+        let reaches = |tet: u32| tets[tet as usize].iter().any(|&v| on_walls[v as usize]);
+        let at_walls = (0..tets.len() as u32).filter(|&tet| reaches(tet)).collect();
         Ok(Self {
             body,
-            body_tets: body_tets.len(),
-            tets: body_tets.into_iter().chain(around).collect(),
+            body_tets: whole,
+            at_walls,
+            tets,
             rest: [mesh.positions.as_slice(), &at_rest].concat(),
             on_device: on_device.and_then(|positions| stages.append(positions, &moved)),
             deformed: [deformed, &moved].concat(),
@@ -80,11 +90,27 @@ impl<'a> BodyWarp<'a> {
         })
     }
 
-    /// Resamples a volume through the deformation.
+    /// Resamples a volume through the deformation. A voxel that the wall of a wound crosses takes
+    /// the mean over the voxel, as in a scan.
     ///
     /// # Errors
     /// The errors of the resampler.
     pub(crate) fn apply(
+        &self,
+        volume: &Volume,
+        stages: &mut Stages,
+        progress: &dyn Progress,
+    ) -> Result<(Volume, Resample), Error> {
+        let (resampled, report) = self.apply_to_centers(volume, stages, progress)?;
+        let warp = self.warp(&self.deformed, &self.tets, self.body_tets);
+        Ok((blend_walls(volume, &warp, &self.at_walls, resampled)?.0, report))
+    }
+
+    /// Resamples a volume through the deformation. Each voxel takes the value at its center.
+    ///
+    /// # Errors
+    /// The errors of the resampler.
+    pub(crate) fn apply_to_centers(
         &self,
         volume: &Volume,
         stages: &mut Stages,
