@@ -12,8 +12,8 @@
 //! * values stay within the range of the input;
 //! * the result has the same bits for any number of threads.
 //!
-//! [`blend_walls`] then gives the voxels that the wall of a wound crosses the mean over the voxel, as
-//! a scanner would, so that walls look smooth.
+//! [`blend_walls`] then gives the voxels that the wall of a wound crosses the mean over the voxel,
+//! as a scanner would, so that walls look smooth.
 //!
 //! With the feature `gpu`, the same rules hold on a GPU: `resample_gpu` resamples through one state
 //! of a mesh, and `ResamplerGpu` through many.

@@ -33,8 +33,8 @@ const GENERATORS: [usize; 3] = [1, 41, 49];
 ///
 /// # Errors
 /// The errors of [`resample`](crate::resample), [`ResampleError::NoSuchTet`] for an index in
-/// `at_walls` that is out of range, and [`ResampleError::OtherGrid`] if the grids of the two volumes
-/// differ.
+/// `at_walls` that is out of range, and [`ResampleError::OtherGrid`] if the two volumes have
+/// different grids.
 pub fn blend_walls(
     volume: &Volume,
     warp: &Warp<'_>,
