@@ -76,11 +76,17 @@ fn choose(
 pub fn run(workspace: &Workspace) -> Result<()> {
     let checker = require(workspace)?;
     println!("unsafe code is checked by {checker}");
+    let mut passed_before: Vec<&Tests> = Vec::new();
     for file in UNSAFE_FILES {
         let Some(tests) = &file.tests else {
             println!("no check of {}: {}", file.path, file.reason);
             continue;
         };
+        if passed_before.contains(&tests) {
+            println!("{}: the same tests", file.path);
+            continue;
+        }
+        passed_before.push(tests);
         let output = match &checker {
             Checker::Miri { toolchain } => under_miri(workspace, toolchain, tests)?,
             Checker::Valgrind => under_valgrind(workspace, tests)?,

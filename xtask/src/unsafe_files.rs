@@ -11,6 +11,7 @@ pub struct UnsafeFile {
 }
 
 /// Unit tests of one package.
+#[derive(PartialEq)]
 pub struct Tests {
     pub package: &'static str,
     /// The tests whose names contain this text.
@@ -19,12 +20,31 @@ pub struct Tests {
     pub target_features: &'static str,
 }
 
+/// The tests of SIMD lanes.
+const LANES: Option<Tests> =
+    Some(Tests { package: "cutis-constraints", filter: "lanes::", target_features: "+avx2" });
+
 /// `tidy` refuses `unsafe` in every other file.
 pub const UNSAFE_FILES: &[UnsafeFile] = &[
     UnsafeFile {
         path: "crates/cutis-solver/src/colored.rs",
         reason: "threads move the vertices of one color at the same time",
         tests: Some(Tests { package: "cutis-solver", filter: "colored::", target_features: "" }),
+    },
+    UnsafeFile {
+        path: "crates/cutis-constraints/src/lanes/level.rs",
+        reason: "calls functions for vector units that only some processors have",
+        tests: LANES,
+    },
+    UnsafeFile {
+        path: "crates/cutis-constraints/src/lanes/pack.rs",
+        reason: "implements a trait with unsafe methods",
+        tests: LANES,
+    },
+    UnsafeFile {
+        path: "crates/cutis-constraints/src/lanes/x86.rs",
+        reason: "has instructions of vector units that only some processors have",
+        tests: LANES,
     },
     UnsafeFile {
         path: "crates/cutis-chainmail/src/simd.rs",

@@ -16,7 +16,8 @@
 //! | [`LipContact`] | 4 | overlap of the sides of a cut over the length of a severed edge, 1 | [`lip_contact_compliance`], 1/J |
 //!
 //! Each formula is written once and runs as `f32`, as `f64` and in SIMD lanes of both ([`Real`]).
-//! Every lane has the bits of a scalar evaluation. No formula contains an absolute length or an
+//! Every lane has the bits of a scalar evaluation, for any width of the registers
+//! ([`SimdLevel`]). No formula contains an absolute length or an
 //! absolute epsilon, so scaling a body by 1e-3 or 1e3 scales the results. The only limit is the
 //! exponent range of the number type: in `f32`, elements between about 1e-7 m and 1e7 m neither
 //! underflow nor overflow.
@@ -32,10 +33,11 @@
 //! assert!((eval.c - 0.001f64).abs() < 1e-15);
 //! assert_eq!(eval.grad, [-Vector3::x(), Vector3::x()]);
 //! ```
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod constraint;
 mod distance;
+mod lanes;
 mod lip_contact;
 mod material;
 mod real;
@@ -52,12 +54,13 @@ mod volume;
 
 pub use constraint::{Constraint, Eval, Params};
 pub use distance::{Distance, DistanceMaterial};
+pub use lanes::{LaneTask, Lanes, SimdLevel};
 pub use lip_contact::{LipContact, LipContactMaterial};
 pub use material::{
     MaterialError, distance_compliance, lip_contact_compliance, skin_compliance, skin_strip_compliance,
     volume_compliance,
 };
-pub use real::{Real, Scalar};
+pub use real::{Real, Scalar, cross};
 pub use skin_strip::SkinStrip;
 pub use skin_strip_at_rest::SkinStripAtRest;
 pub use skin_strip_turn::SkinStripTurn;

@@ -1,8 +1,10 @@
 //! The number types of a constraint: `f32`, `f64` and SIMD lanes of them.
 
 use bytemuck::Pod;
-use nalgebra::{RealField, SimdRealField};
-use simba::simd::{SimdValue, WideF32x4, WideF64x4};
+use nalgebra::{RealField, SimdRealField, Vector3};
+
+use crate::lanes::{run_f32, run_f64};
+use crate::{LaneTask, SimdLevel};
 
 /// A number, or a vector of SIMD lanes, in which a constraint can be evaluated.
 ///
@@ -17,25 +19,30 @@ pub trait Real: SimdRealField + Copy {
 
 impl<T: SimdRealField + Copy> Real for T {}
 
+/// The cross product `a × b`.
+///
+/// It has the bits of [`Vector3::cross`], but is always inlined. A call would keep the lanes of a
+/// SIMD register in memory.
+#[inline(always)]
+pub fn cross<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+}
+
 /// A single floating-point number: the type of stored positions.
 pub trait Scalar: Real<SimdBool = bool> + RealField + Pod {
     /// Returns the same number as `f64`. The conversion is exact.
     fn to_f64(self) -> f64;
-    /// Several numbers in SIMD lanes. An evaluation in lanes has the bits of one evaluation per
-    /// lane.
-    type Lanes: Real + SimdValue<Element = Self>;
-    /// Lanes that hold `value(0)`, `value(1)`, …
-    fn lanes(value: impl FnMut(usize) -> Self) -> Self::Lanes;
+    /// Runs a task with SIMD lanes of this number type. The result does not depend on the level.
+    fn in_lanes<K: LaneTask<Self>>(level: SimdLevel, task: K);
 }
 
 impl Scalar for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
-    type Lanes = WideF32x4;
-    #[inline(always)]
-    fn lanes(value: impl FnMut(usize) -> Self) -> WideF32x4 {
-        std::array::from_fn::<_, 4, _>(value).into()
+    #[inline]
+    fn in_lanes<K: LaneTask<Self>>(level: SimdLevel, task: K) {
+        run_f32(level, task);
     }
 }
 
@@ -43,9 +50,8 @@ impl Scalar for f64 {
     fn to_f64(self) -> f64 {
         self
     }
-    type Lanes = WideF64x4;
-    #[inline(always)]
-    fn lanes(value: impl FnMut(usize) -> Self) -> WideF64x4 {
-        std::array::from_fn::<_, 4, _>(value).into()
+    #[inline]
+    fn in_lanes<K: LaneTask<Self>>(level: SimdLevel, task: K) {
+        run_f64(level, task);
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::real::cross;
 use crate::{Real, SkinStripMaterial};
 
 /// Weights of a strip on a triangle at rest, and their scale.
@@ -27,7 +28,7 @@ impl<T: Real> Weights<T> {
         let [w1, w2, w3] = [x3 - x2, x1 - x3, x2 - x1].map(|edge| across.dot(&edge));
         let width = w1.simd_abs().simd_max(w2.simd_abs()).simd_max(w3.simd_abs());
         let inverse = (T::one() / width).select(width.simd_gt(T::zero()), T::zero());
-        let area_vector = (x2 - x1).cross(&(x3 - x1));
+        let area_vector = cross(&(x2 - x1), &(x3 - x1));
         let least = length(&area_vector) * T::constant(SkinStripMaterial::LEAST_FACING);
         let seen = normal.dot(&area_vector);
         let (faces, twice_area) = (seen.simd_ge(least), seen.simd_max(least));

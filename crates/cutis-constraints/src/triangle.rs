@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::Real;
+use crate::real::cross;
 
 /// Sine of the angle at the first vertex, in units of the machine epsilon, below which the normal
 /// of a triangle is rounding noise.
@@ -10,7 +11,7 @@ const NOISE: f64 = 8.0;
 
 /// Returns the area (m²) of the triangle `x`.
 pub(crate) fn area<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> T {
-    let n = (x2 - x1).cross(&(x3 - x1));
+    let n = cross(&(x2 - x1), &(x3 - x1));
     n.dot(&n).simd_sqrt() * T::constant(0.5)
 }
 
@@ -24,15 +25,15 @@ pub(crate) fn area<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> T {
 #[inline(always)]
 pub(crate) fn area_and_gradient<T: Real>([x1, x2, x3]: &[Point3<T>; 3]) -> (T, [Vector3<T>; 3]) {
     let (e2, e3) = (x2 - x1, x3 - x1);
-    let n = e2.cross(&e3);
+    let n = cross(&e2, &e3);
     let n_squared = n.dot(&n);
     let n_length = n_squared.simd_sqrt();
     let half = T::constant(0.5);
     let noise = T::constant(NOISE) * T::simd_default_epsilon();
     let noise_squared = noise * noise * e2.dot(&e2) * e3.dot(&e3);
     let half_normal = n * (half / n_length).select(n_squared.simd_gt(noise_squared), T::zero());
-    let grad2 = e3.cross(&half_normal);
-    let grad3 = half_normal.cross(&e2);
+    let grad2 = cross(&e3, &half_normal);
+    let grad3 = cross(&half_normal, &e2);
     (n_length * half, [-(grad2 + grad3), grad2, grad3])
 }
 

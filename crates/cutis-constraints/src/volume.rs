@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, SimdBool, Vector3};
 
+use crate::real::cross;
 use crate::{Constraint, Eval, Real};
 
 /// A constraint that keeps the signed volume of a tetrahedron.
@@ -47,9 +48,9 @@ impl Default for VolumeMaterial {
 fn volume_and_gradient<T: Real>([x1, x2, x3, x4]: &[Point3<T>; 4]) -> (T, [Vector3<T>; 4]) {
     let (a, b, c) = (x2 - x1, x3 - x1, x4 - x1);
     let sixth = T::constant(1.0 / 6.0);
-    let grad2 = b.cross(&c) * sixth;
-    let grad3 = c.cross(&a) * sixth;
-    let grad4 = a.cross(&b) * sixth;
+    let grad2 = cross(&b, &c) * sixth;
+    let grad3 = cross(&c, &a) * sixth;
+    let grad4 = cross(&a, &b) * sixth;
     (a.dot(&grad2), [-(grad2 + grad3 + grad4), grad2, grad3, grad4])
 }
 

@@ -1,5 +1,5 @@
 //! Time of one sweep over all edges and over all tetrahedra of a Kuhn lattice, as constraints per
-//! second.
+//! second, for each number of SIMD lanes that the processor has.
 //!
 //! Run `cargo bench -p cutis-solver-cpu`. With `CUTIS_BENCH_LARGE=1` the lattice has 129×129×76
 //! vertices instead of 65×65×38. The time of a frame includes one sweep and the two passes over the
@@ -8,7 +8,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use cutis_coloring::Groups;
-use cutis_constraints::{Distance, Volume};
+use cutis_constraints::{Distance, SimdLevel, Volume};
 use cutis_solver::{Formulation, Settings, Solver, Stiffness, System, SystemBuilder};
 use cutis_solver_cpu::SolverCpu;
 use cutis_test_kit::Kuhn;
@@ -63,11 +63,14 @@ fn sweeps(criterion: &mut Criterion) {
                 damping_per_s: 0.0,
                 relaxation: 1.0,
             };
-            let mut solver =
-                SolverCpu::new(system(&lattice), settings, Some(threads)).expect("a valid system");
-            group.bench_function(BenchmarkId::new("threads", threads), |bencher| {
-                bencher.iter(|| solver.step(1).expect("finite"));
-            });
+            for level in SimdLevel::available() {
+                let solver = SolverCpu::new(system(&lattice), settings, Some(threads));
+                let mut solver = solver.expect("a valid system").with_level(level);
+                let name = format!("{} lanes, threads", level.lanes());
+                group.bench_function(BenchmarkId::new(name, threads), |bencher| {
+                    bencher.iter(|| solver.step(1).expect("finite"));
+                });
+            }
         }
         group.finish();
     }
@@ -87,10 +90,14 @@ fn descent(criterion: &mut Criterion) {
             gravity_m_s2: [0.0, -9.81, 0.0],
             ..Settings::default()
         };
-        let mut solver = SolverCpu::new(both(&lattice), settings, Some(threads)).expect("a valid system");
-        group.bench_function(BenchmarkId::new("threads", threads), |bencher| {
-            bencher.iter(|| solver.step(1).expect("finite"));
-        });
+        for level in SimdLevel::available() {
+            let solver = SolverCpu::new(both(&lattice), settings, Some(threads));
+            let mut solver = solver.expect("a valid system").with_level(level);
+            let name = format!("{} lanes, threads", level.lanes());
+            group.bench_function(BenchmarkId::new(name, threads), |bencher| {
+                bencher.iter(|| solver.step(1).expect("finite"));
+            });
+        }
     }
     group.finish();
 }

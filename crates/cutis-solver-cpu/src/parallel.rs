@@ -1,6 +1,6 @@
 //! Distribution of passes over threads.
 
-use cutis_constraints::Scalar;
+use cutis_constraints::{Scalar, SimdLevel};
 use cutis_solver::{Colored, ColoredVertices, ConstraintColor, Execute, Vertex, VertexBlock, VertexColor};
 use rayon::prelude::*;
 
@@ -10,6 +10,7 @@ const BLOCK: usize = 8192;
 /// Executes passes on the threads of the current pool, or on the calling thread if `threads` is 1.
 pub(crate) struct Parallel {
     pub(crate) threads: usize,
+    pub(crate) level: SimdLevel,
 }
 
 impl<T: Scalar> Execute<T> for Parallel {
@@ -18,12 +19,12 @@ impl<T: Scalar> Execute<T> for Parallel {
     }
 
     fn project(&self, color: ConstraintColor<'_, T>) {
-        let color = Colored::new(color);
+        let color = Colored::new(color, self.level);
         fan_out(self.threads.min(color.chunks()), &|| while color.project_next_chunk() {});
     }
 
     fn descend(&self, color: VertexColor<'_, T>) {
-        let color = ColoredVertices::new(color);
+        let color = ColoredVertices::new(color, self.level);
         fan_out(self.threads.min(color.chunks()), &|| while color.move_next_chunk() {});
     }
 

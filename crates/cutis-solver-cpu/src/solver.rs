@@ -1,6 +1,6 @@
 //! The solver of this backend: a simulation and, for more than one thread, a thread pool.
 
-use cutis_constraints::Scalar;
+use cutis_constraints::{Scalar, SimdLevel};
 use cutis_solver::{Change, Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed};
 use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -15,6 +15,7 @@ const MAX_THREADS: usize = 1024;
 pub struct SolverCpu<T: Scalar> {
     simulation: Simulation<T>,
     threads: usize,
+    level: SimdLevel,
     pool: Option<ThreadPool>,
 }
 
@@ -37,7 +38,13 @@ impl<T: Scalar> SolverCpu<T> {
             1 => None,
             _ => Some(pool(threads)?),
         };
-        Ok(Self { simulation, threads, pool })
+        Ok(Self { simulation, threads, level: SimdLevel::best(), pool })
+    }
+
+    /// Uses the SIMD lanes of `level` in place of the widest ones. The results are the same.
+    pub fn with_level(mut self, level: SimdLevel) -> Self {
+        self.level = level;
+        self
     }
 
     /// Returns the number of threads.
@@ -51,8 +58,8 @@ impl<T: Scalar> SolverCpu<T> {
         frames: usize,
         wrap: impl FnOnce(Parallel) -> E + Send,
     ) -> Result<(), SolverError> {
-        let (simulation, threads) = (&mut self.simulation, self.threads);
-        let run = || simulation.run(frames, &wrap(Parallel { threads }));
+        let (simulation, threads, level) = (&mut self.simulation, self.threads, self.level);
+        let run = || simulation.run(frames, &wrap(Parallel { threads, level }));
         match &self.pool {
             Some(pool) => pool.install(run),
             None => run(),

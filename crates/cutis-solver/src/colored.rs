@@ -19,7 +19,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use cutis_constraints::Scalar;
+use cutis_constraints::{Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
 use crate::batch::{ConstraintChunk, Load, Store, VertexChunk};
@@ -44,7 +44,7 @@ const CHUNK: usize = if cfg!(miri) { 8 } else { 1024 };
 /// let (vertices, kinds) = system.projection_parts();
 /// let (set, step) = (&*kinds[0], Step::Pbd);
 /// let color = ConstraintColor { set, color: 0, vertices, step, multipliers: &mut [] };
-/// let color = Colored::new(color);
+/// let color = Colored::new(color, cutis_constraints::SimdLevel::best());
 /// std::thread::scope(|scope| {
 ///     for _ in 0..2 {
 ///         scope.spawn(|| while color.project_next_chunk() {});
@@ -54,6 +54,7 @@ const CHUNK: usize = if cfg!(miri) { 8 } else { 1024 };
 /// ```
 pub struct Colored<'a, T: Scalar> {
     set: &'a dyn ConstraintSet<T>,
+    level: SimdLevel,
     range: Range<usize>,
     step: Step<T>,
     next: AtomicUsize,
@@ -68,12 +69,12 @@ pub struct Colored<'a, T: Scalar> {
 unsafe impl<T: Scalar> Sync for Colored<'_, T> {}
 
 impl<'a, T: Scalar> Colored<'a, T> {
-    /// Prepares a color for several threads.
+    /// Prepares a color for several threads, with the SIMD lanes of `level`.
     ///
     /// # Panics
     /// Panics if the set was built for more vertices than given, or if there are multipliers but
     /// not one per constraint of the set.
-    pub fn new(color: ConstraintColor<'a, T>) -> Self {
+    pub fn new(color: ConstraintColor<'a, T>, level: SimdLevel) -> Self {
         let ConstraintColor { set, color, vertices, step, multipliers } = color;
         assert!(set.vertex_count() <= vertices.len(), "the set refers to vertices that do not exist");
         let keeps_multipliers = !multipliers.is_empty();
@@ -83,6 +84,7 @@ impl<'a, T: Scalar> Colored<'a, T> {
         );
         Self {
             set,
+            level,
             range: set.range(color),
             step,
             next: AtomicUsize::new(0),
@@ -104,7 +106,8 @@ impl<'a, T: Scalar> Colored<'a, T> {
             &mut []
         };
         let vertices = SharedVertices { vertices: self.vertices, borrow: PhantomData };
-        self.set.project_shared(ConstraintChunk { range, vertices, step: self.step, multipliers });
+        let chunk = ConstraintChunk { range, vertices, step: self.step, multipliers };
+        self.set.project_shared(self.level, chunk);
         true
     }
 
@@ -120,6 +123,7 @@ const VERTEX_CHUNK: usize = if cfg!(miri) { 2 } else { 128 };
 /// One color of vertices, shared between the threads that move them.
 pub struct ColoredVertices<'a, T: Scalar> {
     kinds: &'a [Kind<T>],
+    level: SimdLevel,
     descent: &'a Descent<T>,
     range: Range<usize>,
     next: AtomicUsize,
@@ -134,12 +138,13 @@ pub struct ColoredVertices<'a, T: Scalar> {
 unsafe impl<T: Scalar> Sync for ColoredVertices<'_, T> {}
 
 impl<'a, T: Scalar> ColoredVertices<'a, T> {
-    /// Prepares a color for several threads.
-    pub fn new(color: VertexColor<'a, T>) -> Self {
+    /// Prepares a color for several threads, with the SIMD lanes of `level`.
+    pub fn new(color: VertexColor<'a, T>, level: SimdLevel) -> Self {
         let VertexColor { system, descent, pass } = color;
         let System { vertices, previous, velocities, loads, kinds, .. } = system;
         Self {
             kinds,
+            level,
             descent,
             range: pass.start..pass.end,
             next: AtomicUsize::new(0),
@@ -159,7 +164,8 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
         let forces = &mut forces[..indices.len()];
         let shared = || SharedVertices { vertices: self.vertices, borrow: PhantomData };
         for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
-            kind.vertex_forces_shared(VertexChunk { incidence, indices, vertices: shared(), forces });
+            let chunk = VertexChunk { incidence, indices, vertices: shared(), forces };
+            kind.vertex_forces_shared(self.level, chunk);
         }
         let mut vertices = shared();
         for (&index, force) in indices.iter().zip(forces) {

@@ -3,6 +3,8 @@
 use cutis_constraints::{Constraint, Real};
 use nalgebra::{Point3, Vector3, convert};
 
+use crate::Step;
+
 /// A formula for the multiplier of a constraint's gradients.
 pub trait Rule<T: Real>: Copy + Send + Sync {
     /// Returns `Δλ` for the value `c`, the weighted square of the gradients `Σ w|∇C|²`, the
@@ -35,6 +37,19 @@ impl<T: Real> Rule<T> for Xpbd<T> {
     fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T {
         let compliance = stiffness * self.inverse_h_squared;
         quotient_or_zero(-c - compliance * multiplier, weighted_square + compliance)
+    }
+}
+
+/// Chooses the formula at run time, so that the loops over constraints are compiled once for both.
+impl<T: Real> Rule<T> for Step<T> {
+    #[inline(always)]
+    fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T {
+        match self {
+            Self::Pbd => Pbd.multiplier(c, weighted_square, stiffness, multiplier),
+            Self::Xpbd { inverse_h_squared } => {
+                Xpbd { inverse_h_squared }.multiplier(c, weighted_square, stiffness, multiplier)
+            }
+        }
     }
 }
 

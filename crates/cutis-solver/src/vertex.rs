@@ -28,10 +28,16 @@ impl<T: Scalar> Vertex<T> {
         self.0[3]
     }
 
-    /// Returns x, y, z or the inverse mass.
+    /// Returns x, y, z and the inverse mass.
     #[inline(always)]
-    pub(crate) fn component(&self, index: usize) -> T {
-        self.0[index]
+    pub(crate) fn components(self) -> [T; 4] {
+        self.0
+    }
+
+    /// Returns a vertex from x, y, z and the inverse mass.
+    #[inline(always)]
+    pub(crate) fn from_components(components: [T; 4]) -> Self {
+        Self(components)
     }
 
     pub(crate) fn to_f64(self) -> Vertex<f64> {

@@ -1,11 +1,11 @@
 //! Skin strips in the scan: forces, modulus, and zeros without rounding.
 
 use cutis_constraints::{
-    Constraint, Eval, Params, Scalar, SkinStrip, SkinStripAtRest, SkinStripLaw, SkinStripMaterial,
-    SkinStripTurn,
+    Constraint, Eval, LaneTask, Lanes, Params, Scalar, SimdLevel, SkinStrip, SkinStripAtRest, SkinStripLaw,
+    SkinStripMaterial, SkinStripTurn,
 };
 use cutis_test_kit::Random;
-use nalgebra::{Matrix2, Point3, SimdValue, Vector2, Vector3};
+use nalgebra::{Matrix2, Point3, SimdBool, Vector2, Vector3};
 use proptest::prelude::*;
 
 use crate::shapes::SCALES;
@@ -204,6 +204,21 @@ fn stiffening_does_not_depend_on_the_slope() {
     }
 }
 
+/// Counts the lanes in which a constraint is not zero.
+struct NotZero<'a, C: Constraint<3>, T: Scalar> {
+    x: &'a [Point3<T>; 3],
+    params: &'a C::Params<T>,
+    found: &'a mut usize,
+}
+
+impl<C: Constraint<3>, T: Scalar> LaneTask<T> for NotZero<'_, C, T> {
+    fn run<L: Lanes<T>>(self) {
+        let x = self.x.map(|p| p.map(L::splat));
+        let params = Params::from_fn(|k| L::splat(self.params.as_ref()[k]));
+        *self.found += usize::from(C::eval(&x, &params).c.simd_ne(L::zero()).any());
+    }
+}
+
 /// Number of values that are not zero in the scan, of `rounds` random triangles, in scalar code and
 /// in a lane. `params` gives the parameters.
 fn not_zero<C, T: Scalar>(
@@ -223,12 +238,10 @@ where
         let law = SkinStripLaw { tension_n_per_m: 49.0 * random.uniform(), stiffening: 3.0, ..LAW };
         let material = SkinStripMaterial::new(random.vector().into(), random.vector().into(), law).unwrap();
         let params = params(&x, &material);
-        let scalar = C::eval(&x, &params);
-        let in_lanes = C::eval(
-            &x.map(|p| p.map(|v| T::lanes(|_| v))),
-            &Params::from_fn(|k| T::lanes(|_| params.as_ref()[k])),
-        );
-        found += usize::from(scalar.c != T::zero()) + usize::from(in_lanes.c.extract(1) != T::zero());
+        found += usize::from(C::eval(&x, &params).c != T::zero());
+        for level in SimdLevel::available() {
+            T::in_lanes(level, NotZero::<C, T> { x: &x, params: &params, found: &mut found });
+        }
     }
     found
 }

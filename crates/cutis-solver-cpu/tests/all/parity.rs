@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use cutis_coloring::greedy;
-use cutis_constraints::{Distance, Scalar, SkinTension, SkinTensionMaterial, Volume};
+use cutis_constraints::{Distance, Scalar, SimdLevel, SkinTension, SkinTensionMaterial, Volume};
 use cutis_solver::{
     Formulation, Handle, Settings, Solver, SolverError, SolverReference, StepProfile, Stiffness, System,
     SystemBuilder, Values,
@@ -82,9 +82,13 @@ fn bits<T: Scalar>(mut solver: impl Solver<T>, calls: &[usize]) -> Vec<u64> {
 fn parity<T: Scalar>(formulation: Formulation, iterations: u32) {
     let settings = settings(formulation, iterations);
     let reference = bits(SolverReference::new(body::<T>(formulation), settings).unwrap(), &[3]);
-    for threads in [1, 2, 3, 8] {
-        let solver = SolverCpu::new(body::<T>(formulation), settings, Some(threads)).unwrap();
-        assert!(bits(solver, &[1, 2]) == reference, "{threads} threads, {formulation:?}");
+    for level in SimdLevel::available() {
+        let threads: &[usize] = if level == SimdLevel::best() { &[1, 2, 3, 8] } else { &[2] };
+        for &threads in threads {
+            let solver = SolverCpu::new(body::<T>(formulation), settings, Some(threads)).unwrap();
+            let found = bits(solver.with_level(level), &[1, 2]);
+            assert!(found == reference, "{threads} threads, {level:?}, {formulation:?}");
+        }
     }
     // Control: another number of iterations gives other bits.
     let other = Settings { iterations: iterations + 1, ..settings };
@@ -92,7 +96,7 @@ fn parity<T: Scalar>(formulation: Formulation, iterations: u32) {
 }
 
 #[test]
-fn results_equal_the_reference_for_any_number_of_threads() {
+fn results_equal_the_reference_for_any_number_of_threads_and_lanes() {
     parity::<f32>(Formulation::Pbd, 2);
     parity::<f32>(Formulation::Xpbd, 1);
     parity::<f32>(Formulation::Xpbd, 3);

@@ -10,7 +10,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use cutis_coloring::{Groups, Incidence};
-use cutis_constraints::{Constraint, Scalar};
+use cutis_constraints::{Constraint, Scalar, SimdLevel};
 use nalgebra::Point3;
 
 use crate::colored::SharedVertices;
@@ -18,8 +18,8 @@ use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
 
 pub use access::{Load, Store};
 
-/// Upper bound of the number of SIMD lanes over all number types.
-const MAX_LANES: usize = 4;
+/// Upper bound of the number of SIMD lanes over all levels and number types.
+const MAX_LANES: usize = 16;
 
 /// A range of constraints of one kind, to be projected with the vertices `V`.
 pub struct ConstraintChunk<'a, T, V> {
@@ -52,12 +52,12 @@ pub trait Project<T: Scalar> {
     fn project(&self, chunk: ConstraintChunk<'_, T, &mut [Vertex<T>]>);
     /// Projects with SIMD lanes while other threads project other constraints. No two constraints
     /// that are projected at the same time may share a vertex.
-    fn project_shared(&self, chunk: ConstraintChunk<'_, T, SharedVertices<'_, T>>);
+    fn project_shared(&self, level: SimdLevel, chunk: ConstraintChunk<'_, T, SharedVertices<'_, T>>);
     /// Adds the forces of this kind on each vertex, one vertex after the other.
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>);
     /// Adds the forces with SIMD lanes while other threads move other vertices. No thread may
     /// move a vertex that shares a constraint with a vertex of this chunk.
-    fn vertex_forces_shared(&self, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>);
+    fn vertex_forces_shared(&self, level: SimdLevel, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>);
     /// Returns the number of vertices for which the indices were checked.
     fn vertex_count(&self) -> usize;
 }

@@ -52,7 +52,7 @@ fn swept(each: bool, keeps_multipliers: bool, run: impl Fn(ConstraintColor<'_, f
         }
         kept.push(multipliers);
     }
-    kept.push(vertices.iter().flat_map(|vertex| (0..4).map(|n| vertex.component(n))).collect());
+    kept.push(vertices.iter().flat_map(|vertex| vertex.components()).collect());
     kept
 }
 
@@ -62,7 +62,7 @@ fn shared_constraints_have_the_bits_of_serial_ones() {
         let serial = swept(each, keeps_multipliers, |color| color.project());
         for threads in [1, 2] {
             let shared = swept(each, keeps_multipliers, |color| {
-                let color = Colored::new(color);
+                let color = Colored::new(color, SimdLevel::best());
                 on_threads(threads, &|| while color.project_next_chunk() {});
                 assert!(!color.project_next_chunk(), "no chunk is left");
             });
@@ -90,7 +90,7 @@ fn shared_vertices_have_the_bits_of_serial_ones() {
         assert_ne!(serial, system(each).vertices, "the sweep moves vertices");
         for threads in [1, 2] {
             let shared = descended(each, |color| {
-                let color = ColoredVertices::new(color);
+                let color = ColoredVertices::new(color, SimdLevel::best());
                 on_threads(threads, &|| while color.move_next_chunk() {});
             });
             assert_eq!(shared, serial, "{threads} threads");
@@ -121,7 +121,7 @@ fn threads_take_each_chunk_once() {
     };
     let serial = run(&|color| color.project());
     let shared = run(&|color| {
-        let color = Colored::new(color);
+        let color = Colored::new(color, SimdLevel::best());
         assert_eq!(color.chunks(), 3);
         on_threads(2, &|| while color.project_next_chunk() {});
     });
@@ -135,7 +135,10 @@ fn a_set_for_more_vertices_is_rejected() {
     let mut system = system(false);
     let (vertices, kinds) = system.projection_parts();
     let (vertices, step) = (&mut vertices[..7], Step::Pbd);
-    Colored::new(ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers: &mut [] });
+    Colored::new(
+        ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers: &mut [] },
+        SimdLevel::best(),
+    );
 }
 
 #[test]
@@ -144,5 +147,8 @@ fn too_few_multipliers_are_rejected() {
     let mut system = system(false);
     let (vertices, kinds) = system.projection_parts();
     let (multipliers, step) = (&mut [0.0; 6][..], Step::Pbd);
-    Colored::new(ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers });
+    Colored::new(
+        ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers },
+        SimdLevel::best(),
+    );
 }
