@@ -9,9 +9,9 @@ use crate::checks::degenerate_cases;
 use crate::measure::numbers;
 use crate::{Case, Report, Subject};
 
-/// Samples evaluated in SIMD lanes, in `f32` with every SIMD level and in `f64`, have the same bits in each lane as in
-/// scalar code. Some of the samples are degenerate. The CPU backend relies on this equality.
-/// Control: the next lane must differ.
+/// Samples evaluated in SIMD lanes, in `f32` with every SIMD level and in `f64`, have the same bits
+/// in each lane as in scalar code. Some of the samples are degenerate. The CPU backend relies on
+/// this equality. Control: the next lane must differ.
 pub fn lanes<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Report {
     let mut report = Report::new(C::NAME, "lanes");
     // Interleave the samples, so that lanes differ in scale and mix regular with degenerate shapes.

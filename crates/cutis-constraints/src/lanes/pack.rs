@@ -1,9 +1,8 @@
 //! Lanes of `f32` in one vector register, with the traits of a number.
 //!
-//! A [`Register`] knows the operations of an instruction set. Everything else is the same for all of
-//! them and is written once here. Operations that constraints rarely use run lane by lane. The unsafe
-//! methods are those of a trait, and do what their safe twins do.
-
+//! A [`Register`] knows the operations of an instruction set. Everything else is the same for all
+//! of them and is written once here. Operations that constraints rarely use run lane by lane. The
+//! unsafe methods are those of a trait, and do what their safe twins do.
 #![allow(unsafe_code)]
 
 use std::fmt::{self, Debug};

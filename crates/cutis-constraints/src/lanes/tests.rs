@@ -1,5 +1,5 @@
-//! These tests are small enough for Miri: `cargo miri test -p cutis-constraints --lib lanes::`. Miri
-//! has only the instruction sets that the compiler enables.
+//! These tests are small enough for Miri: `cargo miri test -p cutis-constraints --lib lanes::`.
+//! Miri has only the instruction sets that the compiler enables.
 
 use simba::simd::SimdBool;
 
