@@ -134,7 +134,8 @@ impl<C: Constraint<N>, const N: usize> Elements<C, N>
 where
     C::Material: Default,
 {
-    fn new(
+    /// Elements with default materials and a compliance each.
+    pub fn new(
         scan: &[Point3<f64>],
         vertices: Vec<[u32; N]>,
         compliance: impl Fn([Point3<f64>; N], usize) -> Result<f64, Failure>,

@@ -1,8 +1,12 @@
 //! The scan at rest: ways to hold the tension of the skin in XPBD, compared by error against time,
-//! and how far from the wound the skin of scans moves.
+//! how far the skin moves over a layer of fat, against solutions of plane strain, and how far from
+//! the wound the skin of scans moves.
 
 pub(crate) mod block;
+mod far_field;
+mod layer;
 mod scans;
+mod slab;
 mod ways;
 
 use std::io::Write;
@@ -15,7 +19,11 @@ use cutis_solver::{Stiffness, SystemBuilder, Values};
 use nalgebra::{Point3, Vector3};
 
 use block::{Block, Elements, SIZE};
+use far_field::FarField;
+pub use far_field::{DECAY_TOLERANCE, ELEMENT_ROWS, PROFILE_TOLERANCE, ROWS, Skin, fat, thin};
+pub use layer::Layer;
 use scans::Scans;
+pub use slab::Slab;
 use ways::{Setting, Way};
 
 use crate::kit::{Checks, Failure, Page, Provenance, Table, results};
@@ -34,8 +42,18 @@ pub struct Options {
 }
 
 /// Tables of the page.
-pub const TABLES: [&str; 8] =
-    ["provenance", "uncut", "cut", "checks", "scans-provenance", "scans", "directions", "scans-checks"];
+pub const TABLES: [&str; 10] = [
+    "provenance",
+    "uncut",
+    "cut",
+    "far-field",
+    "decay",
+    "checks",
+    "scans-provenance",
+    "scans",
+    "directions",
+    "scans-checks",
+];
 /// Settings of the runs.
 const SETTINGS: [Setting; 8] = [[1, 1], [2, 1], [5, 1], [10, 1], [20, 1], [40, 1], [5, 4], [10, 4]];
 /// Index of the setting with the most substeps.
@@ -64,12 +82,18 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let mut checks = Checks::default();
     let uncut = uncut(&mut checks)?;
     let cut = cut(&mut checks)?;
-    writeln!(out, "{}\n{}", uncut.markdown(), cut.markdown())?;
+    let far_field = FarField::measure()?;
+    let [uncut, cut, far, decay] =
+        [uncut, cut, far_field.profile, far_field.decay].map(|table| table.markdown());
+    checks.append(far_field.checks);
+    writeln!(out, "{uncut}\n{cut}\n{far}\n{decay}")?;
     checks.print(out)?;
     if let Some(mut page) = page.filter(|_| checks.pass()) {
         page.set("provenance", &provenance.markdown())?;
-        page.set("uncut", &uncut.markdown())?;
-        page.set("cut", &cut.markdown())?;
+        page.set("uncut", &uncut)?;
+        page.set("cut", &cut)?;
+        page.set("far-field", &far)?;
+        page.set("decay", &decay)?;
         page.set("checks", &checks.summary())?;
         page.save(&results())?;
     }
