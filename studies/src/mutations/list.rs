@@ -18,9 +18,9 @@ pub struct Mutation {
 /// A suite of tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suite {
-    /// The battery of the four constraint types.
+    /// The battery of the constraint types.
     Conformance,
-    /// The GPU solver against the reference.
+    /// The CPU and GPU backends against the reference.
     Solver,
     /// Resampling on a GPU against its CPU twin and against `f64`.
     Resample,
@@ -63,7 +63,7 @@ impl Suite {
     pub fn arguments(self) -> &'static [&'static str] {
         match self {
             Self::Conformance => &["-p", "cutis-conformance", "--test", "all", "builtin"],
-            Self::Solver => &["-p", "cutis-solver-gpu", "--test", "all"],
+            Self::Solver => &["-p", "cutis-solver-gpu", "-p", "cutis-solver-cpu", "--test", "all"],
             Self::Resample => &["-p", "cutis-resample", "--features", "gpu", "--test", "all", "gpu::"],
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],
             Self::Stability => &["-p", "cutis-tests", "--test", "all", "stability::"],
@@ -185,6 +185,20 @@ pub const MUTATIONS: &[Mutation] = &[
         "amplified < p.max_amplification",
         "amplified > p.max_amplification",
     ),
+    mutation(
+        Conformance,
+        "skin strip, WGSL: the slope of the stiffening is left out",
+        "shaders/wgsl/constraints/skin_strip.wgsl",
+        "1.0 + (0.5 * growth) * ratio",
+        "1.0",
+    ),
+    mutation(
+        Conformance,
+        "skin strip at rest, WGSL: a slack strip has the wrong sign",
+        "shaders/wgsl/constraints/skin_strip_at_rest.wgsl",
+        "select(e, -1.0, slack)",
+        "select(e, 1.0, slack)",
+    ),
     // Constraints in Rust.
     mutation(
         Conformance,
@@ -213,6 +227,20 @@ pub const MUTATIONS: &[Mutation] = &[
         "crates/cutis-constraints/src/skin_tension_paper.rs",
         "amplified.simd_lt(most)",
         "amplified.simd_gt(most)",
+    ),
+    mutation(
+        Conformance,
+        "skin strips, Rust: sign of the third weight",
+        "crates/cutis-constraints/src/strip.rs",
+        "of_image * -(b1 + b2)",
+        "of_image * (b1 + b2)",
+    ),
+    mutation(
+        Conformance,
+        "turn of a skin strip, Rust: the 2 below the root is missing",
+        "crates/cutis-constraints/src/skin_strip_turn.rs",
+        "(two * stretch * eta)",
+        "(stretch * eta)",
     ),
     // Projection.
     mutation(
@@ -256,6 +284,34 @@ pub const MUTATIONS: &[Mutation] = &[
         "shaders/wgsl/solver/stiffness_each.wgsl",
         "return stiffness[k];",
         "return stiffness[0];",
+    ),
+    mutation(
+        Solver,
+        "vertex block descent, WGSL: every constraint has the stiffness of the first",
+        "shaders/wgsl/solver/vertex_force.wgsl",
+        "let stiffness = shape[k].x;",
+        "let stiffness = shape[0].x;",
+    ),
+    mutation(
+        Solver,
+        "projection, Rust, one at a time: every color has the stiffness of the first",
+        "crates/cutis-solver/src/batch/project.rs",
+        "stiffness.at(start + k)",
+        "stiffness.at(k)",
+    ),
+    mutation(
+        Solver,
+        "projection, Rust, in lanes: every lane has the stiffness of the first",
+        "crates/cutis-solver/src/batch/project.rs",
+        "values[first + lane]",
+        "values[first]",
+    ),
+    mutation(
+        Solver,
+        "vertex block descent, Rust, in lanes: every lane has the stiffness of the first",
+        "crates/cutis-solver/src/batch/vertex_force.rs",
+        "values[constraint[lane]]",
+        "values[constraint[0]]",
     ),
     mutation(
         Solver,

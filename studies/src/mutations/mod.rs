@@ -74,7 +74,13 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         for mutation in chosen.iter().filter(|mutation| mutation.suite == suite) {
             let failed = copy.with(mutation, || copy.failing_tests(suite))?;
             tried += 1;
-            writeln!(out, "{tried}/{} {}: {} tests failed", chosen.len(), mutation.fault, failed.len())?;
+            let [number, count] = [chosen.len(), failed.len()];
+            writeln!(
+                out,
+                "{tried}/{number} {}: {count} tests failed: {}",
+                mutation.fault,
+                failed.join(", ")
+            )?;
             match failed.first() {
                 None => unnoticed.push(mutation.fault),
                 Some(first) => table.add([
