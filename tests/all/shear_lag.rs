@@ -12,8 +12,8 @@ fn relative(found: f64, wanted: f64) -> f64 {
     (found / wanted - 1.0).abs()
 }
 
-/// The closed form is that of a layer without thickness. Its error must fall with the thickness over
-/// the length of shear lag.
+/// The closed form is that of a layer without thickness. Its error must fall with the thickness
+/// over the length of shear lag.
 #[test]
 fn the_skin_of_a_thin_layer_follows_shear_lag() {
     let error = |layer: Layer| Skin::of_lattice(layer, 4).unwrap().difference(|s| layer.lag(s));

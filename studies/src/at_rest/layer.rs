@@ -35,8 +35,8 @@ impl Layer {
         2.0 * self.shear_modulus * self.poisson / (1.0 - 2.0 * self.poisson)
     }
 
-    /// The length in m over which the displacement far from the cut falls by the factor `e`, for any
-    /// thickness.
+    /// The length in m over which the displacement far from the cut falls by the factor `e`, for
+    /// any thickness.
     ///
     /// With the height `z` above the ground and `θ = κ z`, the fields `e^(−κ x) (U(θ), W(θ))` with
     ///

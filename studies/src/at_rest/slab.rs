@@ -19,9 +19,9 @@ use crate::kit::Failure;
 /// cut. They are so long that they do not resist a motion in the plane across the cut.
 const GUIDE: (f64, f64) = (10.0, 1e6);
 
-/// The slab on one side of the cut. Its lattice is `five`, one cell wide, with `x` the distance from
-/// the cut. Both sides are mirror planes of the lattice, so that the slab deforms as one without
-/// end.
+/// The slab on one side of the cut. Its lattice is `five`, one cell wide, with `x` the distance
+/// from the cut. Both sides are mirror planes of the lattice, so that the slab deforms as one
+/// without end.
 pub struct Slab {
     layer: Layer,
     size: [usize; 3],
