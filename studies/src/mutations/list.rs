@@ -303,8 +303,8 @@ pub const MUTATIONS: &[Mutation] = &[
         Solver,
         "projection, Rust, in lanes: every lane has the stiffness of the first",
         "crates/cutis-solver/src/batch/project.rs",
-        "values[first + lane]",
-        "values[first]",
+        "L::from_lanes(|lane| values[lane])",
+        "L::from_lanes(|_| values[0])",
     ),
     mutation(
         Solver,
