@@ -131,6 +131,23 @@ fn an_excision_changes_only_the_voxels_of_its_piece() {
     assert!((15.0..23.0).contains(&depth), "{depth} mm");
 }
 
+/// The picture of the start shows a piece that is taken out later in its place, so it does not
+/// depend on the depth. Control: the picture of the end, and a piece that is out from the start.
+#[test]
+fn a_piece_that_is_taken_out_later_is_in_the_picture_of_the_start() {
+    let slack = "{ distance = { youngs_modulus_pa = 1e4 }, volume = { bulk_modulus_pa = 1e5 } }";
+    let set = [("run.frames", "4"), ("constraints", slack), ("output", "{ pictures = true }")];
+    let run = |at_s: &str, depth: &str| {
+        let lesion = excise(&ellipse(LENGTH, WIDTH), at_s).replace("= 16", depth);
+        Run::of(&operated(&[&lesion], &set))
+    };
+    let [later, shallow] = ["= 16", "= 9"].map(|depth| run(", at_s = 0.02", depth));
+    assert!(later.bytes("before.png") == shallow.bytes("before.png"));
+    assert!(later.bytes("after.png") != shallow.bytes("after.png"));
+    let at_start = run("", "= 16");
+    assert!(at_start.bytes("before.png") != later.bytes("before.png"));
+}
+
 /// A hook holds the skin with a force, which grows while it pulls. Control: it pulls half as far.
 #[test]
 fn a_hook_pulls_with_a_force() {

@@ -42,7 +42,7 @@ impl TetMesh {
         });
         let mut split = wound.split_edges.iter().peekable();
         self.edges.retain(|edge| split.next_if(|other| *other == edge).is_none());
-        let kept = || wound.copies.iter().filter(|copy| !copy.gone);
+        let kept = || wound.copies.iter().filter(|copy| copy.gone.is_none());
         self.copies = Some(Copies {
             vertices,
             tets: self.tets.len(),

@@ -31,8 +31,9 @@ pub struct Shell {
     /// The parts of the tets that cuts of no width divide. Corners from
     /// `first_extra + positions.len()` on are points.
     pub pieces: Pieces<4>,
-    /// The parts of these tets that are taken out with a piece, with the corners of `pieces`.
-    pub taken_out: Vec<[u32; 4]>,
+    /// For each blade of [`Severed`]: the tets and the parts of tets that it takes out with a
+    /// piece, with the corners of `pieces`.
+    pub taken_out: Vec<Vec<[u32; 4]>>,
     /// Extra vertex `n` follows the mesh vertices `neighbors[offsets[n]..offsets[n + 1]]`.
     pub offsets: Vec<u32>,
     /// The followed mesh vertices of all extra vertices.
@@ -115,20 +116,26 @@ impl Shell {
             None => mesh.positions[v as usize],
         };
         let in_slit: Vec<bool> = positions.iter().map(|&position| cut.contains(position)).collect();
-        let is_taken = |v: u32| blades.iter().any(|blade| blade.encloses(position(v).cast()));
+        let taken_by = |v: u32| blades.iter().position(|blade| blade.encloses(position(v).cast()));
         let is_removed = |v: u32| match (v as usize).checked_sub(vertices) {
             Some(extra) => in_slit[extra],
-            None => cut.removed[v as usize] && !is_taken(v),
+            None => cut.removed[v as usize] && taken_by(v).is_none(),
         };
         let all = found.into_iter().map(|tet| tet.map(|point| vertex_of[point as usize]));
-        let (removed, tets) = all.partition(|tet| {
+        let (removed, tets): (Vec<_>, Vec<_>) = all.partition(|tet| {
             tet.iter().any(|&v| is_removed(v))
-                || tet.iter().all(|&v| is_taken(v))
                 || (0..4).any(|a| (0..a).any(|b| cut.crosses(position(tet[a]), position(tet[b]))))
         });
         let count = vertices + positions.len();
-        let DividedShell { whole, followers, pieces, taken_out } =
+        let (enclosed, tets): (Vec<[u32; 4]>, Vec<_>) =
+            tets.into_iter().partition(|tet| tet.iter().all(|&v| taken_by(v).is_some()));
+        let DividedShell { whole, followers, pieces, mut taken_out } =
             divide_shell(tets, count, &position, blades, reach);
+        for tet in enclosed {
+            if let Some(blade) = taken_by(tet[0]) {
+                taken_out[blade].push(tet);
+            }
+        }
         let mut rows = rows;
         let mut positions = positions;
         for follower in followers {

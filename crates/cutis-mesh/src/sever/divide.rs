@@ -83,7 +83,7 @@ impl Severing {
                 nodes,
                 share: share as f32,
                 whole,
-                gone: gone.is_some(),
+                gone,
             };
             for (of_tet, part) in (0..).zip((0..4).filter(|part| kept >> part & 1 == 1)) {
                 let share = tet.cut * tet.volumes[part];

@@ -15,7 +15,7 @@ impl Severing {
             for (a, b) in EDGES {
                 let volume = mesh.edge_share(corners, [a, b]) * f64::from(copy.share);
                 let (a, b) = if corners[a] < corners[b] { (a, b) } else { (b, a) };
-                let nodes = (!copy.gone).then_some([copy.nodes[a], copy.nodes[b]]);
+                let nodes = copy.gone.is_none().then_some([copy.nodes[a], copy.nodes[b]]);
                 all.push(([corners[a], corners[b]], nodes, volume));
             }
         }

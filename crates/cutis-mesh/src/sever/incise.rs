@@ -29,8 +29,9 @@ pub struct Severed {
     /// The shapes of the parts of divided tets. They fill the divided tets, but for those that are
     /// taken out.
     pub tet_pieces: Pieces<4>,
-    /// The shapes of the parts of tets that are taken out, with the corners of `tet_pieces`.
-    pub taken_out: Vec<[u32; 4]>,
+    /// For each piece of the cut: the shapes of the parts of tets that are taken out with it, with
+    /// the corners of `tet_pieces`.
+    pub taken_out: Vec<Vec<[u32; 4]>>,
     /// The shapes of the copies of skin triangles. Their field `copies` is a number in `copies`.
     pub skin_pieces: Pieces<3>,
 }
@@ -152,7 +153,8 @@ impl Cut {
                 })?;
             self.gapes.push(gape);
         }
-        let (tet_pieces, taken_out) = wound.tet_pieces(mesh).apart(|copy| wound.copies[copy as usize].gone);
+        let piece_of = |copy: u32| wound.copies[copy as usize].gone.map(|blade| blade as usize - first_piece);
+        let (tet_pieces, taken_out) = wound.tet_pieces(mesh).apart(self.pieces.len(), piece_of);
         let replaced: Vec<u32> =
             wound.areas(mesh, triangles).into_iter().map(|triangle| triangle.triangle).collect();
         mesh.divide(&wound);

@@ -79,7 +79,8 @@ impl Severing {
         let of_split = |n: usize| {
             let split = &wound.split[n];
             let copy = |part| wound.copy_of(split, part).map(|copy| &wound.copies[copy]);
-            let held = split.parts.map(|part| copy(part).filter(|copy| !copy.gone).map(|copy| copy.nodes));
+            let held =
+                split.parts.map(|part| copy(part).filter(|copy| copy.gone.is_none()).map(|copy| copy.nodes));
             Some(Divided { cut: split.cut, held })
         };
         pairs(&sites, &reached, of_split)

@@ -53,12 +53,17 @@ pub struct Pieces<const N: usize> {
 }
 
 impl<const N: usize> Pieces<N> {
-    /// The pieces but for those of some copies, and the corners of these.
-    pub(super) fn apart(mut self, leaves: impl Fn(u32) -> bool) -> (Self, Vec<[u32; N]>) {
-        let (mut kept, mut copies, mut left) = (Vec::new(), Vec::new(), Vec::new());
+    /// The pieces but for those of copies that leave with one of `groups` groups, and the corners
+    /// of these for each group. `leaves` returns the group of a copy.
+    pub(super) fn apart(
+        mut self,
+        groups: usize,
+        leaves: impl Fn(u32) -> Option<usize>,
+    ) -> (Self, Vec<Vec<[u32; N]>>) {
+        let (mut kept, mut copies, mut left) = (Vec::new(), Vec::new(), vec![Vec::new(); groups]);
         for (simplex, copy) in self.simplices.drain(..).zip(self.copies.drain(..)) {
-            if leaves(copy) {
-                left.push(simplex);
+            if let Some(group) = leaves(copy) {
+                left[group].push(simplex);
             } else {
                 kept.push(simplex);
                 copies.push(copy);

@@ -21,8 +21,8 @@ pub(crate) struct DividedShell {
     pub followers: Vec<Follower>,
     /// The shapes of the parts of divided tets. Corners from `vertices + followers` on are points.
     pub pieces: Pieces<4>,
-    /// The parts that are taken out, with the corners of `pieces`.
-    pub taken_out: Vec<[u32; 4]>,
+    /// For each blade: the parts that it takes out, with the corners of `pieces`.
+    pub taken_out: Vec<Vec<[u32; 4]>>,
 }
 
 /// Divides the tets of a shell along blades. `vertices` is the number of vertices of mesh and
@@ -62,7 +62,7 @@ pub(crate) fn divide_shell(
                 (vertices + followers.len() - 1) as u32
             });
             let own = (0..4).find(|&n| parts[n] == part);
-            let taken = own.is_some_and(|n| blades.iter().any(|blade| blade.encloses(corners[n])));
+            let taken = own.and_then(|n| blades.iter().position(|blade| blade.encloses(corners[n])));
             copies.push((nodes, part, parts, distances.clone(), taken));
         }
     }
@@ -77,6 +77,6 @@ pub(crate) fn divide_shell(
             }
         });
     }
-    let (pieces, taken_out) = builder.pieces.apart(|copy| taken[copy as usize]);
+    let (pieces, taken_out) = builder.pieces.apart(blades.len(), |copy| taken[copy as usize]);
     DividedShell { whole, followers, pieces, taken_out }
 }

@@ -68,8 +68,8 @@ pub struct TetCopy {
     /// True if the copy has all of the tet's corners as its nodes: it stands for the share of the
     /// section that is not cut.
     pub whole: bool,
-    /// True if it is taken out of the body. A mesh that is divided does not have it.
-    pub gone: bool,
+    /// The blade that takes it out of the body. A mesh that is divided does not have such a copy.
+    pub gone: Option<u32>,
 }
 
 /// An edge of copies.
@@ -165,7 +165,7 @@ impl Wound {
             };
             let parts = (0..4).filter(|&part| areas[usize::from(part)] > 0.0);
             copies.extend(parts.filter_map(|part| {
-                let copy = self.copy_of(own, part).filter(|&copy| !self.copies[copy].gone)?;
+                let copy = self.copy_of(own, part).filter(|&copy| self.copies[copy].gone.is_none())?;
                 Some(copy_of(&self.copies[copy].nodes, Some(part), areas[usize::from(part)] * own.cut))
             }));
             if own.cut < 1.0 && !self.rest_is_gone(own) {
@@ -178,7 +178,7 @@ impl Wound {
     /// Whether the share of a tet that is not cut is taken out of the body.
     fn rest_is_gone(&self, split: &SplitTet) -> bool {
         let copy = split.first_copy as usize + split.kept.count_ones() as usize;
-        self.copies[copy].gone
+        self.copies[copy].gone.is_some()
     }
 
     /// The skin triangles of divided tets, in the order of the skin.

@@ -86,10 +86,10 @@ fn an_excision_takes_out_its_piece_and_nothing_else() {
                 Some(point) => severed.tet_pieces.points[point].at(&mesh.positions).cast(),
             };
             // Thin parts get a least share, so volumes agree only nearly.
-            assert!((volume_of(&severed.taken_out, &at) / gone - 1.0).abs() < 0.01);
+            assert!((volume_of(&severed.taken_out[0], &at) / gone - 1.0).abs() < 0.01);
             let (whole, pieces) = (&mesh.tets[..mesh.whole_tets()], &severed.tet_pieces.simplices);
             let kept = volume_of(whole, &at) + volume_of(pieces, &at);
-            assert!((kept + volume_of(&severed.taken_out, &at) - before).abs() < 1e-3 * before);
+            assert!((kept + volume_of(&severed.taken_out[0], &at) - before).abs() < 1e-3 * before);
             let lost = area - skin_area_cut(&mesh, &skin, &severed);
             assert!((lost / outline - 1.0).abs() < 0.02, "{lost} of {outline} mm²");
             // What is left is one body, and it still has all vertices outside the piece.

@@ -76,6 +76,11 @@ impl GrowingCuts {
         blades.map(|(timing, length)| timing.reached(time_s, length)).collect()
     }
 
+    /// Which blades have cut to their ends at a time in s. A piece is out when its blade has.
+    pub(super) fn finished(&self, time_s: f64) -> Vec<bool> {
+        self.reached(time_s).iter().zip(self.growth.lengths()).map(|(&reached, all)| reached >= all).collect()
+    }
+
     /// Mass of each of [`Growth::nodes`] at a stage, kg. Nodes without elements have none.
     pub(crate) fn masses(&self, stage: &Stage) -> Vec<f64> {
         let nodes = self.growth.nodes();

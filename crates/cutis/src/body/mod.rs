@@ -80,6 +80,12 @@ impl Body {
         self.cut.removed[vertex as usize]
     }
 
+    /// Which blades of [`Body::severed`] have cut to their ends at a time in s.
+    pub(crate) fn finished_cuts(&self, time_s: f64) -> Vec<bool> {
+        let all = self.severed.as_ref().map_or(0, |severed| severed.blades.len());
+        self.growing.as_ref().map_or(vec![true; all], |growing| growing.finished(time_s))
+    }
+
     /// HU at the positions of [`Body::whole_skin`].
     pub(crate) fn whole_skin_hu(&self) -> Vec<f32> {
         let edges = self.severed.as_ref().map(|severed| self.hu_at(&severed.skin_pieces.points));

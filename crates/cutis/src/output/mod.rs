@@ -39,6 +39,13 @@ pub(crate) struct DeformedBody<'a> {
     pub(crate) on_device: Option<&'a DevicePositions>,
     pub(crate) ct: &'a Volume,
     pub(crate) scene: &'a Scene,
+    /// Number of frames that led to it.
+    pub(crate) frames: u32,
+}
+
+/// When the last of some frames began, s. Cuts are made when a frame begins.
+fn last_cut_s(scene: &Scene, frames: u32) -> f64 {
+    f64::from(frames.saturating_sub(1)) * scene.solver.dt_s
 }
 
 /// Results of the outputs for the report.
@@ -70,7 +77,8 @@ pub(crate) fn write(
     if !(output.volume || output.pictures) {
         return Ok(results);
     }
-    let warp = BodyWarp::new(deformed.body, deformed.positions, deformed.on_device, stages)?;
+    let DeformedBody { body, positions, on_device, scene, frames, .. } = *deformed;
+    let warp = BodyWarp::new(body, positions, last_cut_s(scene, frames), on_device, stages)?;
     let (volume, found) = clock.stage_placed("resample the CT", 0, |progress| {
         Ok((warp.apply(deformed.ct, stages, progress)?, stages.place()))
     })?;

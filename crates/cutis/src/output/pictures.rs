@@ -32,7 +32,7 @@ const COLORS: [Rgb; 2] = [[90, 160, 255], [255, 170, 60]];
 const LINES: Rgb = [20, 50, 120];
 
 /// Draws a run: the skin before and after, a slice before and after, and the lines of tension of a
-/// membrane. Before, the CT is cut but has not moved. `after` is the deformed CT.
+/// membrane. Before, the CT has the cuts from the start. `after` is the deformed CT.
 ///
 /// # Errors
 /// The errors of the resampler and the renderer.
@@ -94,7 +94,7 @@ pub(super) fn draw(
     let mut figures = vec![
         Figure {
             path: RunFolder::before,
-            caption: "Before: cut, not yet moved",
+            caption: "Before the first frame",
             wide: false,
             png: stages.raymarch(&before, &view)?.to_png()?,
         },

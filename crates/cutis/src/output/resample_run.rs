@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use cutis_volume::nifti;
 
+use super::last_cut_s;
 use super::report::Resample;
 use super::warp::BodyWarp;
 use crate::backend::{Request, Stages};
@@ -48,7 +49,7 @@ pub fn resample_run(
         Some(path) => nifti::read(path)?.volume,
         None => source.volume,
     };
-    let warp = BodyWarp::new(&body, &saved.positions, None, &stages)?;
+    let warp = BodyWarp::new(&body, &saved.positions, last_cut_s(&loaded.scene, saved.frame), None, &stages)?;
     let (deformed, report) =
         clock.stage("resample", 0, |progress| warp.apply(&volume, &mut stages, progress))?;
     stages.notes.iter().for_each(|note| progress.note(note));

@@ -21,16 +21,21 @@ pub(crate) struct BodyWarp<'a> {
     tets: Vec<[u32; 4]>,
     rest: Vec<Point3<f32>>,
     deformed: Vec<Point3<f32>>,
+    /// The tetrahedra that incisions removed and those of the pieces that were taken out.
     removed: Vec<[u32; 4]>,
     /// The tets next to the walls of wounds, as indices into `tets`.
     at_walls: Vec<u32>,
+    /// Number of `removed` that are missing before the first frame. The others were taken out
+    /// later.
+    removed_at_start: usize,
     /// The deformed positions of mesh and shell on the GPU, if the simulation left the positions of
     /// the mesh there.
     on_device: Option<DevicePositions>,
 }
 
 impl<'a> BodyWarp<'a> {
-    /// Prepares the deformation to these positions, one per mesh vertex, in local meters.
+    /// Prepares the deformation to these positions, one per mesh vertex, in local meters. `time_s`
+    /// is when the last cuts were made: a piece that is taken out later is part of the body.
     /// `on_device` are the same positions on the GPU of the stages.
     ///
     /// # Errors
@@ -38,6 +43,7 @@ impl<'a> BodyWarp<'a> {
     pub(crate) fn new(
         body: &'a Body,
         deformed: &[Point3<f32>],
+        time_s: f64,
         on_device: Option<&DevicePositions>,
         stages: &Stages,
     ) -> Result<Self, Error> {
@@ -50,12 +56,33 @@ impl<'a> BodyWarp<'a> {
         let (vertices, all) = (mesh.positions.len() as u32, shell.first_extra + shell_count);
         let behind = |tet: &[u32; 4]| tet.map(|v| if v < vertices { v } else { v + shell_count });
         let in_shell = |tet: &[u32; 4]| tet.map(|v| if v < all { v } else { v + walls.points.len() as u32 });
+        // Pieces are out when their blades have cut to their ends.
+        let [at_start, at_end] = [0.0, time_s].map(|time_s| body.finished_cuts(time_s));
+        let (at_start, at_end) = (at_start.as_slice(), at_end.as_slice());
+        let pieces = body.severed.as_ref().map_or(&[][..], |severed| &severed.taken_out);
+        let first_piece = shell.taken_out.len() - pieces.len();
+        let tets_of = |blade: usize| {
+            let piece = blade.checked_sub(first_piece).map_or(&[][..], |piece| &pieces[piece]);
+            (piece.iter().map(behind), shell.taken_out[blade].iter().map(in_shell))
+        };
+        let blades = || 0..shell.taken_out.len();
+        let kept = || blades().filter(|&blade| !at_end[blade]).map(tets_of);
         let body_tets: Vec<[u32; 4]> = mesh.tets[..mesh.whole_tets()]
             .iter()
             .copied()
             .chain(walls.simplices.iter().map(behind))
+            .chain(kept().flat_map(|(in_body, _)| in_body))
             .collect();
         let around = shell.tets.iter().copied().chain(shell.pieces.simplices.iter().map(in_shell));
+        let around = around.chain(kept().flat_map(|(_, in_shell)| in_shell));
+        let out = |first: bool| {
+            let blades = blades().filter(move |&blade| at_end[blade] && at_start[blade] == first);
+            blades.map(tets_of).flat_map(|(in_body, in_shell)| in_body.chain(in_shell))
+        };
+        let mut removed: Vec<[u32; 4]> =
+            body.removed.tets.iter().chain(&shell.removed).copied().chain(out(true)).collect();
+        let removed_at_start = removed.len();
+        removed.extend(out(false));
         let extra = |positions: &[Point3<f32>]| {
             let followed = shell.follow(&mesh.positions, positions);
             let nodes = [positions, &followed].concat();
@@ -78,15 +105,8 @@ impl<'a> BodyWarp<'a> {
             rest: [mesh.positions.as_slice(), &at_rest].concat(),
             on_device: on_device.and_then(|positions| stages.append(positions, &moved)),
             deformed: [deformed, &moved].concat(),
-            removed: body
-                .removed
-                .tets
-                .iter()
-                .chain(&shell.removed)
-                .copied()
-                .chain(body.severed.iter().flat_map(|severed| severed.taken_out.iter().map(behind)))
-                .chain(shell.taken_out.iter().map(in_shell))
-                .collect(),
+            removed,
+            removed_at_start,
         })
     }
 
@@ -118,7 +138,7 @@ impl<'a> BodyWarp<'a> {
     ) -> Result<(Volume, Resample), Error> {
         let (volume, report) = stages.resample(
             volume,
-            &self.warp(&self.deformed, &self.tets, self.body_tets),
+            &self.warp(&self.deformed, &self.tets, self.body_tets, &self.removed),
             self.on_device.as_ref(),
             &|done, _total| progress.advance(done as u64),
         )?;
@@ -130,8 +150,9 @@ impl<'a> BodyWarp<'a> {
         Ok((volume, report))
     }
 
-    /// The volume with the incisions cut and nothing moved. Voxels outside the removed tetrahedra
-    /// keep their values, so only the tetrahedra around them take part.
+    /// The volume before the first frame: with the cuts from the start, and nothing moved. Voxels
+    /// outside the removed tetrahedra keep their values, so only the tetrahedra around them take
+    /// part.
     ///
     /// # Errors
     /// The errors of the resampler.
@@ -141,29 +162,36 @@ impl<'a> BodyWarp<'a> {
         stages: &mut Stages,
         progress: &dyn Progress,
     ) -> Result<Cow<'v, Volume>, Error> {
-        if self.removed.is_empty() {
+        let (removed, later) = self.removed.split_at(self.removed_at_start);
+        if removed.is_empty() {
             return Ok(Cow::Borrowed(volume));
         }
         let mut touched = vec![false; self.rest.len()];
-        self.removed.iter().flatten().for_each(|&v| touched[v as usize] = true);
+        removed.iter().flatten().for_each(|&v| touched[v as usize] = true);
         let touches = |tet: &&[u32; 4]| tet.iter().any(|&v| touched[v as usize]);
         let around = |tets: &[[u32; 4]]| -> Vec<[u32; 4]> { tets.iter().filter(touches).copied().collect() };
         let (body, shell) = self.tets.split_at(self.body_tets);
         let (body, shell) = (around(body), around(shell));
-        let tets = [body.as_slice(), &shell].concat();
-        let warp = self.warp(&self.rest, &tets, body.len());
+        let tets = [body.as_slice(), &shell, &around(later)].concat();
+        let warp = self.warp(&self.rest, &tets, body.len(), removed);
         let progress = |done: usize, _total: usize| progress.advance(done as u64);
         Ok(Cow::Owned(stages.resample(volume, &warp, None, &progress)?.0))
     }
 
-    fn warp<'w>(&'w self, deformed: &'w [Point3<f32>], tets: &'w [[u32; 4]], body_tets: usize) -> Warp<'w> {
+    fn warp<'w>(
+        &'w self,
+        deformed: &'w [Point3<f32>],
+        tets: &'w [[u32; 4]],
+        body_tets: usize,
+        removed: &'w [[u32; 4]],
+    ) -> Warp<'w> {
         Warp {
             origin_mm: self.body.mesh.frame.origin_mm,
             rest: &self.rest,
             deformed,
             tets,
             body_tets,
-            removed: &self.removed,
+            removed,
         }
     }
 }

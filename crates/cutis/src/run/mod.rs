@@ -78,6 +78,7 @@ fn run_with(
         on_device: simulated.result.on_device.as_ref(),
         ct: &source.volume,
         scene: &loaded.scene,
+        frames: loaded.scene.run.frames,
     };
     let mut stages = Stages::on(simulated.device.as_ref().map(DeviceMeter::gpu).cloned());
     let outputs = output::write(&deformed, &loaded.scene.output, &folder, &mut stages, &mut clock)?;
@@ -144,5 +145,48 @@ mod tests {
         assert!(notes.0.lock().unwrap().iter().any(|note| note.contains("have collapsed")));
         let html = fs::read_to_string(RunFolder(folder.path().into()).html()).unwrap();
         assert!(html.contains("have collapsed"));
+    }
+
+    /// The checkpoint of an interrupted run is resampled with a piece that is taken out later in
+    /// its place. Control: at the end of the run it is out.
+    #[test]
+    fn a_piece_is_resampled_until_it_is_taken_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let set = |(key, value): (&str, &str)| Override { key: key.into(), value: value.into() };
+        let outline = "[[-40, 110, -40], [40, 110, -40], [40, 110, 40], [-40, 110, 40], [-40, 110, -40]]";
+        let lesion = format!("[{{ path_mm = {outline}, depth_mm = 40, at_s = 0.01 }}]");
+        let keys = [
+            ("volume.phantom", "{ size = [48, 48, 32], seed = 1 }"),
+            ("lattice.spacing_mm", "12.0"),
+            ("solver.backend", "\"cpu\""),
+            ("incision", "[]"),
+            ("excision", &lesion),
+            ("run", "{ frames = 2, checkpoint_every = 1 }"),
+            ("output", "{}"),
+        ];
+        let loaded = crate::demo(&keys.map(set)).unwrap();
+        run(&loaded, &RunOptions { out: folder.path().into(), resume: false }, &crate::Silent).unwrap();
+        let path = RunFolder(folder.path().into()).checkpoint();
+        let bytes = fs::read(&path).unwrap();
+        let fingerprint: [u8; 32] = bytes[8..40].try_into().unwrap();
+        let count = u64::from_le_bytes(bytes[44..52].try_into().unwrap()) as usize;
+        let saved = Checkpoint::read(&path, &fingerprint, count).unwrap();
+        let hu_in_piece = |frame: u32| {
+            Checkpoint { frame, ..saved.clone() }.write(&path, &fingerprint).unwrap();
+            let out = folder.path().join("out.nii.gz");
+            let request =
+                crate::ResampleRequest { run: folder.path().into(), volume: None, out: out.clone() };
+            crate::resample_run(&loaded, &request, &crate::Silent).unwrap();
+            let volume = cutis_volume::nifti::read(&out).unwrap().volume;
+            let from_middle = |voxel: &usize| {
+                let at = volume.grid().mm(volume.grid().point(*voxel));
+                (at - nalgebra::Point3::new(0.0, 90.0, 0.0)).norm()
+            };
+            let voxels = 0..volume.voxels().len();
+            let nearest = voxels.min_by(|a, b| from_middle(a).total_cmp(&from_middle(b))).unwrap();
+            volume.voxels()[nearest]
+        };
+        assert!(hu_in_piece(1) > -449, "{}", hu_in_piece(1));
+        assert!(hu_in_piece(2) < -900, "{}", hu_in_piece(2));
     }
 }

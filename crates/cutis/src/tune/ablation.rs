@@ -201,6 +201,7 @@ impl Baseline<'_> {
             on_device: None,
             ct: self.volume(),
             scene: &self.loaded.scene,
+            frames: self.loaded.scene.run.frames,
         };
         let mut stages = Stages::on(self.bench.backend.device()?);
         let before = clock.stages.len();

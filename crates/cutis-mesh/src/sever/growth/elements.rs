@@ -100,7 +100,7 @@ impl GrowingTet {
                 nodes: nodes.map(node),
                 share: share as f32,
                 whole,
-                gone: false,
+                gone: None,
             });
         };
         let all_gone = self.is_all_gone(taken);
