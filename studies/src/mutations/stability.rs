@@ -73,8 +73,8 @@ pub const STABILITY: &[Mutation] = &[
         Stability,
         "an absolute epsilon below the volume's gradient, Rust",
         "crates/cutis-constraints/src/volume.rs",
-        "let grad2 = b.cross(&c) * sixth;",
-        "let sixth = sixth.select(b.cross(&c).dot(&b.cross(&c)).simd_gt(T::constant(1e-6)), T::zero());\n    let grad2 = b.cross(&c) * sixth;",
+        "let grad2 = cross(&b, &c) * sixth;",
+        "let n = cross(&b, &c);\n    let sixth = sixth.select(n.dot(&n).simd_gt(T::constant(1e-6)), T::zero());\n    let grad2 = n * sixth;",
     ),
     mutation(
         Stability,

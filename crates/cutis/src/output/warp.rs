@@ -92,9 +92,9 @@ impl<'a> BodyWarp<'a> {
         let (at_rest, moved) = (extra(&mesh.positions), extra(deformed));
         let (divided, whole) = (mesh.tets[mesh.whole_tets()..].as_flattened(), body_tets.len());
         let tets: Vec<[u32; 4]> = body_tets.into_iter().chain(around).collect();
-        let pieces = tets[mesh.whole_tets()..whole].iter().chain(&tets[whole + shell.tets.len()..]);
+        let cut = tets[mesh.whole_tets()..whole].iter().chain(&tets[whole + shell.tets.len()..]);
         let mut on_walls = vec![false; mesh.positions.len() + at_rest.len()];
-        divided.iter().chain(pieces.flatten()).for_each(|&v| on_walls[v as usize] = true);
+        divided.iter().chain(cut.flatten()).for_each(|&v| on_walls[v as usize] = true);
         let reaches = |tet: u32| tets[tet as usize].iter().any(|&v| on_walls[v as usize]);
         let at_walls = (0..tets.len() as u32).filter(|&tet| reaches(tet)).collect();
         Ok(Self {
@@ -122,7 +122,7 @@ impl<'a> BodyWarp<'a> {
         progress: &dyn Progress,
     ) -> Result<(Volume, Resample), Error> {
         let (resampled, report) = self.apply_to_centers(volume, stages, progress)?;
-        let warp = self.warp(&self.deformed, &self.tets, self.body_tets);
+        let warp = self.warp(&self.deformed, &self.tets, self.body_tets, &self.removed);
         Ok((blend_walls(volume, &warp, &self.at_walls, resampled)?.0, report))
     }
 
