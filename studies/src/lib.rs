@@ -17,6 +17,7 @@ pub mod region;
 pub mod sheet;
 pub mod stability;
 pub mod tuning;
+pub mod wound;
 
 #[cfg(test)]
 mod tests {
@@ -36,6 +37,7 @@ mod tests {
             ("region", &crate::region::TABLES),
             ("stability", &crate::stability::TABLES),
             ("tuning", &crate::tuning::TABLES),
+            ("wound", &crate::wound::TABLES),
         ] {
             Page::open(name, tables).unwrap();
         }

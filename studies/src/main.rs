@@ -7,6 +7,7 @@ use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
     accuracy, at_rest, cantilever, chainmail, main_job, mutations, parity, patch, region, stability, tuning,
+    wound,
 };
 
 /// A study and its options.
@@ -24,6 +25,7 @@ enum Study {
     Region(region::Options),
     Stability(stability::Options),
     Tuning(tuning::Options),
+    Wound(wound::Options),
 }
 
 impl Study {
@@ -40,6 +42,7 @@ impl Study {
             Self::Region(options) => region::run(options, out),
             Self::Stability(options) => stability::run(options, out),
             Self::Tuning(options) => tuning::run(options, out),
+            Self::Wound(options) => wound::run(options, out),
         }
     }
 }

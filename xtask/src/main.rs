@@ -47,6 +47,7 @@ usage: cargo xtask COMMAND
       main-job        the main job on the phantom and on real scans, with and without skin tension
       region          cost and error of a region of interest and of a graded lattice
       tuning          `cutis tune` on the demo, compared with a full run
+      wound           frames of the demo without a cut, with one, and while it grows
       mutations       deliberate faults that a test must see
   accuracy, stability, parity, cantilever, chainmail [OPTIONS]
                       short for `study NAME`
