@@ -24,6 +24,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::batch::{ConstraintChunk, Load, Store, VertexChunk};
 use crate::loads::load_of;
+use crate::runs::VERTEX_CHUNK;
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
 
 /// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so
@@ -117,9 +118,6 @@ impl<'a, T: Scalar> Colored<'a, T> {
     }
 }
 
-/// Number of vertices of a chunk. Results do not depend on it.
-const VERTEX_CHUNK: usize = if cfg!(miri) { 2 } else { 128 };
-
 /// One color of vertices, shared between the threads that move them.
 pub struct ColoredVertices<'a, T: Scalar> {
     kinds: &'a [Kind<T>],
@@ -162,10 +160,11 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
         let indices = &self.descent.groups().order[range];
         let mut forces = [VertexForce::none(); VERTEX_CHUNK];
         let forces = &mut forces[..indices.len()];
+        let plan = self.descent.runs().plan(indices);
         let shared = || SharedVertices { vertices: self.vertices, borrow: PhantomData };
         for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
             let chunk = VertexChunk { incidence, indices, vertices: shared(), forces };
-            kind.vertex_forces_shared(self.level, chunk);
+            kind.vertex_forces_shared(self.level, &plan, chunk);
         }
         let mut vertices = shared();
         for (&index, force) in indices.iter().zip(forces) {

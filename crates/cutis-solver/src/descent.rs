@@ -35,6 +35,7 @@ use cutis_coloring::{ColoringError, Groups, Incidence, Tuples, greedy_vertices};
 use cutis_constraints::{Real, Scalar};
 use nalgebra::{Point3, Vector3};
 
+use crate::runs::Runs;
 use crate::{Formulation, Kind, Settings, SolverError, System, Vertex};
 
 /// Force on a vertex in N and the matrix of its quadratic model in N/m, summed over constraints.
@@ -145,6 +146,7 @@ impl<T: Scalar> DescentStep<T> {
 pub struct Descent<T: Scalar> {
     groups: Groups,
     incidences: Vec<Incidence>,
+    runs: Runs,
     step: DescentStep<T>,
 }
 
@@ -159,7 +161,9 @@ impl<T: Scalar> Descent<T> {
     pub fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
         let incidences = Self::incidences_of(system)?;
         let groups = groups_of(system, &tuples_of(system.kinds()), &incidences)?;
-        Ok(Self { groups, incidences, step: DescentStep::new(settings) })
+        let arities: Vec<usize> = system.kinds().iter().map(|kind| kind.arity()).collect();
+        let runs = Runs::find(&groups, &incidences, &arities);
+        Ok(Self { groups, incidences, runs, step: DescentStep::new(settings) })
     }
 
     /// Returns the constraints at each vertex, for each kind, if the forces of all kinds are
@@ -174,9 +178,19 @@ impl<T: Scalar> Descent<T> {
         incidences.map_err(groups_error)
     }
 
-    /// Replaces the constraints at each vertex of one kind.
+    /// Replaces the constraints at each vertex of one kind. Vertices that have or had one are no
+    /// longer part of runs.
     pub(crate) fn set_incidence(&mut self, kind: usize, incidence: Incidence) {
+        for incidence in [&self.incidences[kind], &incidence] {
+            let vertices = (0..incidence.starts().len() as u32 - 1).filter(|&v| !incidence.of(v).is_empty());
+            self.runs.forget(vertices);
+        }
         self.incidences[kind] = incidence;
+    }
+
+    /// Returns the runs of vertices.
+    pub(crate) fn runs(&self) -> &Runs {
+        &self.runs
     }
 
     /// Replaces the groups by verified ones.
@@ -208,7 +222,7 @@ impl<T: Scalar> Descent<T> {
     /// Returns the memory of the groups and incidences in bytes.
     pub fn bytes(&self) -> usize {
         let groups = size_of_val(self.groups.order.as_slice()) + size_of_val(self.groups.offsets.as_slice());
-        groups + self.incidences.iter().map(Incidence::bytes).sum::<usize>()
+        groups + self.incidences.iter().map(Incidence::bytes).sum::<usize>() + self.runs.bytes()
     }
 }
 

@@ -61,6 +61,7 @@ mod loads;
 mod measures;
 mod passes;
 mod reference;
+mod runs;
 mod schedule;
 mod set;
 mod settings;

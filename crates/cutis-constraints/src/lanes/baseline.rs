@@ -13,6 +13,11 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn from_quads(quad: impl Fn(usize) -> [$number; 4]) -> Self {
+                quad(0).into()
+            }
+
+            #[inline(always)]
             fn columns(row: impl Fn(usize) -> [$number; 4]) -> [Self; 4] {
                 let rows: [[$number; 4]; 4] = std::array::from_fn(row);
                 std::array::from_fn(|column| Self::from_lanes(|lane| rows[lane][column]))

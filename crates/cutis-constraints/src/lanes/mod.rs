@@ -25,6 +25,9 @@ pub trait Lanes<T: Scalar>: Real + SimdValue<Element = T> {
     /// Lanes that hold `value(0)`, `value(1)`, …
     fn from_lanes(value: impl FnMut(usize) -> T) -> Self;
 
+    /// Lanes that hold the four numbers of `quad(0)`, then those of `quad(1)`, …
+    fn from_quads(quad: impl Fn(usize) -> [T; 4]) -> Self;
+
     /// Reads four numbers per lane: `row(lane)` gives those of one lane. Returns the first numbers
     /// of all lanes, the second ones, and so on.
     fn columns(row: impl Fn(usize) -> [T; 4]) -> [Self; 4];

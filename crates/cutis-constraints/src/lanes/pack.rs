@@ -51,6 +51,8 @@ pub trait Register: Copy + Send + Sync + 'static {
     /// Bit `n` is lane `n`.
     fn bits(mask: Self::Mask) -> u32;
     fn mask(bits: u32) -> Self::Mask;
+    /// The numbers of `quad(0)`, then those of `quad(1)`, …
+    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self;
     /// The components of as many vertices as there are lanes: all first components in the first
     /// register, and so on.
     fn columns(rows: impl Fn(usize) -> [f32; 4]) -> [Self; 4];
@@ -95,6 +97,11 @@ impl<R: Register> Lanes<f32> for Pack<R> {
         let mut array = R::splat(0.0).to_array();
         array.as_mut().iter_mut().enumerate().for_each(|(lane, x)| *x = value(lane));
         Self(R::from_array(array))
+    }
+
+    #[inline(always)]
+    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
+        Self(R::from_quads(quad))
     }
 
     #[inline(always)]

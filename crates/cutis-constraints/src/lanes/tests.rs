@@ -95,6 +95,8 @@ impl LaneTask<f32> for Transposition {
         for (number, column) in columns.iter().enumerate() {
             (0..L::LANES).for_each(|lane| assert_eq!(column.extract(lane), row(lane)[number]));
         }
+        let quads = L::from_quads(|quad| [0, 1, 2, 3].map(|n| (4 * quad + n) as f32));
+        (0..L::LANES).for_each(|lane| assert_eq!(quads.extract(lane), lane as f32));
         let mut seen = vec![false; L::LANES];
         L::rows(columns, |lane, numbers| {
             assert_eq!(numbers, row(lane));

@@ -162,14 +162,17 @@ impl Register for __m256 {
     }
 
     #[inline(always)]
+    fn from_quads(numbers: impl Fn(usize) -> [f32; 4]) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let low = _mm256_castps128_ps256(quad(numbers(0)));
+            _mm256_insertf128_ps::<1>(low, quad(numbers(1)))
+        }
+    }
+
+    #[inline(always)]
     fn columns(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        transpose_8(std::array::from_fn(|n| {
-            // SAFETY: as above.
-            unsafe {
-                let low = _mm256_castps128_ps256(quad(row(n)));
-                _mm256_insertf128_ps::<1>(low, quad(row(4 + n)))
-            }
-        }))
+        transpose_8(std::array::from_fn(|n| Self::from_quads(|place| row(4 * place + n))))
     }
 
     #[inline(always)]
@@ -254,16 +257,19 @@ impl Register for __m512 {
     }
 
     #[inline(always)]
+    fn from_quads(numbers: impl Fn(usize) -> [f32; 4]) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let quads = _mm512_castps128_ps512(quad(numbers(0)));
+            let quads = _mm512_insertf32x4::<1>(quads, quad(numbers(1)));
+            let quads = _mm512_insertf32x4::<2>(quads, quad(numbers(2)));
+            _mm512_insertf32x4::<3>(quads, quad(numbers(3)))
+        }
+    }
+
+    #[inline(always)]
     fn columns(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        transpose_16(std::array::from_fn(|n| {
-            // SAFETY: as above.
-            unsafe {
-                let rows = _mm512_castps128_ps512(quad(row(n)));
-                let rows = _mm512_insertf32x4::<1>(rows, quad(row(4 + n)));
-                let rows = _mm512_insertf32x4::<2>(rows, quad(row(8 + n)));
-                _mm512_insertf32x4::<3>(rows, quad(row(12 + n)))
-            }
-        }))
+        transpose_16(std::array::from_fn(|n| Self::from_quads(|place| row(4 * place + n))))
     }
 
     #[inline(always)]

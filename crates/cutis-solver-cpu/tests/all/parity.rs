@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use cutis_coloring::greedy;
+use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Scalar, SimdLevel, SkinTension, SkinTensionMaterial, Volume};
 use cutis_solver::{
-    Formulation, Handle, Settings, Solver, SolverError, SolverReference, StepProfile, Stiffness, System,
-    SystemBuilder, Values,
+    Change, Formulation, Handle, Settings, Solver, SolverError, SolverReference, StepProfile, Stiffness,
+    System, SystemBuilder, Values,
 };
 use cutis_solver_cpu::{CpuError, SolverCpu};
 use cutis_test_kit::Kuhn;
@@ -104,6 +104,67 @@ fn results_equal_the_reference_for_any_number_of_threads_and_lanes() {
     parity::<f32>(Formulation::Vbd, 1);
     parity::<f32>(Formulation::Vbd, 3);
     parity::<f64>(Formulation::Vbd, 2);
+}
+
+/// In a lattice most vertices are in runs, which vertex block descent processes together.
+#[test]
+fn runs_of_a_lattice_have_the_bits_of_the_reference() {
+    let lattice = Kuhn::new([40, 5, 5], 0.1);
+    let masses: Vec<f32> = lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 }).collect();
+    let groups = |colors: &[u16]| Groups::from_colors(colors).unwrap();
+    let each = |base: f32, count: usize| {
+        Stiffness::Compliance(Values::Each((0..count).map(|n| base * (1.0 + (n % 7) as f32)).collect()))
+    };
+    let sum = |p: &Point3<f64>| ((p.x + p.y + p.z) / 0.1).round() as u16 % 4;
+    let colors: Vec<u16> = lattice.positions.iter().map(sum).collect();
+    let system = SystemBuilder::<f32>::new(&lattice.positions, &masses)
+        .unwrap()
+        .add_from_rest::<Distance, 2>(
+            &lattice.edges,
+            &Default::default(),
+            each(1e-4, lattice.edges.len()),
+            &groups(&lattice.edge_colors),
+        )
+        .unwrap()
+        .add_from_rest::<Volume, 4>(
+            &lattice.tets,
+            &Default::default(),
+            each(1e-7, lattice.tets.len()),
+            &groups(&lattice.tet_colors),
+        )
+        .unwrap()
+        .vertex_groups(groups(&colors))
+        .build();
+    let settings = settings(Formulation::Vbd, 2);
+    let reference = || SolverReference::new(system.clone(), settings).unwrap();
+    // A change that removes some edges ends the runs there.
+    let (edges, colors): (Vec<[u32; 2]>, Vec<u16>) = lattice
+        .edges
+        .iter()
+        .zip(&lattice.edge_colors)
+        .filter(|(edge, _)| edge[0] % 11 != 3)
+        .map(|(edge, color)| (*edge, *color))
+        .unzip();
+    let kinds = SystemBuilder::<f32>::new(&lattice.positions, &masses)
+        .unwrap()
+        .add_from_rest::<Distance, 2>(&edges, &Default::default(), each(1e-4, edges.len()), &groups(&colors))
+        .unwrap()
+        .take_kinds();
+    let change = Change { kinds: kinds.into_iter().map(|kind| (0, kind)).collect(), ..Change::default() };
+    let changed = |mut solver: Box<dyn Solver<f32>>| {
+        solver.step(1).unwrap();
+        solver.change(&change).unwrap();
+        solver.step(2).unwrap();
+        solver.positions().unwrap().iter().map(|p| p.coords.map(f32::to_bits)).collect::<Vec<_>>()
+    };
+    for level in SimdLevel::available() {
+        let solver = || SolverCpu::new(system.clone(), settings, Some(2)).unwrap().with_level(level);
+        assert!(bits(solver(), &[3]) == bits(reference(), &[3]), "{level:?}");
+        assert!(changed(Box::new(solver())) == changed(Box::new(reference())), "{level:?}, after a change");
+    }
+    let other = Settings { relaxation: 1.2, ..settings };
+    let control = SolverReference::new(system.clone(), other).unwrap();
+    assert!(bits(control, &[3]) != bits(reference(), &[3]), "control");
 }
 
 #[test]

@@ -14,6 +14,7 @@ use cutis_constraints::{Constraint, Scalar, SimdLevel};
 use nalgebra::Point3;
 
 use crate::colored::SharedVertices;
+use crate::runs::Plan;
 use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
 
 pub use access::{Load, Store};
@@ -57,7 +58,14 @@ pub trait Project<T: Scalar> {
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>);
     /// Adds the forces with SIMD lanes while other threads move other vertices. No thread may
     /// move a vertex that shares a constraint with a vertex of this chunk.
-    fn vertex_forces_shared(&self, level: SimdLevel, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>);
+    ///
+    /// `plan` says which vertices of the chunk are runs.
+    fn vertex_forces_shared(
+        &self,
+        level: SimdLevel,
+        plan: &Plan,
+        chunk: VertexChunk<'_, T, SharedVertices<'_, T>>,
+    );
     /// Returns the number of vertices for which the indices were checked.
     fn vertex_count(&self) -> usize;
 }

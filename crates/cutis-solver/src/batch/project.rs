@@ -5,6 +5,7 @@ use nalgebra::Point3;
 
 use super::{Batch, ConstraintChunk, MAX_LANES, Project, Store, VertexChunk};
 use crate::colored::SharedVertices;
+use crate::runs::{Plan, RUN, VERTEX_CHUNK};
 use crate::{Step, Values, Vertex, project};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
@@ -106,6 +107,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> LaneTask<T>
 /// The forces on the vertices of a chunk, for any number of lanes.
 struct ForceTask<'a, 'b, B, T: Scalar> {
     batch: &'a B,
+    plan: &'a Plan,
     chunk: VertexChunk<'a, T, SharedVertices<'b, T>>,
 }
 
@@ -114,13 +116,27 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> LaneTask<T>
 {
     #[inline(always)]
     fn run<L: Lanes<T>>(self) {
-        let VertexChunk { incidence, indices, vertices, forces } = self.chunk;
-        let mut entries: [&[u32]; MAX_LANES] = [&[]; MAX_LANES];
-        for (indices, forces) in indices.chunks(L::LANES).zip(forces.chunks_mut(L::LANES)) {
-            for (entries, &vertex) in entries.iter_mut().zip(indices) {
-                *entries = incidence.of(vertex);
+        let Self { batch, plan, chunk } = self;
+        let VertexChunk { incidence, indices, vertices, forces } = chunk;
+        let mut others = [0; VERTEX_CHUNK];
+        let mut count = plan.others().len();
+        others[..count].copy_from_slice(plan.others());
+        for runs in plan.runs().chunk_by(|a, b| a.0 == b.0) {
+            let (whole, rest) = runs.split_at(runs.len() - runs.len() % (L::LANES / RUN));
+            for runs in whole.chunks_exact(L::LANES / RUN) {
+                batch.forces_of_runs::<L, _>(runs, incidence, indices, &vertices, forces);
             }
-            self.batch.forces_in_lanes::<L, _>(&entries[..indices.len()], &vertices, forces);
+            for place in rest.iter().flat_map(|&(_, start)| start..start + RUN as u16) {
+                others[count] = place;
+                count += 1;
+            }
+        }
+        for places in others[..count].chunks(L::LANES) {
+            let mut entries: [&[u32]; MAX_LANES] = [&[]; MAX_LANES];
+            for (entries, &place) in entries.iter_mut().zip(places) {
+                *entries = incidence.of(indices[place as usize]);
+            }
+            batch.forces_in_lanes::<L, _>(&entries[..places.len()], places, &vertices, forces);
         }
     }
 }
@@ -142,8 +158,13 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
         }
     }
 
-    fn vertex_forces_shared(&self, level: SimdLevel, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>) {
-        T::in_lanes(level, ForceTask { batch: self, chunk });
+    fn vertex_forces_shared(
+        &self,
+        level: SimdLevel,
+        plan: &Plan,
+        chunk: VertexChunk<'_, T, SharedVertices<'_, T>>,
+    ) {
+        T::in_lanes(level, ForceTask { batch: self, plan, chunk });
     }
 
     fn vertex_count(&self) -> usize {
