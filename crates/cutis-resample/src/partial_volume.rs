@@ -26,8 +26,8 @@ const GENERATORS: [usize; 3] = [1, 41, 49];
 /// are the tets next to walls, as indices into [`Warp::tets`]. Only voxels that such a tet reaches
 /// can change. A point in a deformed tet counts as tissue with the value at its rest position, a
 /// point that the body has left as air, and any other point with the input's value there. A voxel
-/// with all of its points in tets is not crossed by a wall and keeps its value. So a body that has
-/// not moved keeps all values.
+/// without a point that the body has left is not crossed by a wall and keeps its value. So a body
+/// that has not moved keeps all values.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -146,6 +146,9 @@ impl Walls<'_> {
                             empty |= self.inside(&raster, &points) & !covered;
                         }
                     }
+                }
+                if empty == 0 {
+                    return None;
                 }
                 sum += f64::from(empty.count_ones()) * f64::from(air);
                 sum += bits(!(covered | empty)).map(|point| value_at(points[point])).sum::<f64>();
