@@ -162,7 +162,7 @@ impl<T: Scalar> Descent<T> {
         let incidences = Self::incidences_of(system)?;
         let groups = groups_of(system, &tuples_of(system.kinds()), &incidences)?;
         let arities: Vec<usize> = system.kinds().iter().map(|kind| kind.arity()).collect();
-        let runs = Runs::find(&groups, &incidences, &arities);
+        let runs = Runs::find(system.vertices().len(), &groups, &incidences, &arities);
         Ok(Self { groups, incidences, runs, step: DescentStep::new(settings) })
     }
 

@@ -29,10 +29,14 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// Finds runs in the order of the groups. `incidences` are those of all kinds, with their
-    /// arities.
-    pub(crate) fn find(groups: &Groups, incidences: &[Incidence], arities: &[usize]) -> Self {
-        let vertices = incidences.first().map_or(0, |incidence| incidence.starts().len() - 1);
+    /// Finds runs of `vertices` vertices in the order of the groups. `incidences` are those of all
+    /// kinds, with their arities.
+    pub(crate) fn find(
+        vertices: usize,
+        groups: &Groups,
+        incidences: &[Incidence],
+        arities: &[usize],
+    ) -> Self {
         let mut runs = Self { starts: vec![0; vertices], strides: Vec::new() };
         let mut patterns: HashMap<Vec<u32>, u8> = HashMap::new();
         for color in groups.offsets.windows(2) {
@@ -177,7 +181,7 @@ mod tests {
     #[test]
     fn runs_are_found_where_constraints_follow_each_other() {
         let (groups, incidence) = chain(40);
-        let runs = Runs::find(&groups, &[incidence], &[2]);
+        let runs = Runs::find(40, &groups, &[incidence], &[2]);
         let even: Vec<u32> = (0..40).step_by(2).collect();
         // The first vertex has one edge only, and is no part of a run.
         let plan = runs.plan(&even);
@@ -203,15 +207,25 @@ mod tests {
         let sum = |p: &nalgebra::Point3<f64>| (p.x + p.y + p.z).round() as u16 % 4;
         let colors: Vec<u16> = lattice.positions.iter().map(sum).collect();
         let groups = Groups::from_colors(&colors).unwrap();
-        let runs = Runs::find(&groups, &[incidence], &[4]);
+        let runs = Runs::find(count, &groups, &[incidence], &[4]);
         let starts = runs.starts.iter().filter(|&&start| start > 0).count();
         assert!(RUN * starts * 10 > 7 * count, "{starts} runs of {count} vertices");
     }
 
     #[test]
+    fn a_body_without_constraints_has_runs_too() {
+        let groups = Groups { order: vec![0, 1, 2, 3], offsets: vec![0, 4] };
+        let runs = Runs::find(4, &groups, &[], &[]);
+        assert_eq!(runs.plan(&groups.order).runs().len(), 1);
+        assert!(
+            Runs::find(0, &Groups { order: vec![], offsets: vec![0] }, &[], &[]).plan(&[]).runs().is_empty()
+        );
+    }
+
+    #[test]
     fn runs_of_changed_vertices_are_forgotten() {
         let (groups, incidence) = chain(40);
-        let mut runs = Runs::find(&groups, &[incidence], &[2]);
+        let mut runs = Runs::find(40, &groups, &[incidence], &[2]);
         runs.forget([14].into_iter());
         let even: Vec<u32> = (0..40).step_by(2).collect();
         assert_eq!(runs.plan(&even).runs().iter().map(|run| run.1).collect::<Vec<_>>(), [1, 9, 13]);
