@@ -23,8 +23,8 @@ const GENERATORS: [usize; 3] = [1, 41, 49];
 /// Gives the voxels that walls cross their mean over 64 points, and returns how many there were.
 ///
 /// `resampled` is the result of resampling `volume` through `warp`, on the CPU or a GPU. `at_walls`
-/// are the tets next to walls, as indices into [`Warp::tets`]. Only voxels that such a tet reaches
-/// can change. A point in a deformed tet counts as tissue with the value at its rest position, a
+/// are the tets next to walls, as indices into [`Warp::tets`]. Only voxels that such a tet reaches,
+/// and that moved, can change. A point in a deformed tet counts as tissue with the value at its rest position, a
 /// point that the body has left as air, and any other point with the input's value there. A voxel
 /// without a point that the body has left is not crossed by a wall and keeps its value. So a body
 /// that has not moved keeps all values.
@@ -83,10 +83,11 @@ struct Walls<'a> {
 type Pair = (u32, u32);
 
 impl Walls<'_> {
-    /// The voxels that some tets reach, in ascending order.
+    /// The voxels that the moved ones of some tets reach, in ascending order.
     fn voxels_at(&self, tets: &[u32]) -> Vec<u64> {
         let mut voxels: Vec<u64> = tets
             .par_iter()
+            .filter(|&&tet| self.warp.tet_moved(tet as usize))
             .flat_map_iter(|&tet| {
                 let mut found = Vec::new();
                 self.rows(&self.corners(self.warp.deformed, &self.warp.tets[tet as usize]), |first, end| {
