@@ -23,11 +23,11 @@ const GENERATORS: [usize; 3] = [1, 41, 49];
 /// Gives the voxels that walls cross their mean over 64 points, and returns how many there were.
 ///
 /// `resampled` is the result of resampling `volume` through `warp`, on the CPU or a GPU. `at_walls`
-/// are the tets next to walls, as indices into [`Warp::tets`]. Only voxels that such a tet reaches,
-/// and that moved, can change. A point in a deformed tet counts as tissue with the value at its rest position, a
-/// point that the body has left as air, and any other point with the input's value there. A voxel
-/// without a point that the body has left is not crossed by a wall and keeps its value. So a body
-/// that has not moved keeps all values.
+/// are the tets next to walls, as indices into [`Warp::tets`]. Only voxels that such a tet reaches
+/// can change, and none if no such tet has moved. A point in a deformed tet counts as tissue with
+/// the value at its rest position, a point that the body has left as air, and any other point with
+/// the input's value there. A voxel without a point that the body has left is not crossed by a wall
+/// and keeps its value.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -52,7 +52,8 @@ pub fn blend_walls(
     }
     let space = IndexSpace::new(&grid.affine, warp.origin_mm, [warp.rest, warp.deformed]);
     let walls = Walls { volume, warp, space: &space, shape: grid.shape };
-    let voxels = walls.voxels_at(at_walls);
+    let moved = at_walls.par_iter().any(|&tet| warp.tet_moved(tet as usize));
+    let voxels = if moved { walls.voxels_at(at_walls) } else { Vec::new() };
     if voxels.is_empty() {
         return Ok((resampled, 0));
     }
@@ -83,11 +84,10 @@ struct Walls<'a> {
 type Pair = (u32, u32);
 
 impl Walls<'_> {
-    /// The voxels that the moved ones of some tets reach, in ascending order.
+    /// The voxels that some tets reach, in ascending order.
     fn voxels_at(&self, tets: &[u32]) -> Vec<u64> {
         let mut voxels: Vec<u64> = tets
             .par_iter()
-            .filter(|&&tet| self.warp.tet_moved(tet as usize))
             .flat_map_iter(|&tet| {
                 let mut found = Vec::new();
                 self.rows(&self.corners(self.warp.deformed, &self.warp.tets[tet as usize]), |first, end| {
