@@ -144,7 +144,7 @@ fn follow(run: &[u32], incidences: &[Incidence], arities: &[usize]) -> bool {
                 && (0..places[0].len()).all(|n| {
                     let step = places[1][n].wrapping_sub(places[0][n]);
                     let even = places.windows(2).all(|pair| pair[1][n].wrapping_sub(pair[0][n]) == step);
-                    even && step % arity as u32 == 0 && step / arity as u32 <= MOST_STEP
+                    even && step.is_multiple_of(arity as u32) && step / arity as u32 <= MOST_STEP
                 })
         })
 }
