@@ -37,6 +37,11 @@ pub const UNSAFE_FILES: &[UnsafeFile] = &[
         tests: LANES,
     },
     UnsafeFile {
+        path: "crates/cutis-constraints/src/lanes/mask.rs",
+        reason: "implements a trait with unsafe methods",
+        tests: LANES,
+    },
+    UnsafeFile {
         path: "crates/cutis-constraints/src/lanes/pack.rs",
         reason: "implements a trait with unsafe methods",
         tests: LANES,

@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use nalgebra::{Point3, Vector3};
+use num_traits::Zero;
 
 use crate::Real;
 
@@ -27,10 +28,16 @@ pub trait Params<T>: Copy + Debug + Send + Sync + PartialEq + AsRef<[T]> {
     fn flat(many: &[Self]) -> &[T];
 }
 
-impl<T: Copy + Debug + Send + Sync + PartialEq, const K: usize> Params<T> for [T; K] {
+impl<T: Copy + Debug + Send + Sync + PartialEq + Zero, const K: usize> Params<T> for [T; K] {
     const LEN: usize = K;
-    fn from_fn(f: impl FnMut(usize) -> T) -> Self {
-        std::array::from_fn(f)
+    // Not `std::array::from_fn`, which the compiler may leave as a call in the loops with SIMD lanes.
+    #[inline(always)]
+    fn from_fn(mut f: impl FnMut(usize) -> T) -> Self {
+        let mut scalars = [T::zero(); K];
+        for (k, scalar) in scalars.iter_mut().enumerate() {
+            *scalar = f(k);
+        }
+        scalars
     }
     fn flat(many: &[Self]) -> &[T] {
         many.as_flattened()

@@ -7,6 +7,8 @@
 mod baseline;
 mod level;
 #[cfg(target_arch = "x86_64")]
+mod mask;
+#[cfg(target_arch = "x86_64")]
 mod pack;
 #[cfg(test)]
 mod tests;

@@ -6,10 +6,7 @@
 #![allow(unsafe_code)]
 
 use std::fmt::{self, Debug};
-use std::ops::{
-    Add, AddAssign, BitAnd, BitOr, BitXor, Div, DivAssign, Mul, MulAssign, Neg, Not, Rem, RemAssign, Sub,
-    SubAssign,
-};
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Rem, RemAssign, Sub, SubAssign};
 
 use nalgebra::{ComplexField, Field, RealField, SimdComplexField, SimdRealField};
 use num_traits::{Num, One, Zero};
@@ -17,6 +14,7 @@ use simba::scalar::SubsetOf;
 use simba::simd::{PrimitiveSimdValue, SimdBool, SimdPartialOrd, SimdSigned, SimdValue};
 
 use super::Lanes;
+use super::mask::PackMask;
 
 /// A vector register of `f32`, and the operations on it.
 ///
@@ -38,10 +36,10 @@ pub trait Register: Copy + Send + Sync + 'static {
     fn sqrt(self) -> Self;
     fn neg(self) -> Self;
     fn abs(self) -> Self;
-    /// The larger number; `self` if `other` is not a number, and `other` if `self` is not.
-    fn max(self, other: Self) -> Self;
-    /// The smaller number, with the same rule.
-    fn min(self, other: Self) -> Self;
+    /// The instruction for the larger number. What it does with a NaN is its own affair.
+    fn larger(self, other: Self) -> Self;
+    /// The instruction for the smaller number.
+    fn smaller(self, other: Self) -> Self;
     fn select(mask: Self::Mask, this: Self, other: Self) -> Self;
     fn equal(self, other: Self) -> Self::Mask;
     fn greater(self, other: Self) -> Self::Mask;
@@ -53,22 +51,14 @@ pub trait Register: Copy + Send + Sync + 'static {
     fn mask(bits: u32) -> Self::Mask;
     /// The numbers of `quad(0)`, then those of `quad(1)`, …
     fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self;
-    /// The components of as many vertices as there are lanes: all first components in the first
-    /// register, and so on.
-    fn columns(rows: impl Fn(usize) -> [f32; 4]) -> [Self; 4];
-    /// The inverse of [`columns`](Self::columns): calls `row(lane, components)` for each lane.
-    fn rows(columns: [Self; 4], row: impl FnMut(usize, [f32; 4]));
+    /// Transposes the blocks of 4 × 4 numbers that four registers have at the same place.
+    fn transposed(registers: [Self; 4]) -> [Self; 4];
 }
 
 /// A number with one value per lane of a register.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub struct Pack<R>(R);
-
-/// One truth value per lane of a register.
-#[derive(Clone, Copy)]
-#[repr(transparent)]
-pub struct PackMask<R: Register>(R::Mask);
 
 impl<R: Register> Pack<R> {
     #[inline(always)]
@@ -106,12 +96,23 @@ impl<R: Register> Lanes<f32> for Pack<R> {
 
     #[inline(always)]
     fn columns(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        R::columns(row).map(Self)
+        let [a, b, c, d] = R::transposed([
+            every_fourth(&row, 0),
+            every_fourth(&row, 1),
+            every_fourth(&row, 2),
+            every_fourth(&row, 3),
+        ]);
+        [Self(a), Self(b), Self(c), Self(d)]
     }
 
     #[inline(always)]
-    fn rows(columns: [Self; 4], row: impl FnMut(usize, [f32; 4])) {
-        R::rows(columns.map(|column| column.0), row);
+    fn rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+        for (n, rows) in R::transposed(columns.map(|column| column.0)).into_iter().enumerate() {
+            let numbers = rows.to_array();
+            for (place, quad) in numbers.as_ref().as_chunks::<4>().0.iter().enumerate() {
+                row(4 * place + n, *quad);
+            }
+        }
     }
 }
 
@@ -119,6 +120,15 @@ impl<R: Register> Debug for Pack<R> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.to_array().as_ref().fmt(out)
     }
+}
+
+/// The rows `n`, `n + 4`, … behind each other.
+///
+/// This is a function, because the compiler does not inline closures without fail, and only what is
+/// inlined into a function for AVX2 or AVX-512 can inline their instructions.
+#[inline(always)]
+fn every_fourth<R: Register>(row: &impl Fn(usize) -> [f32; 4], n: usize) -> R {
+    R::from_quads(|place| row(4 * place + n))
 }
 
 impl<R: Register> PartialEq for Pack<R> {
@@ -129,7 +139,6 @@ impl<R: Register> PartialEq for Pack<R> {
 }
 
 impl<R: Register> PrimitiveSimdValue for Pack<R> {}
-impl<R: Register> PrimitiveSimdValue for PackMask<R> {}
 
 impl<R: Register> SimdValue for Pack<R> {
     const LANES: usize = R::LANES;
@@ -161,119 +170,6 @@ impl<R: Register> SimdValue for Pack<R> {
     #[inline(always)]
     fn select(self, mask: PackMask<R>, other: Self) -> Self {
         Self(R::select(mask.0, self.0, other.0))
-    }
-}
-
-impl<R: Register> SimdValue for PackMask<R> {
-    const LANES: usize = R::LANES;
-    type Element = bool;
-    type SimdBool = Self;
-
-    #[inline(always)]
-    fn splat(value: bool) -> Self {
-        Self(R::mask(if value { u32::MAX } else { 0 }))
-    }
-    #[inline(always)]
-    fn extract(&self, lane: usize) -> bool {
-        R::bits(self.0) >> lane & 1 != 0
-    }
-    #[inline(always)]
-    unsafe fn extract_unchecked(&self, lane: usize) -> bool {
-        self.extract(lane)
-    }
-    #[inline(always)]
-    fn replace(&mut self, lane: usize, value: bool) {
-        *self = Self(R::mask(R::bits(self.0) & !(1 << lane) | u32::from(value) << lane));
-    }
-    #[inline(always)]
-    unsafe fn replace_unchecked(&mut self, lane: usize, value: bool) {
-        self.replace(lane, value);
-    }
-    #[inline(always)]
-    fn select(self, mask: Self, other: Self) -> Self {
-        self & mask | other & !mask
-    }
-}
-
-impl<R: Register> Not for PackMask<R> {
-    type Output = Self;
-    #[inline(always)]
-    fn not(self) -> Self {
-        Self(R::mask(!R::bits(self.0)))
-    }
-}
-
-macro_rules! mask_operator {
-    ($operator:ident, $function:ident) => {
-        impl<R: Register> $operator for PackMask<R> {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                Self(R::mask(R::bits(self.0).$function(R::bits(other.0))))
-            }
-        }
-    };
-}
-mask_operator!(BitAnd, bitand);
-mask_operator!(BitOr, bitor);
-mask_operator!(BitXor, bitxor);
-
-impl<R: Register> PackMask<R> {
-    /// The bits of all lanes.
-    const ALL: u32 = u32::MAX >> (32 - R::LANES as u32);
-}
-
-impl<R: Register> SimdBool for PackMask<R> {
-    #[inline(always)]
-    fn bitmask(self) -> u64 {
-        u64::from(R::bits(self.0) & Self::ALL)
-    }
-    #[inline(always)]
-    fn and(self) -> bool {
-        self.all()
-    }
-    #[inline(always)]
-    fn or(self) -> bool {
-        self.any()
-    }
-    #[inline(always)]
-    fn xor(self) -> bool {
-        self.bitmask().count_ones() % 2 == 1
-    }
-    #[inline(always)]
-    fn all(self) -> bool {
-        R::bits(self.0) & Self::ALL == Self::ALL
-    }
-    #[inline(always)]
-    fn any(self) -> bool {
-        R::bits(self.0) & Self::ALL != 0
-    }
-    #[inline(always)]
-    fn none(self) -> bool {
-        !self.any()
-    }
-    #[inline(always)]
-    fn if_else<V: SimdValue<SimdBool = Self>>(self, a: impl FnOnce() -> V, b: impl FnOnce() -> V) -> V {
-        a().select(self, b())
-    }
-    #[inline(always)]
-    fn if_else2<V: SimdValue<SimdBool = Self>>(
-        self,
-        a: impl FnOnce() -> V,
-        (second, b): (impl FnOnce() -> Self, impl FnOnce() -> V),
-        c: impl FnOnce() -> V,
-    ) -> V {
-        a().select(self, b().select(second(), c()))
-    }
-    #[inline(always)]
-    fn if_else3<V: SimdValue<SimdBool = Self>>(
-        self,
-        a: impl FnOnce() -> V,
-        (second, b): (impl FnOnce() -> Self, impl FnOnce() -> V),
-        (third, c): (impl FnOnce() -> Self, impl FnOnce() -> V),
-        d: impl FnOnce() -> V,
-    ) -> V {
-        a().select(self, b().select(second(), c().select(third(), d())))
     }
 }
 
@@ -410,11 +306,12 @@ impl<R: Register> SimdPartialOrd for Pack<R> {
     }
     #[inline(always)]
     fn simd_max(self, other: Self) -> Self {
-        Self(self.0.max(other.0))
+        // As `f32::max`: `self` if `other` is a NaN, and `other` if `self` is one.
+        Self(R::select(other.0.unordered(other.0), self.0, self.0.larger(other.0)))
     }
     #[inline(always)]
     fn simd_min(self, other: Self) -> Self {
-        Self(self.0.min(other.0))
+        Self(R::select(other.0.unordered(other.0), self.0, self.0.smaller(other.0)))
     }
     #[inline(always)]
     fn simd_clamp(self, min: Self, max: Self) -> Self {

@@ -32,9 +32,9 @@ macro_rules! comparisons {
     };
 }
 
-/// Conversions of a register from and to an array of the same size.
-macro_rules! arrays {
-    ($array:ty) => {
+/// Functions of a register that are the same for every width but for the names of instructions.
+macro_rules! common {
+    ($array:ty, $splat:ident, $xor:ident, $and_not:ident, $low:ident, $high:ident, $shuffle:ident) => {
         #[inline(always)]
         fn from_array(array: $array) -> Self {
             // SAFETY: both types have the same size, and any bits are valid in both.
@@ -46,15 +46,28 @@ macro_rules! arrays {
             // SAFETY: both types have the same size, and any bits are valid in both.
             unsafe { transmute(self) }
         }
-    };
-}
 
-/// Transposes the blocks of 4 × 4 numbers that four registers have at the same place.
-macro_rules! transpose {
-    ($name:ident, $register:ty, $low:ident, $high:ident, $shuffle:ident) => {
         #[inline(always)]
-        fn $name([a, b, c, d]: [$register; 4]) -> [$register; 4] {
-            // SAFETY: the processor has the instructions (see the top of the file).
+        fn splat(value: f32) -> Self {
+            // SAFETY: the processor has the instruction (see the top of the file).
+            unsafe { $splat(value) }
+        }
+
+        #[inline(always)]
+        fn neg(self) -> Self {
+            // SAFETY: as above.
+            unsafe { $xor(self, $splat(-0.0)) }
+        }
+
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: as above.
+            unsafe { $and_not($splat(-0.0), self) }
+        }
+
+        #[inline(always)]
+        fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
+            // SAFETY: as above.
             unsafe {
                 let (ab_low, ab_high) = ($low(a, b), $high(a, b));
                 let (cd_low, cd_high) = ($low(c, d), $high(c, d));
@@ -69,9 +82,6 @@ macro_rules! transpose {
     };
 }
 
-transpose!(transpose_8, __m256, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps);
-transpose!(transpose_16, __m512, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps);
-
 /// Four numbers as a register.
 #[inline(always)]
 fn quad(numbers: [f32; 4]) -> __m128 {
@@ -79,19 +89,20 @@ fn quad(numbers: [f32; 4]) -> __m128 {
     unsafe { transmute(numbers) }
 }
 
-/// Four numbers of a register.
-#[inline(always)]
-fn numbers(quad: __m128) -> [f32; 4] {
-    // SAFETY: both types have the same size, and any bits are valid in both.
-    unsafe { transmute(quad) }
-}
-
 impl Register for __m256 {
     const LANES: usize = 8;
     type Array = [f32; 8];
     type Mask = __m256;
 
-    arrays!([f32; 8]);
+    common!(
+        [f32; 8],
+        _mm256_set1_ps,
+        _mm256_xor_ps,
+        _mm256_andnot_ps,
+        _mm256_unpacklo_ps,
+        _mm256_unpackhi_ps,
+        _mm256_shuffle_ps
+    );
 
     instructions! {
         add(other) = _mm256_add_ps;
@@ -99,6 +110,8 @@ impl Register for __m256 {
         mul(other) = _mm256_mul_ps;
         div(other) = _mm256_div_ps;
         sqrt() = _mm256_sqrt_ps;
+        larger(other) = _mm256_max_ps;
+        smaller(other) = _mm256_min_ps;
     }
 
     comparisons! {
@@ -110,38 +123,8 @@ impl Register for __m256 {
     }
 
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        // SAFETY: the processor has the instruction (see the top of the file).
-        unsafe { _mm256_set1_ps(value) }
-    }
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        // SAFETY: as above.
-        unsafe { _mm256_xor_ps(self, _mm256_set1_ps(-0.0)) }
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        // SAFETY: as above.
-        unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self) }
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        // SAFETY: as above.
-        Self::select(other.unordered(other), self, unsafe { _mm256_max_ps(self, other) })
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        // SAFETY: as above.
-        Self::select(other.unordered(other), self, unsafe { _mm256_min_ps(self, other) })
-    }
-
-    #[inline(always)]
     fn select(mask: __m256, this: Self, other: Self) -> Self {
-        // SAFETY: as above.
+        // SAFETY: the processor has the instruction (see the top of the file).
         unsafe { _mm256_blendv_ps(other, this, mask) }
     }
 
@@ -169,22 +152,6 @@ impl Register for __m256 {
             _mm256_insertf128_ps::<1>(low, quad(numbers(1)))
         }
     }
-
-    #[inline(always)]
-    fn columns(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        transpose_8(std::array::from_fn(|n| Self::from_quads(|place| row(4 * place + n))))
-    }
-
-    #[inline(always)]
-    fn rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
-        for (n, rows) in transpose_8(columns).into_iter().enumerate() {
-            // SAFETY: as above.
-            let high = unsafe { _mm256_extractf128_ps::<1>(rows) };
-            // SAFETY: as above.
-            row(n, numbers(unsafe { _mm256_castps256_ps128(rows) }));
-            row(4 + n, numbers(high));
-        }
-    }
 }
 
 impl Register for __m512 {
@@ -192,7 +159,15 @@ impl Register for __m512 {
     type Array = [f32; 16];
     type Mask = __mmask16;
 
-    arrays!([f32; 16]);
+    common!(
+        [f32; 16],
+        _mm512_set1_ps,
+        _mm512_xor_ps,
+        _mm512_andnot_ps,
+        _mm512_unpacklo_ps,
+        _mm512_unpackhi_ps,
+        _mm512_shuffle_ps
+    );
 
     instructions! {
         add(other) = _mm512_add_ps;
@@ -200,6 +175,8 @@ impl Register for __m512 {
         mul(other) = _mm512_mul_ps;
         div(other) = _mm512_div_ps;
         sqrt() = _mm512_sqrt_ps;
+        larger(other) = _mm512_max_ps;
+        smaller(other) = _mm512_min_ps;
     }
 
     comparisons! {
@@ -211,38 +188,8 @@ impl Register for __m512 {
     }
 
     #[inline(always)]
-    fn splat(value: f32) -> Self {
-        // SAFETY: the processor has the instruction (see the top of the file).
-        unsafe { _mm512_set1_ps(value) }
-    }
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        // SAFETY: as above.
-        unsafe { _mm512_xor_ps(self, _mm512_set1_ps(-0.0)) }
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        // SAFETY: as above.
-        unsafe { _mm512_andnot_ps(_mm512_set1_ps(-0.0), self) }
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        // SAFETY: as above.
-        Self::select(other.unordered(other), self, unsafe { _mm512_max_ps(self, other) })
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        // SAFETY: as above.
-        Self::select(other.unordered(other), self, unsafe { _mm512_min_ps(self, other) })
-    }
-
-    #[inline(always)]
     fn select(mask: __mmask16, this: Self, other: Self) -> Self {
-        // SAFETY: as above.
+        // SAFETY: the processor has the instruction (see the top of the file).
         unsafe { _mm512_mask_blend_ps(mask, other, this) }
     }
 
@@ -264,29 +211,6 @@ impl Register for __m512 {
             let quads = _mm512_insertf32x4::<1>(quads, quad(numbers(1)));
             let quads = _mm512_insertf32x4::<2>(quads, quad(numbers(2)));
             _mm512_insertf32x4::<3>(quads, quad(numbers(3)))
-        }
-    }
-
-    #[inline(always)]
-    fn columns(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        transpose_16(std::array::from_fn(|n| Self::from_quads(|place| row(4 * place + n))))
-    }
-
-    #[inline(always)]
-    fn rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
-        for (n, rows) in transpose_16(columns).into_iter().enumerate() {
-            // SAFETY: as above.
-            let quads = unsafe {
-                [
-                    _mm512_castps512_ps128(rows),
-                    _mm512_extractf32x4_ps::<1>(rows),
-                    _mm512_extractf32x4_ps::<2>(rows),
-                    _mm512_extractf32x4_ps::<3>(rows),
-                ]
-            };
-            for (place, quad) in quads.into_iter().enumerate() {
-                row(4 * place + n, numbers(quad));
-            }
         }
     }
 }
