@@ -30,7 +30,7 @@ pub trait Params<T>: Copy + Debug + Send + Sync + PartialEq + AsRef<[T]> {
 
 impl<T: Copy + Debug + Send + Sync + PartialEq + Zero, const K: usize> Params<T> for [T; K] {
     const LEN: usize = K;
-    // Not `std::array::from_fn`, which the compiler may leave as a call in the loops with SIMD lanes.
+    // Not `std::array::from_fn`, which may stay a call in the loops with SIMD lanes.
     #[inline(always)]
     fn from_fn(mut f: impl FnMut(usize) -> T) -> Self {
         let mut scalars = [T::zero(); K];

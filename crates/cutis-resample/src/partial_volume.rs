@@ -20,6 +20,9 @@ const POINTS: usize = u64::BITS as usize;
 /// places along each axis, and a wall parallel to a face of the voxel divides them evenly.
 const GENERATORS: [usize; 3] = [1, 41, 49];
 
+/// How many times the voxels of its rest box the deformed box of a tet may have.
+const LARGEST_GROWTH: u64 = 16;
+
 /// Gives the voxels that walls cross their mean over 64 points, and returns how many there were.
 ///
 /// `resampled` is the result of resampling `volume` through `warp`, on the CPU or a GPU. `at_walls`
@@ -28,6 +31,10 @@ const GENERATORS: [usize; 3] = [1, 41, 49];
 /// the value at its rest position, a point that the body has left as air, and any other point with
 /// the input's value there. A voxel without a point that the body has left is not crossed by a wall
 /// and keeps its value.
+///
+/// A tet is left out if the box around it has more than 16 times the voxels that it has at rest.
+/// Such a tet belongs to a run that has diverged, and lists of the voxels that it reaches would not
+/// fit in memory.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -88,6 +95,7 @@ impl Walls<'_> {
     fn voxels_at(&self, tets: &[u32]) -> Vec<u64> {
         let mut voxels: Vec<u64> = tets
             .par_iter()
+            .filter(|tet| !self.has_burst(&self.warp.tets[**tet as usize]))
             .flat_map_iter(|&tet| {
                 let mut found = Vec::new();
                 self.rows(&self.corners(self.warp.deformed, &self.warp.tets[tet as usize]), |first, end| {
@@ -104,7 +112,7 @@ impl Walls<'_> {
     /// The values of those voxels that walls cross.
     fn blend(&self, voxels: &[u64]) -> Vec<(u64, i16)> {
         let Self { volume, warp, shape, .. } = *self;
-        let held = self.pairs(voxels, warp.deformed, warp.tets, &|_| true);
+        let held = self.pairs(voxels, warp.deformed, warp.tets, &|tet| !self.has_burst(&warp.tets[tet]));
         let left = self.pairs(voxels, warp.rest, warp.tets, &|tet| warp.tet_moved(tet));
         let removed = self.pairs(voxels, warp.rest, warp.removed, &|_| true);
         let air = stored_air(volume);
@@ -188,6 +196,16 @@ impl Walls<'_> {
             .collect();
         pairs.par_sort_unstable();
         pairs
+    }
+
+    /// Whether the box around a deformed tet has too many voxels to list them.
+    fn has_burst(&self, tet: &[u32; 4]) -> bool {
+        let [rest, deformed] = [self.warp.rest, self.warp.deformed].map(|positions| {
+            let mut voxels = 0;
+            self.rows(&self.corners(positions, tet), |first, end| voxels += end - first);
+            voxels
+        });
+        deformed > LARGEST_GROWTH * rest.max(1)
     }
 
     /// Calls `visit(first, end)` for each row of voxels whose cubes touch the box around a tet.

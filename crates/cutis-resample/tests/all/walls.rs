@@ -154,6 +154,33 @@ fn a_body_that_did_not_move_keeps_all_values_and_so_do_voxels_away_from_walls() 
 }
 
 #[test]
+fn a_tet_that_has_burst_is_left_out() {
+    let grid = Grid { shape: [SIDE; 3], affine: oblique() };
+    let volume = scan(grid);
+    let body = divided(&grid);
+    let burst = body.tets.last().unwrap();
+    // The voxels that are blended if a vertex of the last tet moves by a distance in meters.
+    let blended = |distance: f32| {
+        let mut deformed = body.rest.clone();
+        deformed[burst[3] as usize] -= Vector3::from_element(distance);
+        let warp = Warp {
+            origin_mm: body.origin_mm,
+            rest: &body.rest,
+            deformed: &deformed,
+            tets: &body.tets,
+            body_tets: body.tets.len(),
+            removed: &[],
+        };
+        let (sharp, _) = resample(&volume, &warp, &|_, _| {}).unwrap();
+        blend_walls(&volume, &warp, &[body.tets.len() as u32 - 1], sharp).unwrap().1
+    };
+    for distance in [1e3, 1e30, f32::MAX] {
+        assert_eq!(blended(distance), 0, "{distance} m");
+    }
+    assert!(blended(2e-3) > 0, "the control, a tet that moved by a little");
+}
+
+#[test]
 fn invalid_walls_are_refused() {
     let grid = Grid { shape: [8; 3], affine: oblique() };
     let volume = noise(grid, 1);
