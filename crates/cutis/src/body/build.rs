@@ -56,6 +56,7 @@ impl Body {
         let mut cut = Cut::of_slits(&mesh, &skin, slits).map_err(|e| region::incision_error(sections, e))?;
         cut = cut.with(&mesh, pockets, pieces).map_err(cut_error(file))?;
         let removed = cut.apply(&mut mesh, &mut skin);
+        let skin_before_pieces = if cut.pieces.is_empty() { Vec::new() } else { skin.clone() };
         let (severed, growth) = match sections.cuts_grow {
             false => (cut.sever(&mut mesh, &mut skin).map_err(cut_error(file))?, None),
             true => cut.sever_growing(&mut mesh, &mut skin).map_err(cut_error(file))?.unzip(),
@@ -75,6 +76,7 @@ impl Body {
         Ok(Self {
             mesh,
             skin,
+            skin_before_pieces,
             inactive_skin,
             inactive_hu,
             skin_report,

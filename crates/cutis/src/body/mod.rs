@@ -44,6 +44,8 @@ pub(crate) struct Body {
     /// Skin triangles in mesh vertices, oriented outward; empty if the scene does not need the
     /// skin.
     pub(crate) skin: Vec<[u32; 3]>,
+    /// The skin before cuts of no width divide it; empty if no piece is taken out.
+    skin_before_pieces: Vec<[u32; 3]>,
     /// The skin outside the region of interest, which never moves.
     pub(crate) inactive_skin: InactiveSkin,
     /// HU at the positions of the inactive skin.
@@ -150,6 +152,20 @@ impl Body {
         ([positions, &inactive.positions, &edges].concat(), triangles.collect())
     }
 
+    /// The whole skin at rest before the first frame: positions and triangles. A piece that is
+    /// taken out later is in its place. If a piece is out from the start, none is in its place.
+    pub(crate) fn skin_at_start(&self) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
+        let finished = self.finished_cuts(0.0);
+        // The blades of pieces come last.
+        let pieces = &finished[finished.len() - self.cut.pieces.len()..];
+        if pieces.is_empty() || pieces.contains(&true) {
+            return self.whole_skin(&self.mesh.positions);
+        }
+        let InactiveSkin { positions, triangles, .. } = &self.inactive_skin;
+        let positions = [self.mesh.positions.as_slice(), positions].concat();
+        (positions, [self.skin_before_pieces.as_slice(), triangles].concat())
+    }
+
     /// The skin triangle in the scan of which each triangle of [`Body::whole_skin`] is a part.
     pub(crate) fn skin_in_scan(&self) -> Vec<[u32; 3]> {
         let pieces = self.severed.iter().flat_map(|severed| {
@@ -189,4 +205,46 @@ impl Body {
 /// Positions of points that move with vertices. None without positions of the vertices.
 fn embedded(points: &[Embedded], positions: &[Point3<f32>]) -> Vec<Point3<f32>> {
     if positions.is_empty() { Vec::new() } else { points.iter().map(|point| point.at(positions)).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Override;
+    use crate::ct::source;
+
+    /// Area in cm² of the skin before the first frame and of the whole skin, with and without an
+    /// excision.
+    fn areas(excision: &str) -> [f64; 2] {
+        let keys = [
+            ("volume.phantom", "{ size = [48, 48, 32], seed = 1 }"),
+            ("lattice.spacing_mm", "12.0"),
+            ("incision", "[]"),
+            ("excision", excision),
+        ];
+        let set = keys.map(|(key, value)| Override { key: key.into(), value: value.into() });
+        let loaded = crate::demo(&set).unwrap();
+        let body = Body::build(&BodySections::of(&loaded), &source::load(&loaded).unwrap().volume).unwrap();
+        let area = |(positions, triangles): (Vec<Point3<f32>>, Vec<[u32; 3]>)| {
+            let of = |triangle: &[u32; 3]| {
+                let [a, b, c] = triangle.map(|v| positions[v as usize].cast::<f64>());
+                (b - a).cross(&(c - a)).norm() / 2.0
+            };
+            triangles.iter().map(of).sum::<f64>() * 1e4
+        };
+        [area(body.skin_at_start()), area(body.whole_skin(&body.mesh.positions))]
+    }
+
+    #[test]
+    fn the_skin_at_the_start_has_the_piece_that_is_taken_out_later() {
+        let outline = "[[-40, 110, -40], [40, 110, -40], [40, 110, 40], [-40, 110, 40], [-40, 110, -40]]";
+        let piece = |time: &str| format!("[{{ path_mm = {outline}, depth_mm = 40{time} }}]");
+        let [uncut, whole] = areas("[]");
+        assert!((uncut - whole).abs() < 1e-6 * whole, "{uncut} and {whole} cm²");
+        let [later, without] = areas(&piece(", at_s = 0.01"));
+        assert!((later - uncut).abs() < 1e-6 * uncut, "{later} cm² of {uncut} cm²");
+        assert!(without < uncut - 50.0, "the piece has 64 cm² and more: {without} cm² of {uncut} cm²");
+        let [out, at_rest] = areas(&piece(""));
+        assert!((out - at_rest).abs() < 1e-6 * out && out < uncut - 50.0, "{out} cm²");
+    }
 }

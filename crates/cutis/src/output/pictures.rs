@@ -57,15 +57,15 @@ pub(super) fn draw(
     let flap = wounds.len() > 1 && !body.cut.pieces.is_empty();
     let wound = wounds.first().map(|slits| Wound::of(slits, frame));
     let focus = wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm });
-    let [at_rest, now] = [&body.mesh.positions, deformed.positions].map(|p| body.whole_skin(p).0);
-    let (_, triangles) = body.whole_skin(&[]);
-    let rest = Contour {
+    let (start, end) = (body.skin_at_start(), body.whole_skin(deformed.positions));
+    let contour = |(positions, triangles), color| Contour {
         origin_mm: body.mesh.frame.origin_mm,
-        positions: &at_rest,
-        triangles: &triangles,
-        color: COLORS[0],
+        positions,
+        triangles,
+        color,
     };
-    let moved = Contour { positions: &now, color: COLORS[1], ..rest };
+    let rest = contour((&start.0, &start.1), COLORS[0]);
+    let moved = contour((&end.0, &end.1), COLORS[1]);
     let (plane, middle_mm) = match &wound {
         Some(wound) => (wound.plane_across(), wound.middle_mm),
         None => (Plane::Axial, body.mesh.frame.origin_mm.into()),
