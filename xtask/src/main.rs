@@ -3,6 +3,7 @@
 
 mod default_features;
 mod examples;
+mod lanes;
 mod lines;
 mod miri;
 mod publish;

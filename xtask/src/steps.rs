@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 
 use crate::workspace::{Workspace, execute};
-use crate::{default_features, examples, miri, publish, python, tidy, tools, vulkan};
+use crate::{default_features, examples, lanes, miri, publish, python, tidy, tools, vulkan};
 
 struct Step {
     name: &'static str,
@@ -22,6 +22,7 @@ const STEPS: &[Step] = &[
     Step { name: "xtask", quick: true, run: xtask },
     Step { name: "clippy", quick: true, run: clippy },
     Step { name: "tests", quick: true, run: tests },
+    Step { name: "lanes", quick: false, run: lanes::run },
     Step { name: "examples", quick: false, run: examples::run },
     Step { name: "no-default-features", quick: false, run: default_features::run },
     Step { name: "third-party", quick: false, run: third_party },

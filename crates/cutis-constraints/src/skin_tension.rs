@@ -79,7 +79,8 @@ impl Constraint<3> for SkinTension {
         let c = area - rest_area;
         let q = (T::one() + T::constant(2.0 / 3.0) * amplification * stretch(c, rest_area)).simd_sqrt();
         let slope = T::constant(1.5) * q - T::constant(0.5) / q;
-        Eval { c: c * q, grad: grad.map(|g| g * slope) }
+        // Not `map`, which may stay a call in the loops with SIMD lanes.
+        Eval { c: c * q, grad: [grad[0] * slope, grad[1] * slope, grad[2] * slope] }
     }
 
     #[inline(always)]

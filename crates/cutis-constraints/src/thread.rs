@@ -66,7 +66,12 @@ impl Constraint<6> for Thread {
         let inverse = (T::one() / distance).select(distance.simd_gt(zero), zero);
         let direction = span * inverse.select(taut, zero);
         let one = T::one();
-        let grad = [(one - a) - b, a, b, (c - one) + d, -c, -d].map(|weight| direction * weight);
+        let weights = [(one - a) - b, a, b, (c - one) + d, -c, -d];
+        // Not `map`, which may stay a call in the loops with SIMD lanes.
+        let mut grad = [direction; 6];
+        for (grad, weight) in grad.iter_mut().zip(weights) {
+            *grad *= weight;
+        }
         Eval { c: excess.select(taut, zero), grad }
     }
 
