@@ -184,8 +184,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: the line of the deformed skin has the color of the skin at rest",
         "crates/cutis/src/output/pictures.rs",
-        "positions: &now, color: COLORS[1]",
-        "positions: &now, color: COLORS[0]",
+        "(&end.0, &end.1), COLORS[1]",
+        "(&end.0, &end.1), COLORS[0]",
     ),
     mutation(
         Outputs,
@@ -205,8 +205,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: the line of the deformed skin is the skin at rest",
         "crates/cutis/src/output/pictures.rs",
-        "Contour { positions: &now",
-        "Contour { positions: &at_rest",
+        "body.whole_skin(deformed.positions)",
+        "body.whole_skin(&body.mesh.positions)",
     ),
     mutation(
         Outputs,

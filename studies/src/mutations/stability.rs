@@ -59,7 +59,7 @@ pub const STABILITY: &[Mutation] = &[
         Stability,
         "skin tension with the published amplification in XPBD, Rust",
         "crates/cutis-constraints/src/skin_tension.rs",
-        "Eval { c: c * q, grad: grad.map(|g| g * slope) }",
+        "Eval { c: c * q, grad: [grad[0] * slope, grad[1] * slope, grad[2] * slope] }",
         "Eval { c: c * (T::one() + amplification * stretch(c, rest_area)), grad: grad.map(|g| g * (slope / slope)) }",
     ),
     mutation(
