@@ -4,7 +4,7 @@
 //! only where everything between them and the function for the processor is inlined. A closure that
 //! is called makes a loop several times slower and changes no result, so no other test sees it.
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::workspace::Workspace;
 
@@ -21,7 +21,7 @@ pub fn run(workspace: &Workspace) -> Result<()> {
         return Ok(());
     }
     let program = workspace.program()?;
-    let output = workspace.command("nm").arg(&program).output()?;
+    let output = workspace.command("nm").arg(&program).output().context("cannot start `nm` of binutils")?;
     ensure!(output.status.success(), "`nm {}` ended with {}", program.display(), output.status);
     let names = String::from_utf8_lossy(&output.stdout);
     ensure!(names.contains(LOOP), "{} has no function `{LOOP}`", program.display());

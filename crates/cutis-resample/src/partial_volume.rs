@@ -4,6 +4,8 @@
 //! as a flight of stairs. Here the voxels that a wall crosses take the mean over points within the
 //! voxel instead.
 
+use std::ops::Range;
+
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -201,29 +203,32 @@ impl Walls<'_> {
     /// Whether the box around a deformed tet has too many voxels to list them.
     fn has_burst(&self, tet: &[u32; 4]) -> bool {
         let [rest, deformed] = [self.warp.rest, self.warp.deformed].map(|positions| {
-            let mut voxels = 0;
-            self.rows(&self.corners(positions, tet), |first, end| voxels += end - first);
-            voxels
+            let spans = self.spans(&self.corners(positions, tet));
+            spans.iter().map(|span| span.len() as u64).product::<u64>()
         });
         deformed > LARGEST_GROWTH * rest.max(1)
     }
 
-    /// Calls `visit(first, end)` for each row of voxels whose cubes touch the box around a tet.
-    fn rows(&self, corners: &[Point3<f64>; 4], mut visit: impl FnMut(u64, u64)) {
-        let [columns, rows, _] = self.shape;
-        let span = |axis: usize| {
+    /// The columns, rows and slices of the voxels whose cubes touch the box around a tet.
+    fn spans(&self, corners: &[Point3<f64>; 4]) -> [Range<usize>; 3] {
+        std::array::from_fn(|axis| {
             let values = corners.map(|corner| corner[axis]);
             let low = values.into_iter().fold(f64::INFINITY, f64::min);
             let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max);
             let end = self.shape[axis] as f64;
             let first = (low - 0.5).ceil().clamp(0.0, end) as usize;
             first..((high + 0.5).floor() + 1.0).clamp(0.0, end) as usize
-        };
-        let (along, across) = (span(0), span(1));
+        })
+    }
+
+    /// Calls `visit(first, end)` for each row of the voxels of [`spans`](Self::spans).
+    fn rows(&self, corners: &[Point3<f64>; 4], mut visit: impl FnMut(u64, u64)) {
+        let [columns, rows, _] = self.shape;
+        let [along, across, slices] = self.spans(corners);
         if along.is_empty() {
             return;
         }
-        for k in span(2) {
+        for k in slices {
             for j in across.clone() {
                 let row = ((k * rows + j) * columns) as u64;
                 visit(row + along.start as u64, row + along.end as u64);

@@ -19,6 +19,19 @@ struct Divided {
     first: usize,
 }
 
+impl Divided {
+    fn warp<'a>(&'a self, deformed: &'a [Point3<f32>]) -> Warp<'a> {
+        Warp {
+            origin_mm: self.origin_mm,
+            rest: &self.rest,
+            deformed,
+            tets: &self.tets,
+            body_tets: self.tets.len(),
+            removed: &[],
+        }
+    }
+}
+
 /// The column in which the cut passes a voxel index.
 fn cut_at(j: f64, k: f64) -> f64 {
     11.3 + 0.31 * (j - 11.5) - 0.17 * (k - 11.5)
@@ -89,14 +102,7 @@ fn the_value_of_a_voxel_at_a_wall_is_the_share_of_the_tissue_in_it() {
             let step: Vector3<f32> = (affine.step_mm(0) * (opening / 1000.0)).map(|c| c as f32);
             let mut deformed = body.rest.clone();
             deformed[body.first..].iter_mut().for_each(|p| *p += step);
-            let warp = Warp {
-                origin_mm: body.origin_mm,
-                rest: &body.rest,
-                deformed: &deformed,
-                tets: &body.tets,
-                body_tets: body.tets.len(),
-                removed: &[],
-            };
+            let warp = body.warp(&deformed);
             let at_walls: Vec<u32> = (0..body.tets.len() as u32).collect();
             let (sharp, _) = resample(&volume, &warp, &|_, _| {}).unwrap();
             let (smooth, count) = blend_walls(&volume, &warp, &at_walls, sharp.clone()).unwrap();
@@ -123,14 +129,7 @@ fn a_body_that_did_not_move_keeps_all_values_and_so_do_voxels_away_from_walls() 
     let grid = Grid { shape: [SIDE; 3], affine: oblique() };
     let volume = noise(grid, 3);
     let body = divided(&grid);
-    let warp = Warp {
-        origin_mm: body.origin_mm,
-        rest: &body.rest,
-        deformed: &body.rest,
-        tets: &body.tets,
-        body_tets: body.tets.len(),
-        removed: &[],
-    };
+    let warp = body.warp(&body.rest);
     let at_walls: Vec<u32> = (0..body.tets.len() as u32).collect();
     assert_eq!(blend_walls(&volume, &warp, &at_walls, volume.clone()).unwrap(), (volume.clone(), 0));
 
@@ -163,14 +162,7 @@ fn a_tet_that_has_burst_is_left_out() {
     let blended = |distance: f32| {
         let mut deformed = body.rest.clone();
         deformed[burst[3] as usize] -= Vector3::from_element(distance);
-        let warp = Warp {
-            origin_mm: body.origin_mm,
-            rest: &body.rest,
-            deformed: &deformed,
-            tets: &body.tets,
-            body_tets: body.tets.len(),
-            removed: &[],
-        };
+        let warp = body.warp(&deformed);
         let (sharp, _) = resample(&volume, &warp, &|_, _| {}).unwrap();
         blend_walls(&volume, &warp, &[body.tets.len() as u32 - 1], sharp).unwrap().1
     };
