@@ -64,6 +64,20 @@ pub enum MeshError {
         /// Normal of the plane.
         normal: [f64; 3],
     },
+    /// A lattice point cannot be moved.
+    #[error(
+        "move {position} moves point {point} by {mm:?} mm; points must be below {count} and ascend, and displacements must be finite"
+    )]
+    Move {
+        /// Position in the list of moves.
+        position: usize,
+        /// Flat index of the point.
+        point: u32,
+        /// Its displacement in mm.
+        mm: [f64; 3],
+        /// Number of points.
+        count: usize,
+    },
     /// The through axis of a skin detection is not an index axis.
     #[error("through axis {axis} does not exist; it must be 0, 1 or 2")]
     Axis {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::MeshError;
 use crate::grading::Planes;
+use crate::moved::Moves;
 use crate::stencil::Stencil;
 
 /// The split of a lattice cell into tetrahedra.
@@ -34,12 +35,14 @@ pub enum Split {
 ///
 /// The points are evenly spaced, or, in a graded lattice ([`Lattice::graded`]), on planes that are
 /// farther apart outside a fine zone. Both kinds have the same cells, tets, neighbors and colors.
-/// Only the positions of the points differ.
+/// Only the positions of the points differ. This is also true of a lattice with points that are
+/// moved off the planes ([`Lattice::with_moves`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
     grid: Grid,
     split: Split,
     planes: Option<Arc<Planes>>,
+    moves: Option<Arc<Moves>>,
 }
 
 impl Lattice {
@@ -54,7 +57,7 @@ impl Lattice {
     /// range of 32-bit meters.
     pub fn new(grid: Grid, split: Split) -> Result<Self, MeshError> {
         Self::check(&grid, grid.shape)?;
-        Ok(Self { grid, split, planes: None })
+        Ok(Self { grid, split, planes: None, moves: None })
     }
 
     /// Creates a graded lattice. Its points are the intersections of `planes`, whose positions are
@@ -66,7 +69,7 @@ impl Lattice {
         Self::check(&even, even.shape)?;
         let grid = Grid { shape: planes.shape(), affine: even.affine };
         Self::check(&grid, even.shape)?;
-        Ok(Self { grid, split, planes: Some(Arc::new(planes)) })
+        Ok(Self { grid, split, planes: Some(Arc::new(planes)), moves: None })
     }
 
     /// Checks the limits of [`Lattice::new`]. `even_shape` is the number of points along each axis
@@ -99,9 +102,13 @@ impl Lattice {
 
     /// World position of a point in mm.
     pub fn mm(&self, point: [usize; 3]) -> Point3<f64> {
-        match &self.planes {
+        let on_planes = match &self.planes {
             None => self.grid.mm(point),
             Some(planes) => self.grid.affine.to_mm(planes.index(point)),
+        };
+        match &self.moves {
+            None => on_planes,
+            Some(moves) => on_planes + moves.of(self.grid.index(point)),
         }
     }
 
@@ -110,7 +117,17 @@ impl Lattice {
         self.planes.as_deref()
     }
 
-    /// Samples a volume at each point, in grid order, with the filter of [`sample::to_grid`] or
+    /// This lattice with these moves only.
+    pub(crate) fn moved(self, moves: Option<Moves>) -> Self {
+        Self { moves: moves.map(Arc::new), ..self }
+    }
+
+    /// The points that lie off the planes. `None` if there are none.
+    pub(crate) fn moves(&self) -> Option<&Moves> {
+        self.moves.as_deref()
+    }
+
+    /// Samples a volume at each point on the planes, in grid order, with the filter of [`sample::to_grid`] or
     /// [`sample::to_planes`].
     ///
     /// # Errors

@@ -17,6 +17,7 @@ mod grading;
 mod incision;
 mod lattice;
 mod mass;
+mod moved;
 mod neighbors;
 mod path;
 mod piece;

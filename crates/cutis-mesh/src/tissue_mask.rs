@@ -1,6 +1,6 @@
 //! The body as a set of lattice tets, and meshes of the whole body or of a region.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::build::NO_VERTEX;
@@ -101,6 +101,14 @@ impl TissueMask {
     /// The lattice of the body.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
+    }
+
+    /// The same body on a lattice with moved points ([`Lattice::with_moves`]).
+    ///
+    /// # Errors
+    /// The errors of [`Lattice::with_moves`].
+    pub fn with_moves(self, points: Vec<u32>, mm: Vec<Vector3<f64>>) -> Result<Self, MeshError> {
+        Ok(Self { lattice: self.lattice.with_moves(points, mm)?, ..self })
     }
 
     /// One flag per lattice point: true if it is a vertex of the body.

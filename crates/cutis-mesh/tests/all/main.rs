@@ -8,6 +8,7 @@ mod growth;
 mod incision;
 mod lattice;
 mod lip_pairs;
+mod moved;
 mod oracle;
 mod real_data;
 mod region;
