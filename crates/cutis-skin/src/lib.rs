@@ -1,9 +1,10 @@
-//! Fields on the skin of a lattice body: smooth normals, directions of tension, and depth below the
-//! skin.
+//! Fields on the skin of a lattice body: smooth normals, directions of tension, depth below the skin,
+//! and moves onto a smooth surface.
 #![doc = ""]
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod blur;
 mod body_skin;
 mod depth;
 mod directions;
@@ -11,6 +12,7 @@ mod error;
 mod field;
 mod nearest;
 mod normals;
+mod skin_moves;
 mod strokes;
 mod vertices;
 
@@ -20,4 +22,5 @@ pub use directions::{Directions, TangentField};
 pub use error::SkinError;
 pub use field::{CellData, SkinField};
 pub use normals::Normals;
+pub use skin_moves::SkinMoves;
 pub use strokes::{Place, Polyline, Strokes};

@@ -70,7 +70,7 @@ impl Normals {
         let opacity = Opacity::blurred(skin);
         let around = facets::means(skin, &SkinVertices::of(skin));
         let normal = |(triangle, around): (&[u32; 3], &Vector3<f64>)| {
-            let gradient = opacity.gradient(triangle);
+            let gradient = opacity.gradient(skin.lattice().grid(), triangle);
             let normal = (gradient.per_step >= LEAST_GRADIENT).then(|| -gradient.direction.normalize());
             // Also catches a gradient that overflowed.
             match normal.filter(|normal| normal.dot(around) > 0.0) {

@@ -5,5 +5,6 @@ mod directions;
 mod normals;
 mod real_data;
 mod shapes;
+mod skin_moves;
 mod strokes;
 mod threads;

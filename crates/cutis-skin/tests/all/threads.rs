@@ -1,6 +1,6 @@
 //! The bits of all fields do not depend on the number of threads.
 
-use cutis_skin::{Directions, SkinField, Strokes, depth_mm};
+use cutis_skin::{Directions, SkinField, SkinMoves, Strokes, depth_mm};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::shapes::{Body, lattice};
@@ -25,7 +25,9 @@ fn fields_do_not_depend_on_the_number_of_threads() {
             });
             let depths: Vec<u32> =
                 depth_mm(&body.skin(), 9.0).unwrap().into_iter().map(f32::to_bits).collect();
-            (bits, depths)
+            let moves = SkinMoves::of(&body.skin()).mm;
+            let moves: Vec<u64> = moves.iter().flatten().map(|c| c.to_bits()).collect();
+            (bits, depths, moves)
         })
     };
     let one = run(1);
