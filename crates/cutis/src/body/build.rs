@@ -2,6 +2,7 @@
 
 use cutis_mesh::sever::Severed;
 use cutis_mesh::{Cut, Excision, Incision, Lattice, Piece, Pocket, Skin, Slit, TetMesh, Tissue, TissueMask};
+use cutis_skin::{BodySkin, SkinMoves};
 use cutis_volume::{TableKind, Volume};
 use nalgebra::Point3;
 
@@ -27,11 +28,13 @@ impl Body {
         let (whole, skin) = find_tissue(sections, &lattice, &found, &mut warnings)?;
         let (skin, skin_report) = skin.map(|skin| (skin.triangles, skin.report)).unzip();
         let skin: Vec<[u32; 3]> = skin.unwrap_or_default();
+        let whole = if sections.smooth_skin { smooth(sections, whole, &hu, &skin)? } else { whole };
+        let lattice = whole.lattice();
         let incisions: Vec<Incision> = incisions.iter().map(Incision::from).collect();
-        let slits = Slit::on_lattice(&lattice, &skin, &incisions).map_err(cut_error(file))?;
+        let slits = Slit::on_lattice(lattice, &skin, &incisions).map_err(cut_error(file))?;
         let excisions: Vec<Excision> = excisions.iter().map(Excision::from).collect();
-        let pieces = Piece::on_lattice(&lattice, &skin, &excisions).map_err(cut_error(file))?;
-        let pockets = Pocket::on_lattice(&lattice, &skin, &slits, &pieces, underminings);
+        let pieces = Piece::on_lattice(lattice, &skin, &excisions).map_err(cut_error(file))?;
+        let pockets = Pocket::on_lattice(lattice, &skin, &slits, &pieces, underminings);
         let pockets = pockets.map_err(cut_error(file))?;
         let from_cuts_mm = |p: Point3<f32>| {
             let slits = slits.iter().map(|slit| slit.distance(p));
@@ -116,6 +119,18 @@ fn find_tissue(
     }
     skin.triangles = on_body;
     Ok((whole, Some(skin)))
+}
+
+/// The body with the vertices of its skin on a smooth surface. `hu` has one value per lattice point.
+fn smooth(
+    sections: &BodySections<'_>,
+    whole: TissueMask,
+    hu: &[f32],
+    skin: &[[u32; 3]],
+) -> Result<TissueMask, Error> {
+    let on_planes = BodySkin::new(whole.lattice(), hu, whole.vertices(), skin);
+    let SkinMoves { points, mm, .. } = SkinMoves::of(&on_planes.map_err(sections.file.blame("tissue"))?);
+    whole.with_moves(points, mm).map_err(sections.file.blame("skin.smooth"))
 }
 
 /// Divides the masses of vertices along cuts of no width among the nodes of the copies. A node

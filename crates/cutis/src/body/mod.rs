@@ -26,7 +26,7 @@ pub(crate) use lattice::even_shape;
 pub(crate) use lattice::lattice;
 pub(crate) use materials::BodyMaterials;
 pub(crate) use membrane::{Membrane, Tangent};
-pub(crate) use sections::{BodySections, needs_skin};
+pub(crate) use sections::{BodySections, needs_skin, smooth_skin};
 
 /// HU below which a lattice point is air, unless a scene says otherwise: the HU at which opacity
 /// begins to rise in the paper's table. A point with exactly this HU is tissue.

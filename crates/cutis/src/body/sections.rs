@@ -17,6 +17,8 @@ pub(crate) struct BodySections<'a> {
     pub(crate) tissue: &'a TissueSection,
     /// Rule by which the skin is found; none if the scene does not need the skin.
     pub(crate) skin: Option<SkinMode>,
+    /// Whether the vertices of the skin move onto a smooth surface.
+    pub(crate) smooth_skin: bool,
     /// The membrane that needs normals and directions of the skin; none if the scene has none, or a
     /// model without constraints.
     pub(crate) membrane: Option<&'a MembraneSection>,
@@ -46,7 +48,8 @@ impl<'a> BodySections<'a> {
             lattice: &scene.lattice,
             tissue: &scene.tissue,
             skin: needs_skin(scene).then_some(scene.skin.mode),
-            membrane: scene.constraints.membrane.as_ref().filter(|_| scene.model == ModelChoice::Pbd),
+            smooth_skin: smooth_skin(scene),
+            membrane: membrane(scene),
             materials: scene.used_materials(),
             incisions: &scene.incision,
             underminings: scene
@@ -64,9 +67,20 @@ impl<'a> BodySections<'a> {
     }
 }
 
+/// The membrane of a scene whose model has constraints.
+fn membrane(scene: &Scene) -> Option<&MembraneSection> {
+    scene.constraints.membrane.as_ref().filter(|_| scene.model == ModelChoice::Pbd)
+}
+
+/// Whether the vertices of the skin move onto a smooth surface.
+pub(crate) fn smooth_skin(scene: &Scene) -> bool {
+    scene.skin.smooth.unwrap_or(membrane(scene).is_some())
+}
+
 /// Whether a part of the scene refers to the skin, so that it must be found.
 pub(crate) fn needs_skin(scene: &Scene) -> bool {
     scene.constraints.need_skin()
+        || smooth_skin(scene)
         || scene.cuts()
         || scene.output.surface
         || scene.output.pictures

@@ -1,7 +1,7 @@
 //! The parts that a scene leaves out and does not pay for, for every model.
 
 use crate::backend::{self, Chosen};
-use crate::body::{Body, even_shape, needs_skin};
+use crate::body::{Body, even_shape, needs_skin, smooth_skin};
 use crate::model::constraints::kinds::KINDS;
 use crate::output::report::MemoryPart;
 use crate::scene::Scene;
@@ -12,6 +12,10 @@ pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
     let gpu = format!("gpu: {}", backend::ABSENT.unwrap_or("no device is opened"));
     let lines = [
         (!needs_skin(scene), "skin: not detected, nothing refers to it"),
+        (
+            needs_skin(scene) && !smooth_skin(scene),
+            "skin.smooth: the vertices of the skin stay on the planes of the lattice",
+        ),
         (!scene.cuts(), "incision: nothing is cut"),
         (scene.suture.is_empty(), "suture: nothing is closed"),
         (scene.handle.is_empty(), "handle: nothing is dragged"),

@@ -107,6 +107,7 @@ pub(crate) fn validate(scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
     let why =
         "must be left out with model = \"chainmail\", whose links all have the length of one lattice step";
     check.require(scene.lattice.grading.is_none(), "lattice.grading", "", why)?;
+    check.require(scene.skin.smooth != Some(true), "skin.smooth", true, why)?;
     let why = "must be left out with model = \"chainmail\", whose links have no force that a thread could \
                hold; model = \"pbd\" has sutures";
     let count = scene.suture.len();

@@ -197,7 +197,7 @@ impl<'de> Deserialize<'de> for TableChoice {
     }
 }
 
-/// Which triangles are skin.
+/// Which triangles are skin, and where their vertices are.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SkinSection {
@@ -205,4 +205,10 @@ pub struct SkinSection {
     /// tissue and the rest, or the paper's rule, taken literally.
     #[serde(default)]
     pub mode: SkinMode,
+    /// Whether the vertices of the skin move onto a smooth surface, half a lattice step below the
+    /// skin of the CT. If not, the skin is a staircase of lattice facets, and its tension depends on
+    /// how the patient lies on the lattice. Left out: true for `constraints.membrane`, false
+    /// otherwise. ChainMail needs a regular lattice and refuses it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smooth: Option<bool>,
 }
