@@ -115,66 +115,6 @@ impl Wound {
     }
 }
 
-/// A point of the skin where a blade cuts an edge, on one side of the cut.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LipPoint {
-    /// The edge, in vertices of the mesh, the lower one first.
-    pub edge: [u32; 2],
-    /// True on the positive side of the blade.
-    pub right: bool,
-    /// The point.
-    pub at: Embedded,
-}
-
-impl Wound {
-    /// The points of both lips of a blade: where it separates the ends of edges of the skin. At
-    /// rest the two points of an edge are at one place. They are in the order of the edges.
-    pub fn lips(
-        &self,
-        mesh: &TetMesh,
-        triangles: &[[u32; 3]],
-        copies: &[TriangleCopy],
-        blade: usize,
-    ) -> Vec<LipPoint> {
-        let mut points = Vec::new();
-        for own in copies {
-            let split = &self.split[own.split as usize];
-            let Some(distances) = self.distances_to(split, blade) else { continue };
-            let Some(own_part) = own.part else { continue };
-            let corners = &mesh.tets[split.tet as usize];
-            let nodes = self.copy_of(split, own_part).map(|copy| self.copies[copy].nodes);
-            let in_face = |corner: usize| triangles[own.triangle as usize].contains(&corners[corner]);
-            for held in (0..4).filter(|&corner| in_face(corner) && split.parts[corner] == own_part) {
-                let apart = |other: usize| {
-                    split.parts[other] != own_part && (distances[held] >= 0.0) != (distances[other] >= 0.0)
-                };
-                for other in (0..4).filter(|&corner| in_face(corner) && apart(corner)) {
-                    let Some(nodes) = nodes else { continue };
-                    // The same weights for both lips.
-                    let (low, high) =
-                        if corners[held] < corners[other] { (held, other) } else { (other, held) };
-                    let part = distances[low] / (distances[low] - distances[high]);
-                    let mut weights = [0.0; 4];
-                    weights[low] = 1.0 - part;
-                    weights[high] = part;
-                    let edge = [corners[low], corners[high]];
-                    let right = distances[held] >= 0.0;
-                    points.push(LipPoint { edge, right, at: Embedded { nodes, weights } });
-                    // A blade through lattice points leaves the part behind them without a volume.
-                    // There the lip is the skin of the whole tets, which has the same corner.
-                    if self.copy_of(split, split.parts[other]).is_none() {
-                        let at = Embedded { nodes: *corners, weights };
-                        points.push(LipPoint { edge, right: !right, at });
-                    }
-                }
-            }
-        }
-        points.sort_by_key(|point| (point.edge, point.right));
-        points.dedup_by_key(|point| (point.edge, point.right));
-        points
-    }
-}
-
 pub(super) fn unit(corner: usize) -> Barycentric {
     std::array::from_fn(|axis| f64::from(u8::from(axis == corner)))
 }

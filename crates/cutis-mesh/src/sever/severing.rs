@@ -232,5 +232,5 @@ pub(crate) fn longest_edge(lattice: &Lattice) -> f64 {
         steps.fold(1.0, f64::max)
     });
     // The main diagonal is at most the sum of the three steps, also in a sheared lattice.
-    (coarsest * spacing.iter().sum::<f64>() + 2.0 * lattice.longest_move_mm()) / 1000.0
+    (coarsest * spacing.iter().sum::<f64>()).max(lattice.longest_moved_edge_mm()) / 1000.0
 }

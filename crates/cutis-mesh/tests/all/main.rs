@@ -8,6 +8,7 @@ mod growth;
 mod incision;
 mod lattice;
 mod lip_pairs;
+mod lips;
 mod moved;
 mod oracle;
 mod real_data;
