@@ -150,7 +150,7 @@ fn a_cut_moves_only_what_it_sets_free() {
     };
     assert!(opening(&at_rest) > 3.0, "{} mm", opening(&at_rest));
     let [still, moved] = [&at_rest, &free].map(|run| far(run, &start));
-    assert!(still < 0.1 * moved && moved > 0.05, "{still} mm with the load, {moved} mm without");
+    assert!(still < 0.02 && still < 0.15 * moved, "{still} mm with the load, {moved} mm without");
 }
 
 /// Strips pull in the plane of the skin, although the facets of the lattice are not parallel to it.

@@ -81,7 +81,7 @@ fn an_excision_is_closed_by_sutures() {
     assert!(without.mid_mm > 2.0 * WIDTH + 1.0, "{without:?}");
     let sections: Vec<&str> = run.report.steps.iter().map(|step| step.section.as_str()).collect();
     assert_eq!(sections, ["excision[0]", "suture[0]"]);
-    assert!(run.report.steps[0].what.contains("76.0 × 31.9 mm"), "{:?}", run.report.steps);
+    assert!(run.report.steps[0].what.contains("76.0 × 31.8 mm"), "{:?}", run.report.steps);
 }
 
 /// Undermining makes closing easier, and a wound across the lines of tension is harder to close

@@ -12,7 +12,7 @@ pub const CUT: &str = "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], d
 /// `lines` is the axis of the lines of tension: `around` the trunk, across the cut, or `along` it.
 pub fn sewn(suture: &str, lines: &str, set: &[(&str, &str)]) -> LoadedScene {
     let constraints = format!(
-        "{{ distance = {{ youngs_modulus_pa = 2e4 }}, volume = {{ bulk_modulus_pa = 1e5 }}, membrane = {{ \
+        "{{ distance = {{ youngs_modulus_pa = 5e3 }}, volume = {{ bulk_modulus_pa = 2.5e4 }}, membrane = {{ \
          tension_along_n_per_m = 6, tension_across_n_per_m = 2, modulus_along_n_per_m = 60, \
          modulus_across_n_per_m = 60, directions = {{ {lines} = [0, 0, 1] }} }} }}"
     );

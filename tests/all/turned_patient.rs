@@ -5,7 +5,8 @@ use cutis_studies::patch::{Patient, TurnedSkin};
 /// The load across the cut and along the normal of the skin, in N/m, and whether the first one is
 /// the tension.
 fn load(skin: TurnedSkin, turn_deg: [f64; 3]) -> ([f64; 2], bool) {
-    let load = Patient::new(skin, turn_deg).load().unwrap();
+    let smooth = skin != TurnedSkin::Area;
+    let load = Patient { smooth, ..Patient::new(skin, turn_deg) }.load().unwrap();
     (load, Patient::has_right_load(load[0]))
 }
 

@@ -27,14 +27,14 @@ impl Cut {
              depth_mm = {depth_mm}{keys} }}]"
         );
         let constraints = format!(
-            "{{ distance = {{ youngs_modulus_pa = 2e4 }}, volume = {{ bulk_modulus_pa = 1e5 }}, membrane = \
+            "{{ distance = {{ youngs_modulus_pa = 5e3 }}, volume = {{ bulk_modulus_pa = 2.5e4 }}, membrane = \
              {{ tension_along_n_per_m = {along}, tension_across_n_per_m = {across}, modulus_along_n_per_m = \
              60, modulus_across_n_per_m = 60, directions = {{ {lines} = [0, 0, 1] }} }} }}"
         );
         let own = [
             ("scan_is_at_rest", "true"),
             ("lattice.split", "five"),
-            ("lattice.spacing_mm", "7"),
+            ("lattice.spacing_mm", "5"),
             ("lattice.region", "{ around_mm = 50 }"),
             ("incision", incision.as_str()),
             ("constraints", constraints.as_str()),

@@ -80,7 +80,8 @@ impl Cut {
         check_indices(triangles, mesh.positions.len())?;
         // All corners of a cut element are within the diagonal of a cell from the slit.
         let spacing_mm = mesh.lattice.grid().affine.spacing_mm();
-        let margin = (spacing_mm.iter().sum::<f64>() + 2.0 * mesh.lattice.longest_move_mm()) / 1000.0;
+        let longest_edge_mm = spacing_mm.iter().sum::<f64>().max(mesh.lattice.longest_moved_edge_mm());
+        let margin = longest_edge_mm / 1000.0;
         check_within(mesh, &slits, margin)?;
         let removes = |p| slits.iter().any(|slit| !slit.removes_nothing() && slit.near(p, margin));
         let near = mesh.positions.iter().map(|&p| removes(p)).collect();

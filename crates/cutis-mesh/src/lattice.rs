@@ -127,8 +127,8 @@ impl Lattice {
         self.moves.as_deref()
     }
 
-    /// Samples a volume at each point on the planes, in grid order, with the filter of [`sample::to_grid`] or
-    /// [`sample::to_planes`].
+    /// Samples a volume at each point on the planes, in grid order, with the filter of
+    /// [`sample::to_grid`] or [`sample::to_planes`].
     ///
     /// # Errors
     /// [`MeshError::Volume`] if the axes of the lattice are not those of the volume.

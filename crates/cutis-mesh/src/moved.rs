@@ -22,8 +22,8 @@ pub(crate) struct Moves {
     points: Vec<u32>,
     /// Displacement of each of these points in world mm.
     mm: Vec<Vector3<f64>>,
-    /// Length of the longest displacement in mm.
-    pub(crate) longest_mm: f64,
+    /// Length of the longest edge at these points in mm.
+    longest_edge_mm: f64,
 }
 
 impl Moves {
@@ -57,8 +57,8 @@ impl Lattice {
     /// ```
     ///
     /// # Errors
-    /// [`MeshError::Length`] if the arrays differ in length. [`MeshError::Move`] if a point does not
-    /// exist, is out of order, or has a displacement that is not finite.
+    /// [`MeshError::Length`] if the arrays differ in length. [`MeshError::Move`] if a point does
+    /// not exist, is out of order, or has a displacement that is not finite.
     pub fn with_moves(&self, points: Vec<u32>, mm: Vec<Vector3<f64>>) -> Result<Self, MeshError> {
         if points.len() != mm.len() {
             return Err(MeshError::Length { array: "mm", expected: points.len(), found: mm.len() });
@@ -78,20 +78,21 @@ impl Lattice {
             });
         }
         let on_planes = self.clone().moved(None);
-        let moves = Moves { points, mm, longest_mm: 0.0 }.shortened(&on_planes);
+        let moves = Moves { points, mm, longest_edge_mm: 0.0 }.shortened(&on_planes);
         Ok(on_planes.moved(Some(moves)))
     }
 
-    /// Length of the longest displacement of a point from its planes in mm.
-    pub(crate) fn longest_move_mm(&self) -> f64 {
-        self.moves().map_or(0.0, |moves| moves.longest_mm)
+    /// Length of the longest edge at a moved point in mm. It is 0 if no points are moved.
+    pub(crate) fn longest_moved_edge_mm(&self) -> f64 {
+        self.moves().map_or(0.0, |moves| moves.longest_edge_mm)
     }
 }
 
 impl Moves {
     /// Makes moves shorter until all tets of a lattice keep [`LEAST_VOLUME`].
     fn shortened(mut self, lattice: &Lattice) -> Self {
-        let mut cells = cells_around(lattice.grid(), &self.points);
+        let all = cells_around(lattice.grid(), &self.points);
+        let mut cells = all.clone();
         for round in 0.. {
             let tight = |cell: &usize| self.tight_corners(lattice, *cell);
             let mut tight: Vec<u32> = cells.par_iter().flat_map_iter(tight).collect();
@@ -108,27 +109,54 @@ impl Moves {
             }
             cells = cells_around(lattice.grid(), &tight);
         }
-        self.longest_mm = self.mm.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let longest = all.par_iter().map(|&cell| self.cell(lattice, cell).longest_edge(lattice));
+        self.longest_edge_mm = longest.reduce(|| 0.0, f64::max);
         self
     }
 
-    /// The corners with a move of the tets of a cell that keep too little volume.
-    fn tight_corners(&self, lattice: &Lattice, cell: usize) -> Vec<u32> {
+    fn cell(&self, lattice: &Lattice, cell: usize) -> Cell {
         let grid = lattice.grid();
-        let [i, j, k] = grid.point(cell);
-        let corners: [usize; 8] =
-            std::array::from_fn(|corner| grid.index(Lattice::corner([i, j, k], corner as u8)));
-        let rest = corners.map(|point| lattice.mm(grid.point(point)));
-        let moves = corners.map(|point| self.of(point));
-        let now: [Point3<f64>; 8] = std::array::from_fn(|corner| rest[corner] + moves[corner]);
+        let at = grid.point(cell);
+        let points: [usize; 8] = std::array::from_fn(|corner| grid.index(Lattice::corner(at, corner as u8)));
+        let rest = points.map(|point| lattice.mm(grid.point(point)));
+        let moves = points.map(|point| self.of(point));
+        Cell { at, points, rest, now: std::array::from_fn(|corner| rest[corner] + moves[corner]) }
+    }
+
+    /// The moved corners of the tets of a cell that keep too little volume.
+    fn tight_corners(&self, lattice: &Lattice, cell: usize) -> Vec<u32> {
+        let Cell { at: [i, j, k], points, rest, now } = self.cell(lattice, cell);
         let mut tight = Vec::new();
         for tet in lattice.cell_tets(i, j, k) {
             if volume(&now, tet) < LEAST_VOLUME * volume(&rest, tet) {
-                let moved = tet.iter().map(|&c| usize::from(c)).filter(|&c| moves[c] != Vector3::zeros());
-                tight.extend(moved.map(|corner| corners[corner] as u32));
+                let corners = tet.iter().map(|&corner| usize::from(corner));
+                let moved = corners.filter(|&corner| now[corner] != rest[corner]);
+                tight.extend(moved.map(|corner| points[corner] as u32));
             }
         }
         tight
+    }
+}
+
+/// A lattice cell with moved corners.
+struct Cell {
+    at: [usize; 3],
+    /// Flat indices of the corners.
+    points: [usize; 8],
+    /// Places of the corners on the planes, in world mm.
+    rest: [Point3<f64>; 8],
+    /// Moved places of the corners, in world mm.
+    now: [Point3<f64>; 8],
+}
+
+impl Cell {
+    /// Length of the longest edge of the tets in mm.
+    fn longest_edge(&self, lattice: &Lattice) -> f64 {
+        let [i, j, k] = self.at;
+        let tets = lattice.cell_tets(i, j, k).iter();
+        let edge = |a: u8, b: u8| (self.now[usize::from(a)] - self.now[usize::from(b)]).norm();
+        let edges = tets.flat_map(|tet| (0..4).flat_map(move |a| (0..a).map(move |b| [tet[a], tet[b]])));
+        edges.map(|[a, b]| edge(a, b)).fold(0.0, f64::max)
     }
 }
 

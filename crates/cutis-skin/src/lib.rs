@@ -1,5 +1,5 @@
-//! Fields on the skin of a lattice body: smooth normals, directions of tension, depth below the skin,
-//! and moves onto a smooth surface.
+//! Fields on the skin of a lattice body: smooth normals, directions of tension, depth below the
+//! skin, and moves onto a smooth surface.
 #![doc = ""]
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]

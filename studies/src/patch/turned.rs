@@ -32,9 +32,9 @@ const SIZE: usize = 80;
 const LATTICES_MM: [f64; 6] = [3.8, 3.9, 4.0, 4.1, 4.2, 4.3];
 /// Largest difference of an opening from the mean over the turns, or over these lattices.
 const OPENING_TOLERANCE: f64 = 0.03;
-/// Young's moduli of soft tissue and of firm tissue in Pa. The skin retracts over the length modulus
-/// of the membrane / modulus of the tissue, which is 12 mm and 3 mm: three steps of 4 mm, and less
-/// than one.
+/// Young's moduli of soft tissue and of firm tissue in Pa. The skin retracts over the length
+/// modulus of the membrane / modulus of the tissue, which is 12 mm and 3 mm: three steps of 4 mm,
+/// and less than one.
 const SOFT_PA: f64 = 5e3;
 const FIRM_PA: f64 = 2e4;
 /// Relative gradient at which the body is at rest.

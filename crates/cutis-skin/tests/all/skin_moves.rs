@@ -123,12 +123,12 @@ fn spheres(radius: f64) -> Measured {
 
 #[test]
 fn depths_below_the_exact_skin() {
-    half_spaces(Matrix3::identity() * 2.0, 30, Random::vector).check("half-spaces", [0.07, 0.10], [0.4, 0.6]);
-    tilted(2.0).check("half-spaces, tilted by 2°", [0.05, 0.25], [0.4, 0.6]);
-    tilted(5.0).check("half-spaces, tilted by 5°", [0.07, 0.24], [0.4, 0.6]);
-    tilted(10.0).check("half-spaces, tilted by 10°", [0.07, 0.18], [0.4, 0.6]);
-    spheres(4.0).check("spheres, radius 4 steps", [0.12, 0.15], [0.5, 0.9]);
-    spheres(9.0).check("spheres, radius 9 steps", [0.08, 0.12], [0.5, 0.75]);
+    half_spaces(Matrix3::identity() * 2.0, 30, Random::vector).check("half-spaces", [0.08, 0.10], [0.4, 0.6]);
+    tilted(2.0).check("half-spaces, tilted by 2°", [0.03, 0.24], [0.4, 0.6]);
+    tilted(5.0).check("half-spaces, tilted by 5°", [0.03, 0.2], [0.4, 0.6]);
+    tilted(10.0).check("half-spaces, tilted by 10°", [0.03, 0.12], [0.4, 0.6]);
+    spheres(4.0).check("spheres, radius 4 steps", [0.16, 0.18], [0.9, 1.1]);
+    spheres(9.0).check("spheres, radius 9 steps", [0.12, 0.14], [0.6, 0.85]);
     let mirrored = Rotation3::from_euler_angles(0.5, -0.2, 0.8).matrix()
         * Matrix3::from_diagonal(&Vector3::new(-1.5, 1.5, 1.5));
     half_spaces(mirrored, 10, Random::vector).check(
@@ -156,7 +156,8 @@ fn flat_skins_have_one_depth() {
     }
 }
 
-/// In the coarse part of a graded lattice the depth is half a step of that part.
+/// In the coarse part of a graded lattice the depth is half a step of that part, within a quarter
+/// of a step: the blur over growing steps shifts it.
 #[test]
 fn the_step_of_a_graded_lattice_is_that_at_the_skin() {
     let even = grid(POINTS, Matrix3::identity());
@@ -174,7 +175,7 @@ fn the_step_of_a_graded_lattice_is_that_at_the_skin() {
         for (&point, mm) in points.iter().zip(&mm) {
             let at = lattice.grid().point(point as usize);
             let depth = (skin - lattice.mm(at).z - mm.z) / step;
-            assert!(at[2] == n && (depth - 0.5).abs() < 0.15, "{share}: plane {} of {n}, {depth}", at[2]);
+            assert!(at[2] == n && (depth - 0.5).abs() < 0.25, "{share}: plane {} of {n}, {depth}", at[2]);
         }
     }
 }

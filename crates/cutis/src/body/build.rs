@@ -121,7 +121,8 @@ fn find_tissue(
     Ok((whole, Some(skin)))
 }
 
-/// The body with the vertices of its skin on a smooth surface. `hu` has one value per lattice point.
+/// The body with the vertices of its skin on a smooth surface. `hu` has one value per lattice
+/// point.
 fn smooth(
     sections: &BodySections<'_>,
     whole: TissueMask,

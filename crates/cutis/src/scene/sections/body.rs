@@ -206,8 +206,8 @@ pub struct SkinSection {
     #[serde(default)]
     pub mode: SkinMode,
     /// Whether the vertices of the skin move onto a smooth surface, half a lattice step below the
-    /// skin of the CT. If not, the skin is a staircase of lattice facets, and its tension depends on
-    /// how the patient lies on the lattice. Left out: true for `constraints.membrane`, false
+    /// skin of the CT. If not, the skin is a staircase of lattice facets, and its tension depends
+    /// on how the patient lies on the lattice. Left out: true for `constraints.membrane`, false
     /// otherwise. ChainMail needs a regular lattice and refuses it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub smooth: Option<bool>,
