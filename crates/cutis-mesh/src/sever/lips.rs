@@ -96,7 +96,8 @@ impl Wound {
         divided.sort_unstable();
         for (number, tet) in (0..).zip(&mesh.tets) {
             if tet.iter().any(is_wanted) && divided.binary_search(&number).is_err() {
-                tet.iter().for_each(|&vertex| _ = tets.entry(vertex).or_insert([*tet; 2]));
+                let ends = tet.iter().filter(|vertex| is_wanted(vertex));
+                ends.for_each(|&vertex| _ = tets.entry(vertex).or_insert([*tet; 2]));
             }
         }
         for split in &self.split {
