@@ -185,7 +185,7 @@ impl Patient {
         let [across, normal] = self.load_of(&built)?;
         let problem = Problem::of(&built.system, [0.0; 3])?;
         let before = problem.positions();
-        let options = Options { tolerance: AT_REST, max_iterations: 1000, ..Options::default() };
+        let options = Options { tolerance: AT_REST, max_iterations: 1000 };
         let after = problem.equilibrium(before, &options)?.positions;
         let gape = |x: &[Point3<f64>]| built.gapes[0].measure_by(&|v| x[v as usize]).mean_mm;
         let middle = self.middle(&phantom)?;
