@@ -123,7 +123,9 @@ fn weight_moves_nothing_in_a_scan_at_rest() {
 #[test]
 fn a_cut_moves_only_what_it_sets_free() {
     let run = |set: &[(&str, &str)]| {
-        let own = [REST, MEMBRANE, ("output", "{ report = true }"), ("run.checkpoint_every", "40")];
+        let staircase = ("skin.smooth", "false");
+        let own =
+            [REST, MEMBRANE, staircase, ("output", "{ report = true }"), ("run.checkpoint_every", "40")];
         Run::of(&scene(SMALL, &[&own, set].concat()))
     };
     // Median displacement of the vertices more than 120 mm from the middle of the cut, in mm. The
@@ -150,7 +152,7 @@ fn a_cut_moves_only_what_it_sets_free() {
     };
     assert!(opening(&at_rest) > 3.0, "{} mm", opening(&at_rest));
     let [still, moved] = [&at_rest, &free].map(|run| far(run, &start));
-    assert!(still < 0.02 && still < 0.15 * moved, "{still} mm with the load, {moved} mm without");
+    assert!(still < 0.1 * moved && moved > 0.05, "{still} mm with the load, {moved} mm without");
 }
 
 /// Strips pull in the plane of the skin, although the facets of the lattice are not parallel to it.

@@ -11,9 +11,9 @@ use crate::sutures::{CUT, sewn};
 /// Lattice step of these scenes, mm.
 const STEP: f64 = 7.0;
 
-/// Threads of 0.85 times the length that would close the wound.
+/// Threads of nine tenths of the length that would close the wound.
 const TIGHT: &str =
-    "[{ wound = 0, every_mm = 10, bite_mm = 7, at_s = 0.1, tighten_s = 0.2, tighten_to = 0.85 }]";
+    "[{ wound = 0, every_mm = 10, bite_mm = 7, at_s = 0.1, tighten_s = 0.2, tighten_to = 0.9 }]";
 
 /// Settings of the three formulations.
 fn formulations() -> [[(&'static str, &'static str); 4]; 3] {
@@ -27,14 +27,17 @@ fn formulations() -> [[(&'static str, &'static str); 4]; 3] {
     })
 }
 
-/// Firm tissue, which resists the threads.
-const FIRM: [(&str, &str); 2] =
-    [("constraints.distance.youngs_modulus_pa", "2e4"), ("constraints.volume.bulk_modulus_pa", "1e5")];
+/// Firm tissue and skin on the staircase of the lattice, which resist the threads.
+const FIRM: [(&str, &str); 3] = [
+    ("constraints.distance.youngs_modulus_pa", "2e4"),
+    ("constraints.volume.bulk_modulus_pa", "1e5"),
+    ("skin.smooth", "false"),
+];
 
 const OFF: (&str, &str) = ("constraints.contact.acts", "false");
 
 /// Threads that pull more than twice the tension of the wound close it, and its lips overlap by
-/// less than 3 % of a lattice step; in PBD, which has no stiffness, by less than 5 %. Control:
+/// less than 2 % of a lattice step; in PBD, which has no stiffness, by less than 5 %. Control:
 /// without contact they pass through each other.
 #[test]
 fn lips_that_threads_press_together_do_not_pass_through_each_other() {
@@ -48,7 +51,7 @@ fn lips_that_threads_press_together_do_not_pass_through_each_other() {
             let wound = report.wound.as_ref().unwrap();
             wound.mid_mm.min(wound.final_mm)
         };
-        let bound = if formulation[0].1 == "pbd" { 0.05 } else { 0.03 };
+        let bound = if formulation[0].1 == "pbd" { 0.05 } else { 0.02 };
         assert!(least(&closed) > -bound * STEP, "{formulation:?}: {:?}", closed.wound);
         assert!(least(&crossed) < -0.05 * STEP, "{formulation:?}: {:?}", crossed.wound);
         let overlap = closed.residuals.iter().find(|residual| residual.kind == "contact").unwrap();

@@ -10,8 +10,7 @@ use crate::blur::Blurred;
 use crate::vertices::SkinVertices;
 
 /// Standard deviation of the blur in lattice steps. A wider blur rounds the skin off, and a
-/// narrower one leaves more of the steps: with 1, the opening of a wound differs by 5 % between the
-/// turns of a patient, with √2 and with 2 by 3 %.
+/// narrower one leaves more of the steps.
 const SIGMA: f64 = SQRT_2;
 
 /// Depth of the smooth surface below the skin of the CT in lattice steps. It is the mean depth of
