@@ -24,8 +24,11 @@ const RANGE: [f64; 2] = [-0.6, 1.7];
 /// tissue is thinner than about two and a half lattice steps, so that its other side counts too.
 const LEAST_GRADIENT: f64 = 0.6;
 
-/// HU of air and of tissue, between which the share of tissue grows from 0 to 1.
-const RAMP_HU: [f32; 2] = [-1000.0, 0.0];
+/// HU of air.
+const AIR_HU: f32 = -1000.0;
+
+/// Lowest and highest HU of tissue: fat and water.
+const TISSUE_HU: [f32; 2] = [-100.0, 0.0];
 
 /// Moves of the skin vertices of a lattice body, for [`Lattice::with_moves`].
 ///
@@ -37,10 +40,12 @@ const RAMP_HU: [f32; 2] = [-1000.0, 0.0];
 /// ```
 ///
 /// `q` is the depth of the vertex in lattice steps and `h` the step along the outward normal `n`.
-/// `s` is the share of tissue, `clamp((HU + 1000)/1000, 0, 1)`, blurred with a standard deviation
-/// `σ` of √2 steps. `Φ` is the normal distribution function, which is what the blur makes of a flat
-/// skin. `n` is along `−∇s`. A point outside the body has a share only next to a vertex of the
-/// body, and at most ½, so that the scanner table does not count.
+/// `s` is the share of tissue, `clamp((HU + 1000)/(T + 1000), 0, 1)`, blurred with a standard
+/// deviation `σ` of √2 steps. `T` is the HU of the tissue there: the largest HU of the vertices of
+/// the body at the point and its 26 neighbors, clamped to −100 (fat) and 0. `Φ` is the normal
+/// distribution function, which is what the blur makes of a flat skin. `n` is along `−∇s`. A point
+/// outside the body has a share only next to a vertex of the body, and at most ½, so that the
+/// scanner table does not count.
 ///
 /// A vertex stays where it is if `q` is not a depth that a skin vertex can have, or if `∇s` does
 /// not fit a flat skin. This happens where tissue is thinner than about two and a half steps. A
@@ -100,20 +105,23 @@ impl SkinMoves {
 /// The share of tissue at each lattice point.
 fn tissue_shares(skin: &BodySkin<'_>) -> Vec<f32> {
     let grid = skin.lattice().grid();
-    let next_to_body = |point: usize| {
+    // The HU of the tissue at a point. None if no vertex of the body is there or next to it.
+    let tissue_hu = |point: usize| {
         let at = grid.point(point);
-        (0..27).any(|n: usize| {
+        let around = (0..27).filter_map(|n: usize| {
             let other = [at[0] + n % 3, at[1] + n / 3 % 3, at[2] + n / 9].map(|c| c.wrapping_sub(1));
-            (0..3).all(|axis| other[axis] < grid.shape[axis]) && skin.vertices()[grid.index(other)]
-        })
+            let other = (0..3).all(|axis| other[axis] < grid.shape[axis]).then(|| grid.index(other))?;
+            skin.vertices()[other].then(|| skin.hu()[other])
+        });
+        let [low, high] = TISSUE_HU;
+        around.reduce(f32::max).map(|hu| hu.max(low).min(high))
     };
-    let [air, tissue] = RAMP_HU;
     let share = |point: usize| {
         // The HU outside the body may be NaN.
-        let share = ((skin.hu()[point] - air) / (tissue - air)).max(0.0);
-        match skin.vertices()[point] {
-            true => share.min(1.0),
-            false if share > 0.0 && next_to_body(point) => share.min(0.5),
+        let above_air = (skin.hu()[point] - AIR_HU).max(0.0);
+        let most = if skin.vertices()[point] { 1.0 } else { 0.5 };
+        match above_air > 0.0 {
+            true => tissue_hu(point).map_or(0.0, |tissue| (above_air / (tissue - AIR_HU)).min(most)),
             false => 0.0,
         }
     };

@@ -138,6 +138,27 @@ fn depths_below_the_exact_skin() {
     );
 }
 
+/// Skin over fat is as deep as skin over muscle. The control is lighter than fat, so that its skin
+/// is taken for deeper.
+#[test]
+fn skin_over_fat_has_the_same_depth() {
+    let (lattice, mut random) = (lattice(POINTS, Matrix3::identity()), Random::new(3));
+    for _ in 0..8 {
+        let normal = random.vector().normalize();
+        let mut body = Body::from_ct(lattice.clone(), 3, |p| p.coords.dot(&normal));
+        let shares: Vec<f32> = body.hu.iter().map(|hu| (hu + 1000.0) / 1040.0).collect();
+        let [muscle, fat, light] = [1040.0, 900.0, 750.0].map(|hu_above_air| {
+            body.hu = shares.iter().map(|share| hu_above_air * share - 1000.0).collect();
+            let SkinMoves { points, mm, .. } = SkinMoves::of(&body.skin());
+            let at = |&point: &u32| lattice.mm(lattice.grid().point(point as usize));
+            points.iter().zip(&mm).map(|(point, mm)| -(at(point) + mm).coords.dot(&normal)).sum::<f64>()
+                / points.len() as f64
+        });
+        assert!((fat - muscle).abs() < 0.05, "{fat} over fat, {muscle} over muscle");
+        assert!((light - muscle).abs() > 0.05, "{light} over lighter tissue, {muscle} over muscle");
+    }
+}
+
 /// A flat skin across an axis stays flat, and its depth no longer depends on where it is between
 /// two planes.
 #[test]
