@@ -5,13 +5,15 @@ use std::path::Path;
 
 use cutis::volume::phantom::Phantom;
 use cutis::{LoadedScene, Scene, SceneSystem, build_system};
+use cutis_mesh::sever::Embedded;
 use cutis_newton::{Options, Problem};
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::kit::{Checks, Failure, Table};
 
-/// Tension along and across the lines in N/m. It is a fifth of the trunk's, so that strains are
-/// small.
+/// Tension along and across the lines in N/m. It is a fifth of that of the preset `trunk`, so that
+/// strains are small.
 const TENSION: [f64; 2] = [3.0, 1.0];
 /// Largest relative error of the load.
 const LOAD_TOLERANCE: f64 = 0.01;
@@ -23,26 +25,36 @@ const DEPTH_MM: f64 = 30.0;
 /// Half of the part of the cut where the load is measured, over the length of the cut. The ends of
 /// the cut lie on the lattice, so they do not count.
 const LOADED_PART: f64 = 0.4;
+/// Everything within this distance of the cut is simulated, mm.
+const AROUND_MM: f64 = 80.0;
+/// Planes beyond which tissue is fixed: axis of the patient (across the cut, outwards and along it)
+/// and distance from the middle of the cut in mm.
+const FIXED_MM: [(usize, f64); 5] = [(0, -60.0), (0, 60.0), (1, -50.0), (2, -80.0), (2, 80.0)];
 /// Middle of the cut along the body in mm.
 const MIDDLE_MM: f64 = -20.0;
+/// Half of the part of the cut where movements are averaged, over the length of the cut.
+const MEASURED_PART: f64 = 0.25;
 /// Range of distances from the cut in mm, in which displacements of the tissue are averaged.
 const TISSUE_MM: [f64; 2] = [4.0, 14.0];
 /// Depth below the skin in mm to which displacements are averaged.
 const SHALLOW_MM: f64 = 12.0;
-/// Voxels per axis of the phantom. They are 5 mm apart.
-const SIZE: usize = 80;
+/// Voxels per axis of the phantom. They are 2.5 mm apart, less than a lattice step.
+const SIZE: usize = 160;
 /// Lattice steps in mm of the patient that is not turned. The skin lies at another place within the
 /// cells of each.
 const LATTICES_MM: [f64; 6] = [2.8, 2.9, 3.0, 3.1, 3.2, 3.3];
 /// Largest difference of an opening from the mean over the turns, or over these lattices.
 const OPENING_TOLERANCE: f64 = 0.03;
-/// Young's moduli of soft tissue and of firm tissue in Pa. The skin retracts over the length
-/// modulus of the membrane / modulus of the tissue, which is 12 mm and 3 mm: three steps of 4 mm,
-/// and less than one.
-const SOFT_PA: f64 = 5e3;
+/// Young's moduli of fat (that of the preset `trunk`) and of firm tissue in Pa. The skin retracts
+/// over the length modulus of the membrane / modulus of the tissue, which is 18 mm and 3 mm: 4.6
+/// steps of 4 mm, and less than one.
+const FAT_PA: f64 = 3.25e3;
 const FIRM_PA: f64 = 2e4;
-/// Relative gradient at which the body is at rest.
-const AT_REST: f64 = 1e-6;
+/// Bulk modulus over Young's modulus, as in the presets.
+const BULK_TO_YOUNG: f64 = 10.0;
+/// Relative gradient at which the body is at rest. With 1e-6 the openings are the same within
+/// 0.01 mm, but some turns take hundreds of iterations: a node at the end of the cut holds little.
+const AT_REST: f64 = 1e-4;
 
 /// The skin of the patient.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,22 +88,22 @@ pub struct Patient {
 /// A wound of a patient.
 #[derive(Clone, Copy, Debug)]
 pub struct TurnedWound {
-    /// Load that the cut sets free across itself, along the skin, in N/m of its length. It is a mean
-    /// over the middle of the cut.
+    /// Load that the cut sets free across itself, along the skin, in N/m of its length: a mean over
+    /// the middle of the cut.
     pub across: f64,
     /// Load that the cut sets free along the normal of the skin, in either direction, in N/m of its
     /// length.
     pub normal: f64,
-    /// How far the lips move apart, in mm.
+    /// How far the lips move apart, in mm: a mean over the middle half of the cut.
     pub opening_mm: f64,
-    /// How far the tissue on both sides of the cut moves apart, in mm.
+    /// How far the tissue on both sides of the cut moves apart there, in mm.
     pub tissue_mm: f64,
 }
 
 impl Patient {
-    /// A patient with a smooth membrane over soft tissue, on a lattice of 4 mm.
+    /// A patient with a smooth membrane over fat, on a lattice of 4 mm.
     pub fn new(skin: TurnedSkin, turn_deg: [f64; 3]) -> Self {
-        Self { skin, split: "five", spacing_mm: 4.0, smooth: true, tissue_pa: SOFT_PA, turn_deg }
+        Self { skin, split: "five", spacing_mm: 4.0, smooth: true, tissue_pa: FAT_PA, turn_deg }
     }
 
     fn phantom(&self) -> Result<Phantom, Failure> {
@@ -128,13 +140,15 @@ impl Patient {
             }
         };
         let Self { split, spacing_mm, smooth, tissue_pa, turn_deg, .. } = self;
-        let bulk_pa = 10.0 * tissue_pa;
+        let fixed = self.fixed(&phantom)?;
+        let bulk_pa = BULK_TO_YOUNG * tissue_pa;
         let text = format!(
-            "scan_is_at_rest = true\nvolume.phantom = {{ size = [{SIZE}, {SIZE}, {SIZE}], seed = 1, turn_deg = \
-             {turn_deg:?} }}\nlattice = {{ spacing_mm = {spacing_mm:?}, split = '{split}', region = {{ \
-             around_mm = 40.0 }} }}\nskin.smooth = {smooth}\nconstraints = {{ distance = {{ youngs_modulus_pa = \
-             {tissue_pa:?} }}, volume = {{ bulk_modulus_pa = {bulk_pa:?} }}, {skin} }}\nincision = [{{ from_mm = \
-             {from:?}, to_mm = {to:?}, depth_mm = {DEPTH_MM:?} }}]\nsolver.formulation = 'vbd'\n"
+            "scan_is_at_rest = true\nmaterials = [{{ name = 'tissue', youngs_modulus_pa = {tissue_pa:?}, \
+             bulk_modulus_pa = {bulk_pa:?} }}]\nvolume.phantom = {{ size = [{SIZE}, {SIZE}, {SIZE}], seed = 1, \
+             turn_deg = {turn_deg:?} }}\nlattice = {{ spacing_mm = {spacing_mm:?}, split = '{split}', region = \
+             {{ around_mm = {AROUND_MM:?} }} }}\nskin.smooth = {smooth}\nconstraints = {{ distance = {{}}, \
+             volume = {{}}, {skin} }}\nincision = [{{ from_mm = {from:?}, to_mm = {to:?}, depth_mm = \
+             {DEPTH_MM:?} }}]\nfixed.planes = [{fixed}]\nsolver.formulation = 'vbd'\n"
         );
         Ok(Scene::parse(&text, Path::new("turned.toml"), Path::new(""), &[])?)
     }
@@ -149,6 +163,19 @@ impl Patient {
     fn middle(&self, phantom: &Phantom) -> Result<Vector3<f64>, Failure> {
         let ([_, front, _], _) = Phantom::new([SIZE; 3], 1)?.incision_site();
         Ok(phantom.place([0.0, front, MIDDLE_MM]).into())
+    }
+
+    /// The planes beyond which tissue is fixed. They turn with the patient, so that the body is the
+    /// same in each turn.
+    fn fixed(&self, phantom: &Phantom) -> Result<String, Failure> {
+        let middle = self.middle(phantom)?;
+        let axes = self.axes(phantom);
+        let planes = FIXED_MM.map(|(axis, at)| {
+            let point: [f64; 3] = (middle + axes[axis] * at).into();
+            let normal: [f64; 3] = (axes[axis] * at.signum()).into();
+            format!("{{ point_mm = {point:?}, normal = {normal:?} }}")
+        });
+        Ok(planes.join(", "))
     }
 
     /// Builds the patient and returns the load that the cut sets free: across it and along the
@@ -175,7 +202,7 @@ impl Patient {
         let positions = built.system.positions();
         for (v, force) in freed(built)?.into_iter().enumerate() {
             if built.system.vertices()[v].inverse_mass() > 0.0 {
-                let z = along.dot(&(positions[v].coords.cast() * 1e3 - middle));
+                let z = along.dot(&(built.frame.to_mm(positions[v]).coords - middle));
                 let weight = bump(z, [-half, half]);
                 sums[0] += weight * force.dot(&across).abs();
                 sums[1] += weight * force.dot(&normal).abs();
@@ -199,22 +226,30 @@ impl Patient {
         let before = problem.positions();
         let options = Options { tolerance: AT_REST, max_iterations: 1000 };
         let after = problem.equilibrium(before, &options)?.positions;
-        let gape = |x: &[Point3<f64>]| built.gapes[0].measure_by(&|v| x[v as usize]).mean_mm;
         let middle = self.middle(&phantom)?;
-        let mut sides = [(0.0, 0.0); 2];
+        let place =
+            |rest: Point3<f64>| axes.map(|axis| axis.dot(&(built.frame.to_mm(rest.cast()).coords - middle)));
+        // Weights fall to zero at the edges of the window.
+        let half = MEASURED_PART * LENGTH_MM;
+        let mut tissue = [Mean::default(); 2];
         for (rest, now) in before.iter().zip(&after) {
-            let [x, y, z] = axes.map(|axis| axis.dot(&(rest.coords * 1e3 - middle)));
-            // Weights fall to zero at the edges of the window.
-            let weight = bump(z, [-0.25 * LENGTH_MM, 0.25 * LENGTH_MM])
-                * bump(x.abs(), TISSUE_MM)
-                * bump(y, [-SHALLOW_MM, SHALLOW_MM]);
-            let side = &mut sides[usize::from(x > 0.0)];
-            side.0 += weight * axes[0].dot(&(now - rest)) * 1e3;
-            side.1 += weight;
+            let [x, y, z] = place(*rest);
+            let weight =
+                bump(z, [-half, half]) * bump(x.abs(), TISSUE_MM) * bump(y, [-SHALLOW_MM, SHALLOW_MM]);
+            tissue[usize::from(x > 0.0)].add(weight, axes[0].dot(&(now - rest)) * 1e3);
         }
-        let [left, right] = sides.map(|(sum, weight)| sum / weight);
-        let opening_mm = gape(&after) - gape(before);
-        Ok(TurnedWound { across, normal, opening_mm, tissue_mm: right - left })
+        let lip = |points: &[Embedded]| {
+            let mut mean = Mean::default();
+            for point in points {
+                let [rest, now] = [before, &after].map(|x| point.at_by(&|node| x[node as usize]));
+                mean.add(bump(place(rest)[2], [-half, half]), axes[0].dot(&(now - rest)) * 1e3);
+            }
+            mean.value()
+        };
+        let gape = &built.gapes[0];
+        let opening_mm = (lip(gape.left()) - lip(gape.right())).abs();
+        let tissue_mm = tissue[1].value() - tissue[0].value();
+        Ok(TurnedWound { across, normal, opening_mm, tissue_mm })
     }
 }
 
@@ -225,6 +260,24 @@ fn freed(built: &SceneSystem) -> Result<Vec<Vector3<f64>>, Failure> {
         *force += load.cast::<f64>();
     }
     Ok(forces)
+}
+
+/// A weighted mean.
+#[derive(Clone, Copy, Default)]
+struct Mean {
+    sum: f64,
+    weights: f64,
+}
+
+impl Mean {
+    fn add(&mut self, weight: f64, value: f64) {
+        self.sum += weight * value;
+        self.weights += weight;
+    }
+
+    fn value(self) -> f64 {
+        self.sum / self.weights
+    }
 }
 
 /// A parabola that is 1 in the middle of a range and 0 outside it.
@@ -302,16 +355,18 @@ impl Turned {
             turns().iter().map(|turn| vec![turn.map(|angle| format!("{angle}°")).join(", ")]).collect();
         for Row { name, patient, column, holds } in rows() {
             let Patient { skin, split, spacing_mm, tissue_pa, .. } = patient;
-            let mut wounds = Vec::new();
-            let mut right = true;
-            for (turn_deg, line) in turns().into_iter().zip(&mut lines) {
+            let wound = |turn_deg: [f64; 3]| {
                 let wound = Patient { turn_deg, ..patient }.wound()?;
                 eprintln!("{name} {split} {spacing_mm} mm {tissue_pa} Pa {turn_deg:?}: {wound:?}");
-                if column.is_some() {
+                Ok(wound)
+            };
+            let wounds: Result<Vec<TurnedWound>, Failure> = turns().into_par_iter().map(wound).collect();
+            let wounds = wounds?;
+            let right = wounds.iter().all(|wound| Patient::has_right_load(wound.across));
+            if column.is_some() {
+                for (line, wound) in lines.iter_mut().zip(&wounds) {
                     line.push(format!("{:.2} mm", wound.opening_mm));
                 }
-                right &= Patient::has_right_load(wound.across);
-                wounds.push(wound);
             }
             columns.extend(column.map(str::to_owned));
             let of = |value: fn(&TurnedWound) -> f64| Spread::of(wounds.iter().map(value));
