@@ -9,7 +9,9 @@
 //!
 //! Soundness for vertices: (1) A `Descent` and the system that it was built from are owned by one
 //! `Simulation`. Its incidences are those of the system's kinds. `Groups::verify_vertices` checks
-//! that no two vertices of a color are in one constraint, and that each vertex occurs once.
+//! that no two vertices of a color are in one constraint, and that each vertex occurs once. The
+//! teams of a color and its other vertices are the vertices of the group, each once: see
+//! `Teams::regroup`. The neighbors of a team are vertices of its constraints.
 //! (2) [`ColoredVertices`] borrows the system mutably for its whole lifetime. (3) Each chunk is
 //! handed out once. The thread that takes it moves the vertices of the chunk and reads the vertices
 //! that share a constraint with them. No other thread moves those meanwhile.
@@ -19,17 +21,20 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use cutis_constraints::{Scalar, SimdLevel};
+use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
-use crate::batch::{ConstraintChunk, Load, Store, VertexChunk};
+use crate::batch::{ConstraintChunk, Load, Store, TeamForces, VertexChunk};
 use crate::loads::load_of;
-use crate::runs::VERTEX_CHUNK;
+use crate::teams::{MOST_NEIGHBORS, Neighborhood, TEAM, TEAM_CHUNK};
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
 
 /// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so
 /// that a tiny body has several.
 const CHUNK: usize = if cfg!(miri) { 8 } else { 1024 };
+
+/// Number of vertices of a chunk that are in no team. Results do not depend on it.
+const VERTEX_CHUNK: usize = if cfg!(miri) { 4 } else { 128 };
 
 /// One color of one kind, shared between the threads that project it.
 ///
@@ -123,7 +128,9 @@ pub struct ColoredVertices<'a, T: Scalar> {
     kinds: &'a [Kind<T>],
     level: SimdLevel,
     descent: &'a Descent<T>,
-    range: Range<usize>,
+    teams: Range<usize>,
+    /// The vertices that are in no team.
+    others: &'a [u32],
     next: AtomicUsize,
     previous: &'a [Point3<T>],
     velocities: &'a [Vector3<T>],
@@ -140,11 +147,13 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
     pub fn new(color: VertexColor<'a, T>, level: SimdLevel) -> Self {
         let VertexColor { system, descent, pass } = color;
         let System { vertices, previous, velocities, loads, kinds, .. } = system;
+        let all = &descent.groups().order[pass.start..pass.end];
         Self {
             kinds,
             level,
             descent,
-            range: pass.start..pass.end,
+            teams: descent.teams().range(pass.color),
+            others: descent.teams().others(pass.color).unwrap_or(all),
             next: AtomicUsize::new(0),
             previous,
             velocities,
@@ -156,35 +165,140 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
 
     /// Takes the next free chunk and moves its vertices. Returns `false` if no chunk is left.
     pub fn move_next_chunk(&self) -> bool {
-        let Some(range) = next_chunk(&self.next, &self.range, VERTEX_CHUNK) else { return false };
-        let indices = &self.descent.groups().order[range];
-        let mut forces = [VertexForce::none(); VERTEX_CHUNK];
-        let forces = &mut forces[..indices.len()];
-        let plan = self.descent.runs().plan(indices);
-        let shared = || SharedVertices { vertices: self.vertices, borrow: PhantomData };
-        for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
-            let chunk = VertexChunk { incidence, indices, vertices: shared(), forces };
-            kind.vertex_forces_shared(self.level, &plan, chunk);
-        }
-        let mut vertices = shared();
-        for (&index, force) in indices.iter().zip(forces) {
-            let i = index as usize;
-            let (previous, velocity) = (&self.previous[i], &self.velocities[i]);
-            let (vertex, load) = (vertices.load(index), load_of(self.loads, i));
-            vertices.store(index, self.descent.step().moved(vertex, previous, velocity, force, load));
+        let number = self.next.fetch_add(1, Ordering::Relaxed);
+        let first = self.teams.len().div_ceil(TEAM_CHUNK);
+        if let Some(teams) = chunk(number, &self.teams, TEAM_CHUNK) {
+            teams.for_each(|team| self.move_team(team));
+        } else if let Some(range) = chunk(number - first, &(0..self.others.len()), VERTEX_CHUNK) {
+            self.move_others(&self.others[range]);
+        } else {
+            return false;
         }
         true
     }
 
+    /// Moves the vertices of a team, if it is not dissolved.
+    fn move_team(&self, team: usize) {
+        let teams = self.descent.teams();
+        let Some((count, neighbors)) = teams.neighbors(team) else { return };
+        let mut around = [[[T::zero(); TEAM]; 3]; MOST_NEIGHBORS];
+        T::in_lanes(self.level, Gather { neighbors, vertices: self.shared(), around: &mut around });
+        let mut forces = TeamForces::none();
+        for (number, kind) in self.kinds.iter().enumerate() {
+            kind.team_forces(self.level, &teams.constraints(number, team, &around), &mut forces);
+        }
+        let team = &neighbors[0][..count];
+        T::in_lanes(self.level, MoveTeam { color: self, team, around: &around[0], forces: &forces });
+    }
+
+    /// Moves vertices that are in no team.
+    fn move_others(&self, indices: &[u32]) {
+        let mut forces = [VertexForce::none(); VERTEX_CHUNK];
+        let forces = &mut forces[..indices.len()];
+        for (kind, incidence) in self.kinds.iter().zip(self.descent.incidences()) {
+            let chunk = VertexChunk { incidence, indices, vertices: self.shared(), forces };
+            kind.vertex_forces_shared(self.level, chunk);
+        }
+        for (&index, force) in indices.iter().zip(forces) {
+            self.move_vertex(index, force);
+        }
+    }
+
+    fn move_vertex(&self, index: u32, force: &VertexForce<T>) {
+        let i = index as usize;
+        let (previous, velocity) = (&self.previous[i], &self.velocities[i]);
+        let mut vertices = self.shared();
+        let (vertex, load) = (vertices.load(index), load_of(self.loads, i));
+        vertices.store(index, self.descent.step().moved(vertex, previous, velocity, force, load));
+    }
+
+    fn shared(&self) -> SharedVertices<'_, T> {
+        SharedVertices { vertices: self.vertices, borrow: PhantomData }
+    }
+
     /// Returns the number of chunks, which is an upper bound of the threads that can help.
     pub fn chunks(&self) -> usize {
-        self.range.len().div_ceil(VERTEX_CHUNK)
+        self.teams.len().div_ceil(TEAM_CHUNK) + self.others.len().div_ceil(VERTEX_CHUNK)
     }
+}
+
+/// Reads the positions of all vertices around a team.
+struct Gather<'a, T> {
+    neighbors: &'a [[u32; TEAM]],
+    vertices: SharedVertices<'a, T>,
+    around: &'a mut Neighborhood<T>,
+}
+
+impl<T: Scalar> LaneTask<T> for Gather<'_, T> {
+    #[inline(always)]
+    fn run<L: Lanes<T>>(self) {
+        let Self { neighbors, vertices, around } = self;
+        for (vertex, around) in neighbors.iter().zip(around) {
+            for first in (0..TEAM).step_by(L::LANES) {
+                let lanes = &vertex[first..first + L::LANES];
+                let columns = L::columns(|lane| vertices.load(lanes[lane]).components());
+                for axis in 0..3 {
+                    for lane in 0..L::LANES {
+                        around[axis][first + lane] = columns[axis].extract(lane);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Moves the vertices of a team.
+struct MoveTeam<'a, 'b, T: Scalar> {
+    color: &'a ColoredVertices<'b, T>,
+    team: &'a [u32],
+    /// Positions of the vertices.
+    around: &'a [[T; TEAM]; 3],
+    forces: &'a TeamForces<T>,
+}
+
+impl<T: Scalar> LaneTask<T> for MoveTeam<'_, '_, T> {
+    #[inline(always)]
+    fn run<L: Lanes<T>>(self) {
+        let Self { color, team, around, forces } = self;
+        let step = color.descent.step().splat::<L>();
+        let mut vertices = color.shared();
+        for (part, team) in team.chunks(L::LANES).enumerate() {
+            let first = part * L::LANES;
+            // Excess lanes repeat the last vertex.
+            let of = |lane: usize| team[lane.min(team.len() - 1)] as usize;
+            let x = vector::<L, T>(|lane, axis| around[axis][first + lane]);
+            let inverse_mass = L::from_lanes(|lane| vertices.load(of(lane) as u32).inverse_mass());
+            let previous = vector::<L, T>(|lane, axis| color.previous[of(lane)][axis]);
+            let velocity = vector::<L, T>(|lane, axis| color.velocities[of(lane)][axis]);
+            let load = vector::<L, T>(|lane, axis| load_of(color.loads, of(lane))[axis]);
+            let force = forces.lanes::<L>(first);
+            let moved = step.step(x.into(), inverse_mass, &previous.into(), &velocity, &force, load);
+            L::rows([moved.x, moved.y, moved.z, inverse_mass], |lane, components| {
+                if let Some(&vertex) = team.get(lane) {
+                    vertices.store(vertex, Vertex::from_components(components));
+                }
+            });
+        }
+    }
+}
+
+/// One vector per lane. `component(lane, axis)` returns its components.
+#[inline(always)]
+fn vector<L: Lanes<T>, T: Scalar>(component: impl Fn(usize, usize) -> T) -> Vector3<L> {
+    Vector3::new(
+        L::from_lanes(|lane| component(lane, 0)),
+        L::from_lanes(|lane| component(lane, 1)),
+        L::from_lanes(|lane| component(lane, 2)),
+    )
 }
 
 /// Takes the next `size` elements of `range`, or the rest of it. Each element is handed out once.
 fn next_chunk(next: &AtomicUsize, range: &Range<usize>, size: usize) -> Option<Range<usize>> {
-    let number = next.fetch_add(1, Ordering::Relaxed);
+    chunk(next.fetch_add(1, Ordering::Relaxed), range, size)
+}
+
+/// Chunk `number` of `range`, which has `size` elements, or the rest. `None` after the last one.
+fn chunk(number: usize, range: &Range<usize>, size: usize) -> Option<Range<usize>> {
     let start = range.start + number.saturating_mul(size).min(range.len());
     let end = range.end.min(start.saturating_add(size));
     (start < end).then_some(start..end)
@@ -200,8 +314,9 @@ pub struct SharedVertices<'a, T> {
 impl<T: Copy> Load<T> for SharedVertices<'_, T> {
     #[inline(always)]
     fn load(&self, index: u32) -> Vertex<T> {
-        // SAFETY: a batch passes only its own indices, which are below the number of vertices. No
-        // other thread moves a vertex of the constraint at hand (see the top of the file).
+        // SAFETY: a batch and a team pass only indices of constraints, which are below the number
+        // of vertices. No other thread moves a vertex of the constraint at hand (see the top of the
+        // file).
         unsafe { *self.vertices.add(index as usize) }
     }
 }

@@ -32,10 +32,10 @@
 //!   over-relaxation.
 
 use cutis_coloring::{ColoringError, Groups, Incidence, Tuples, greedy_vertices};
-use cutis_constraints::{Real, Scalar};
+use cutis_constraints::{Lanes, Real, Scalar};
 use nalgebra::{Point3, Vector3};
 
-use crate::runs::Runs;
+use crate::teams::Teams;
 use crate::{Formulation, Kind, Settings, SolverError, System, Vertex};
 
 /// Force on a vertex in N and the matrix of its quadratic model in N/m, summed over constraints.
@@ -59,8 +59,13 @@ impl<T: Real> VertexForce<T> {
     /// rest size.
     #[inline(always)]
     pub fn add(&mut self, c: T, g: &Vector3<T>, compliance: T, rest_size: T) {
+        self.add_stiff(c, g, T::one() / compliance, rest_size);
+    }
+
+    /// Adds a constraint with a stiffness of 1 / compliance.
+    #[inline(always)]
+    pub(crate) fn add_stiff(&mut self, c: T, g: &Vector3<T>, stiffness: T, rest_size: T) {
         let zero = T::zero();
-        let stiffness = T::one() / compliance;
         let stiff_gradient = g * stiffness;
         let stretch = c.simd_max(zero);
         let size = stretch + rest_size.simd_abs();
@@ -97,13 +102,7 @@ impl<T: Scalar> DescentStep<T> {
         }
     }
 
-    /// Returns the vertex after its step, `x + ω·H⁻¹·f` by LDLᵀ.
-    ///
-    /// In exact arithmetic each pivot of `H` is at least the inertia `m/h²`. The code keeps this
-    /// bound under rounding. If constraints are so stiff that the inertia is lost in the rounding
-    /// of `H`, the code uses `4ε·tr H` in its place. In this case the components of `f` across the
-    /// constraints consist of rounding errors and would move the vertex far away. A larger `H`
-    /// shortens the step across the constraints and leaves the step along them unchanged.
+    /// Returns the vertex after its step.
     #[inline]
     pub(crate) fn moved(
         &self,
@@ -113,12 +112,46 @@ impl<T: Scalar> DescentStep<T> {
         force: &VertexForce<T>,
         load: Vector3<T>,
     ) -> Vertex<T> {
-        let x = vertex.position();
-        let inertia = self.inverse_h_squared / vertex.inverse_mass();
+        let (x, inverse_mass) = (vertex.position(), vertex.inverse_mass());
+        Vertex::new(self.step(x, inverse_mass, previous, velocity, force, load), inverse_mass)
+    }
+
+    /// The constants in all lanes.
+    #[inline(always)]
+    pub(crate) fn splat<L: Lanes<T>>(&self) -> DescentStep<L> {
+        let [x, y, z] = self.gravity_h_squared.into();
+        DescentStep {
+            h: L::splat(self.h),
+            gravity_h_squared: Vector3::new(L::splat(x), L::splat(y), L::splat(z)),
+            inverse_h_squared: L::splat(self.inverse_h_squared),
+            relaxation: L::splat(self.relaxation),
+        }
+    }
+}
+
+impl<R: Real> DescentStep<R> {
+    /// Returns the position after a step, `x + ω·H⁻¹·f` by LDLᵀ.
+    ///
+    /// In exact arithmetic each pivot of `H` is at least the inertia `m/h²`. The code keeps this
+    /// bound under rounding. If constraints are so stiff that the inertia is lost in the rounding
+    /// of `H`, the code uses `4ε·tr H` in its place. In this case the components of `f` across the
+    /// constraints consist of rounding errors and would move the vertex far away. A larger `H`
+    /// shortens the step across the constraints and leaves the step along them unchanged.
+    #[inline(always)]
+    pub(crate) fn step(
+        &self,
+        x: Point3<R>,
+        inverse_mass: R,
+        previous: &Point3<R>,
+        velocity: &Vector3<R>,
+        force: &VertexForce<R>,
+        load: Vector3<R>,
+    ) -> Point3<R> {
+        let inertia = self.inverse_h_squared / inverse_mass;
         let target = previous + velocity * self.h + self.gravity_h_squared;
         let f = (force.force + load) + (target - x) * inertia;
         let d = force.diagonal;
-        let noise = T::constant(4.0) * T::simd_default_epsilon();
+        let noise = R::constant(4.0) * R::simd_default_epsilon();
         let least = ((d.x + d.y + d.z) * noise).simd_max(inertia);
         let a = d + Vector3::repeat(least);
         let b = force.mixed;
@@ -133,10 +166,10 @@ impl<T: Scalar> DescentStep<T> {
         let z3 = y3 / d3;
         let z2 = y2 / d2 - l32 * z3;
         let z1 = f.x / a.x - l21 * z2 - l31 * z3;
-        let step = Vector3::new(z1, z2, z3) * self.relaxation;
         // The product is zero for a finite number and NaN for any other.
-        let finite = step.map(|s| if s * T::zero() == T::zero() { s } else { T::zero() });
-        Vertex::new(x + finite, vertex.inverse_mass())
+        let finite = |s: R| s.select((s * R::zero()).simd_eq(R::zero()), R::zero());
+        let step = Vector3::new(z1, z2, z3) * self.relaxation;
+        x + Vector3::new(finite(step.x), finite(step.y), finite(step.z))
     }
 }
 
@@ -146,7 +179,7 @@ impl<T: Scalar> DescentStep<T> {
 pub struct Descent<T: Scalar> {
     groups: Groups,
     incidences: Vec<Incidence>,
-    runs: Runs,
+    teams: Teams<T>,
     step: DescentStep<T>,
 }
 
@@ -161,9 +194,7 @@ impl<T: Scalar> Descent<T> {
     pub fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
         let incidences = Self::incidences_of(system)?;
         let groups = groups_of(system, &tuples_of(system.kinds()), &incidences)?;
-        let arities: Vec<usize> = system.kinds().iter().map(|kind| kind.arity()).collect();
-        let runs = Runs::find(system.vertices().len(), &groups, &incidences, &arities);
-        Ok(Self { groups, incidences, runs, step: DescentStep::new(settings) })
+        Ok(Self { groups, incidences, teams: Teams::default(), step: DescentStep::new(settings) })
     }
 
     /// Returns the constraints at each vertex, for each kind, if the forces of all kinds are
@@ -178,29 +209,37 @@ impl<T: Scalar> Descent<T> {
         incidences.map_err(groups_error)
     }
 
-    /// Replaces the constraints at each vertex of one kind. Vertices that have or had one are no
-    /// longer part of runs.
+    /// Replaces the constraints at each vertex of one kind. The groups must be set afterwards.
+    /// Vertices that have or had a constraint are no longer in teams.
     pub(crate) fn set_incidence(&mut self, kind: usize, incidence: Incidence) {
         for incidence in [&self.incidences[kind], &incidence] {
             let vertices = (0..incidence.starts().len() as u32 - 1).filter(|&v| !incidence.of(v).is_empty());
-            self.runs.forget(vertices);
+            self.teams.dissolve(vertices);
         }
         self.incidences[kind] = incidence;
     }
 
-    /// Returns the runs of vertices.
-    pub(crate) fn runs(&self) -> &Runs {
-        &self.runs
+    /// Finds vertices of one color whose constraints have the same form, which are moved together
+    /// with SIMD lanes, and copies the parameters of these constraints. Results do not change.
+    pub fn find_teams(&mut self, system: &System<T>) {
+        let vertices = system.vertices().len();
+        self.teams = Teams::find(vertices, &self.groups, system.kinds(), &self.incidences);
+    }
+
+    /// Returns the teams of vertices.
+    pub(crate) fn teams(&self) -> &Teams<T> {
+        &self.teams
     }
 
     /// Replaces the groups by verified ones.
     pub(crate) fn set_groups(&mut self, groups: Groups) {
+        self.teams.regroup(&groups);
         self.groups = groups;
     }
 
     /// Colors the vertices again.
     pub(crate) fn color_again(&mut self, system: &System<T>) -> Result<(), SolverError> {
-        self.groups = groups_of(system, &tuples_of(system.kinds()), &self.incidences)?;
+        self.set_groups(groups_of(system, &tuples_of(system.kinds()), &self.incidences)?);
         Ok(())
     }
 
@@ -222,7 +261,12 @@ impl<T: Scalar> Descent<T> {
     /// Returns the memory of the groups and incidences in bytes.
     pub fn bytes(&self) -> usize {
         let groups = size_of_val(self.groups.order.as_slice()) + size_of_val(self.groups.offsets.as_slice());
-        groups + self.incidences.iter().map(Incidence::bytes).sum::<usize>() + self.runs.bytes()
+        groups + self.incidences.iter().map(Incidence::bytes).sum::<usize>()
+    }
+
+    /// Returns the memory of the teams in bytes, 0 if there are none.
+    pub fn team_bytes(&self) -> usize {
+        self.teams.bytes()
     }
 }
 

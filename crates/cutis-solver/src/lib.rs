@@ -61,7 +61,6 @@ mod loads;
 mod measures;
 mod passes;
 mod reference;
-mod runs;
 mod schedule;
 mod set;
 mod settings;
@@ -70,6 +69,7 @@ mod solver;
 mod step_profile;
 mod stiffness;
 mod system;
+mod teams;
 mod vertex;
 
 pub use builder::SystemBuilder;

@@ -95,6 +95,15 @@ impl<T: Scalar> Simulation<T> {
         })
     }
 
+    /// Finds teams for vertex block descent with SIMD lanes, see [`Descent::find_teams`]. Other
+    /// methods need none.
+    pub fn with_teams(mut self) -> Self {
+        if let Method::Descend(descent) = &mut self.method {
+            descent.find_teams(&self.system);
+        }
+        self
+    }
+
     /// Returns the body in its present state.
     pub fn system(&self) -> &System<T> {
         &self.system
@@ -160,6 +169,14 @@ impl<T: Scalar> Simulation<T> {
     /// Returns the memory of the multipliers in bytes: 0 unless XPBD runs more than one iteration.
     pub fn multiplier_bytes(&self) -> usize {
         self.multipliers.iter().map(|kind| size_of_val(kind.as_slice())).sum()
+    }
+
+    /// Returns the memory of the teams of vertex block descent in bytes, 0 without teams.
+    pub fn team_bytes(&self) -> usize {
+        match &self.method {
+            Method::Project(_) => 0,
+            Method::Descend(descent) => descent.team_bytes(),
+        }
     }
 
     /// Returns the memory of the incidences of vertex block descent in bytes, 0 for other methods.

@@ -123,14 +123,13 @@ pub trait Solver<T: Scalar>: Send {
     fn bytes(&self) -> Vec<MemoryPart> {
         let simulation = self.simulation();
         let mut parts = simulation.system().bytes();
-        let bytes = simulation.multiplier_bytes();
-        if bytes > 0 {
-            parts.push(MemoryPart { name: "multipliers", bytes });
-        }
-        let bytes = simulation.incidence_bytes();
-        if bytes > 0 {
-            parts.push(MemoryPart { name: "incidences", bytes });
-        }
+        let more = [
+            ("multipliers", simulation.multiplier_bytes()),
+            ("incidences", simulation.incidence_bytes()),
+            ("teams", simulation.team_bytes()),
+        ];
+        let more = more.into_iter().filter(|(_, bytes)| *bytes > 0);
+        parts.extend(more.map(|(name, bytes)| MemoryPart { name, bytes }));
         parts
     }
 }

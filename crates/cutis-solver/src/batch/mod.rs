@@ -14,10 +14,11 @@ use cutis_constraints::{Constraint, Scalar, SimdLevel};
 use nalgebra::Point3;
 
 use crate::colored::SharedVertices;
-use crate::runs::Plan;
+use crate::teams::TeamConstraints;
 use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
 
 pub use access::{Load, Store};
+pub use vertex_force::TeamForces;
 
 /// Upper bound of the number of SIMD lanes over all levels and number types.
 const MAX_LANES: usize = 16;
@@ -58,14 +59,9 @@ pub trait Project<T: Scalar> {
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>);
     /// Adds the forces with SIMD lanes while other threads move other vertices. No thread may
     /// move a vertex that shares a constraint with a vertex of this chunk.
-    ///
-    /// `plan` says which vertices of the chunk are runs.
-    fn vertex_forces_shared(
-        &self,
-        level: SimdLevel,
-        plan: &Plan,
-        chunk: VertexChunk<'_, T, SharedVertices<'_, T>>,
-    );
+    fn vertex_forces_shared(&self, level: SimdLevel, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>);
+    /// Adds the forces on the vertices of a team with SIMD lanes.
+    fn team_forces(&self, level: SimdLevel, team: &TeamConstraints<'_, T>, forces: &mut TeamForces<T>);
     /// Returns the number of vertices for which the indices were checked.
     fn vertex_count(&self) -> usize;
 }

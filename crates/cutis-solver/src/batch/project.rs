@@ -3,9 +3,9 @@
 use cutis_constraints::{Constraint, LaneTask, Lanes, Params, Scalar, SimdLevel};
 use nalgebra::Point3;
 
-use super::{Batch, ConstraintChunk, MAX_LANES, Project, Store, VertexChunk};
+use super::{Batch, ConstraintChunk, MAX_LANES, Project, Store, TeamForces, VertexChunk};
 use crate::colored::SharedVertices;
-use crate::runs::{Plan, RUN, VERTEX_CHUNK};
+use crate::teams::TeamConstraints;
 use crate::{Step, Values, Vertex, project};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
@@ -107,7 +107,6 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> LaneTask<T>
 /// The forces on the vertices of a chunk, for any number of lanes.
 struct ForceTask<'a, 'b, B, T: Scalar> {
     batch: &'a B,
-    plan: &'a Plan,
     chunk: VertexChunk<'a, T, SharedVertices<'b, T>>,
 }
 
@@ -116,28 +115,30 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> LaneTask<T>
 {
     #[inline(always)]
     fn run<L: Lanes<T>>(self) {
-        let Self { batch, plan, chunk } = self;
-        let VertexChunk { incidence, indices, vertices, forces } = chunk;
-        let mut others = [0; VERTEX_CHUNK];
-        let mut count = plan.others().len();
-        others[..count].copy_from_slice(plan.others());
-        for runs in plan.runs().chunk_by(|a, b| a.0 == b.0) {
-            let (whole, rest) = runs.split_at(runs.len() - runs.len() % (L::LANES / RUN));
-            for runs in whole.chunks_exact(L::LANES / RUN) {
-                batch.forces_of_runs::<L, _>(runs, incidence, indices, &vertices, forces);
-            }
-            for place in rest.iter().flat_map(|&(_, start)| start..start + RUN as u16) {
-                others[count] = place;
-                count += 1;
-            }
-        }
-        for places in others[..count].chunks(L::LANES) {
+        let VertexChunk { incidence, indices, vertices, forces } = self.chunk;
+        for (indices, forces) in indices.chunks(L::LANES).zip(forces.chunks_mut(L::LANES)) {
             let mut entries: [&[u32]; MAX_LANES] = [&[]; MAX_LANES];
-            for (entries, &place) in entries.iter_mut().zip(places) {
-                *entries = incidence.of(indices[place as usize]);
+            for (entries, &index) in entries.iter_mut().zip(indices) {
+                *entries = incidence.of(index);
             }
-            batch.forces_in_lanes::<L, _>(&entries[..places.len()], places, &vertices, forces);
+            self.batch.forces_in_lanes::<L, _>(&entries[..indices.len()], &vertices, forces);
         }
+    }
+}
+
+/// The forces on the vertices of a team, for any number of lanes.
+struct TeamTask<'a, B, T> {
+    batch: &'a B,
+    team: &'a TeamConstraints<'a, T>,
+    forces: &'a mut TeamForces<T>,
+}
+
+impl<C: Constraint<N>, const N: usize, T: Scalar> LaneTask<T>
+    for TeamTask<'_, Batch<C, N, T, C::Params<T>>, T>
+{
+    #[inline(always)]
+    fn run<L: Lanes<T>>(self) {
+        self.batch.forces_of_team::<L>(self.team, self.forces);
     }
 }
 
@@ -158,13 +159,12 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
         }
     }
 
-    fn vertex_forces_shared(
-        &self,
-        level: SimdLevel,
-        plan: &Plan,
-        chunk: VertexChunk<'_, T, SharedVertices<'_, T>>,
-    ) {
-        T::in_lanes(level, ForceTask { batch: self, plan, chunk });
+    fn vertex_forces_shared(&self, level: SimdLevel, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>) {
+        T::in_lanes(level, ForceTask { batch: self, chunk });
+    }
+
+    fn team_forces(&self, level: SimdLevel, team: &TeamConstraints<'_, T>, forces: &mut TeamForces<T>) {
+        T::in_lanes(level, TeamTask { batch: self, team, forces });
     }
 
     fn vertex_count(&self) -> usize {

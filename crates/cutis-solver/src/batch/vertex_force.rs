@@ -1,11 +1,10 @@
 //! The loops over the constraints of single vertices, for vertex block descent.
 
-use cutis_coloring::Incidence;
 use cutis_constraints::{Constraint, Lanes, Params, Scalar};
 use nalgebra::{Point3, Vector3};
 
 use super::{Batch, Load, MAX_LANES};
-use crate::runs::RUN;
+use crate::teams::{TEAM, TeamConstraints};
 use crate::{Values, VertexForce};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
@@ -22,63 +21,50 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         }
     }
 
-    /// Adds the forces on the vertices of runs of one pattern, as many as fill the lanes.
-    ///
-    /// `runs` are patterns and positions of first vertices in `indices`. The constraints of the
-    /// vertices of a run have one distance. If it is 1, they are read as one block.
+    /// Adds the forces on the vertices of a team.
     #[inline(always)]
-    pub(super) fn forces_of_runs<L: Lanes<T>, V: Load<T>>(
+    pub(super) fn forces_of_team<L: Lanes<T>>(
         &self,
-        runs: &[(u8, u16)],
-        incidence: &Incidence,
-        indices: &[u32],
-        load: &V,
-        forces: &mut [VertexForce<T>],
+        team: &TeamConstraints<'_, T>,
+        forces: &mut TeamForces<T>,
     ) {
-        let mut entries: [&[u32]; MAX_LANES / RUN] = [&[]; MAX_LANES / RUN];
-        let mut starts = [0; MAX_LANES / RUN];
-        for ((entries, start), &(_, at)) in entries.iter_mut().zip(&mut starts).zip(runs) {
-            *start = at as usize;
-            *entries = incidence.of(indices[*start]);
-        }
-        let next = incidence.of(indices[starts[0] + 1]);
-        let count = entries[0].len();
-        if count == 0 {
+        if team.entries.is_empty() {
             return;
         }
-        let stiffness = self.stiffness.values();
-        let place = |lane: usize| starts[lane / RUN] + lane % RUN;
-        let mut sum = gather_forces::<L, T>(forces, place);
-        for n in 0..count {
-            // With fewer lanes, the excess elements repeat the first run.
-            let mut first = [entries[0][n] as usize / N; MAX_LANES / RUN];
-            for (first, entries) in first.iter_mut().zip(&entries[..runs.len()]) {
-                *first = entries[n] as usize / N;
-            }
-            let corner = entries[0][n] as usize % N;
-            let step = (next[n] - entries[0][n]) as usize / N;
-            let last = (RUN - 1) * step + 1;
-            let tuples = first.map(|k| &self.indices[k..k + last]);
+        for first in (0..team.count).step_by(L::LANES) {
+            let mut sum = forces.lanes::<L>(first);
+            self.add_team(team, first, &mut sum);
+            forces.set_lanes(first, &sum);
+        }
+    }
+
+    /// Adds the forces on as many vertices of a team as there are lanes, from vertex `first` on.
+    #[inline(always)]
+    fn add_team<L: Lanes<T>>(&self, team: &TeamConstraints<'_, T>, first: usize, sum: &mut VertexForce<L>) {
+        let same = match self.stiffness.values() {
+            Values::Uniform(compliance) => Some(L::splat(T::one() / *compliance)),
+            Values::Each(_) => None,
+        };
+        let params_len = <C::Params<T> as Params<T>>::LEN;
+        let per_entry = params_len + usize::from(same.is_none());
+        let entries = team.entries.chunks_exact(N + 1);
+        for (entry, numbers) in entries.zip(team.numbers.chunks_exact(per_entry)) {
             let mut x = [Point3::origin(); N];
             for i in 0..N {
-                let row = |lane: usize| load.load(tuples[lane / RUN][lane % RUN * step][i]).components();
-                let [a, b, c, _] = L::columns(row);
-                x[i] = Point3::new(a, b, c);
+                let [a, b, c] = &team.neighborhood[entry[1 + i] as usize];
+                x[i] = Point3::new(load(a, first), load(b, first), load(c, first));
             }
-            let scalars = first.map(|k| &self.params[k..k + last]);
-            let params = Params::from_fn(|j| quads(step, &scalars, |params| params.as_ref()[j]));
-            let compliance = match stiffness {
-                Values::Uniform(value) => L::splat(*value),
-                Values::Each(values) => quads(step, &first.map(|k| &values[k..k + last]), |value| *value),
+            let params = Params::from_fn(|j| load(&numbers[j], first));
+            let stiffness = match same {
+                Some(stiffness) => stiffness,
+                None => load(&numbers[params_len], first),
             };
             let eval = C::eval(&x, &params);
-            sum.add(eval.c, &eval.grad[corner], compliance, C::rest_size(&params));
+            sum.add_stiff(eval.c, &eval.grad[entry[0] as usize], stiffness, C::rest_size(&params));
         }
-        scatter_forces(&sum, forces, L::LANES, place);
     }
 
     /// Adds the forces on several vertices, one per SIMD lane, at most as many as there are lanes.
-    /// `places` are their positions in `forces`.
     ///
     /// A lane whose vertex has fewer constraints than others repeats the constraint of another
     /// lane, and keeps its sum. So every lane has the bits of [`force_scalar`](Self::force_scalar).
@@ -86,12 +72,10 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     pub(super) fn forces_in_lanes<L: Lanes<T>, V: Load<T>>(
         &self,
         entries: &[&[u32]],
-        places: &[u16],
         load: &V,
         forces: &mut [VertexForce<T>],
     ) {
         let stiffness = self.stiffness.values();
-        let place = |lane: usize| places[lane.min(places.len() - 1)] as usize;
         let (mut common, mut longest) = (usize::MAX, 0);
         for (lane, own) in entries.iter().enumerate() {
             common = common.min(own.len());
@@ -102,7 +86,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             return;
         }
         let common = if entries.len() == L::LANES { common } else { 0 };
-        let mut sum = gather_forces::<L, T>(forces, place);
+        let mut sum = gather_forces::<L, T>(forces);
         let count =
             L::from_lanes(|lane| T::constant(entries.get(lane).map_or(0.0, |entries| entries.len() as f64)));
         for n in 0..most {
@@ -146,33 +130,55 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
                 sum.mixed = keep(sum.mixed, before.mixed);
             }
         }
-        scatter_forces(&sum, forces, places.len(), place);
+        scatter_forces(&sum, forces);
     }
 }
 
-/// A number of each constraint of some runs, whose constraints have the distance `step`.
+/// As many numbers as there are lanes, from place `first` on.
 #[inline(always)]
-fn quads<L: Lanes<T>, T: Scalar, V>(
-    step: usize,
-    runs: &[&[V]; MAX_LANES / RUN],
-    number: impl Fn(&V) -> T,
-) -> L {
-    if step == 1 {
-        // As one block, which the compiler can load with one instruction.
-        L::from_quads(|run| std::array::from_fn(|n| number(&runs[run][..RUN][n])))
-    } else {
-        L::from_quads(|run| std::array::from_fn(|n| number(&runs[run][n * step])))
+fn load<L: Lanes<T>, T: Scalar>(numbers: &[T; TEAM], first: usize) -> L {
+    let numbers = &numbers[first..first + L::LANES];
+    L::from_quads(|quad| [0, 1, 2, 3].map(|n| numbers[4 * quad + n]))
+}
+
+/// Forces on the vertices of a team, number by number.
+pub struct TeamForces<T>([[T; TEAM]; 9]);
+
+impl<T: Scalar> TeamForces<T> {
+    /// No force.
+    pub(crate) fn none() -> Self {
+        Self([[T::zero(); TEAM]; 9])
+    }
+
+    /// The forces on as many vertices as there are lanes.
+    #[inline(always)]
+    pub(crate) fn lanes<L: Lanes<T>>(&self, first: usize) -> VertexForce<L> {
+        let [a, b, c, d, e, f, g, h, i] = &self.0;
+        VertexForce {
+            force: Vector3::new(load(a, first), load(b, first), load(c, first)),
+            diagonal: Vector3::new(load(d, first), load(e, first), load(f, first)),
+            mixed: Vector3::new(load(g, first), load(h, first), load(i, first)),
+        }
+    }
+
+    #[inline(always)]
+    fn set_lanes<L: Lanes<T>>(&mut self, first: usize, sum: &VertexForce<L>) {
+        let parts = [&sum.force, &sum.diagonal, &sum.mixed];
+        for (row, numbers) in self.0.iter_mut().enumerate() {
+            let lanes = parts[row / 3][row % 3];
+            for lane in 0..L::LANES {
+                numbers[first + lane] = lanes.extract(lane);
+            }
+        }
     }
 }
 
-/// The forces at some places, one place per lane.
+/// Some forces, one per lane. Excess lanes repeat the last one.
 #[inline(always)]
-fn gather_forces<L: Lanes<T>, T: Scalar>(
-    forces: &[VertexForce<T>],
-    place: impl Fn(usize) -> usize,
-) -> VertexForce<L> {
+fn gather_forces<L: Lanes<T>, T: Scalar>(forces: &[VertexForce<T>]) -> VertexForce<L> {
+    let last = forces.len() - 1;
     let vector = |part: fn(&VertexForce<T>) -> &Vector3<T>| {
-        let component = |axis: usize| L::from_lanes(|lane| part(&forces[place(lane)])[axis]);
+        let component = |axis: usize| L::from_lanes(|lane| part(&forces[lane.min(last)])[axis]);
         Vector3::new(component(0), component(1), component(2))
     };
     VertexForce {
@@ -182,17 +188,12 @@ fn gather_forces<L: Lanes<T>, T: Scalar>(
     }
 }
 
-/// Writes the first `count` lanes to their places.
+/// Writes one lane to each force.
 #[inline(always)]
-fn scatter_forces<L: Lanes<T>, T: Scalar>(
-    sum: &VertexForce<L>,
-    forces: &mut [VertexForce<T>],
-    count: usize,
-    place: impl Fn(usize) -> usize,
-) {
-    for lane in 0..count {
+fn scatter_forces<L: Lanes<T>, T: Scalar>(sum: &VertexForce<L>, forces: &mut [VertexForce<T>]) {
+    for (lane, force) in forces.iter_mut().enumerate() {
         let of_lane = |v: &Vector3<L>| Vector3::new(v.x.extract(lane), v.y.extract(lane), v.z.extract(lane));
-        forces[place(lane)] = VertexForce {
+        *force = VertexForce {
             force: of_lane(&sum.force),
             diagonal: of_lane(&sum.diagonal),
             mixed: of_lane(&sum.mixed),

@@ -182,9 +182,10 @@ impl<'a> Bench<'a> {
     /// Memory of a setting by part.
     pub(super) fn bytes(&self, setting: Setting) -> Result<CostReport, Error> {
         let settings = setting.settings(&self.settings);
-        let CostEstimate { memory, .. } = CostEstimate::of(self.system, &settings)?;
+        let mut estimate = CostEstimate::of(self.system, &settings)?;
+        estimate.add_teams(self.backend, self.system);
         let on_device = constraints::device_memory(self.backend, self.system, &settings);
-        Ok(CostReport::of_memory(&memory, &on_device, "not measured"))
+        Ok(CostReport::of_memory(&estimate.memory, &on_device, "not measured"))
     }
 
     fn one_substep(&self, formulation: Formulation, iterations: u32) -> Settings {

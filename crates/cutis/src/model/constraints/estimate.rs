@@ -2,6 +2,7 @@
 
 use cutis_solver::{Descent, Formulation, Kind, Settings, SolverError, StepProfile, System};
 
+use crate::backend::Chosen;
 use crate::backend::Work;
 use crate::output::report::MemoryPart;
 
@@ -36,6 +37,18 @@ impl CostEstimate {
         }
         add("incidences", descent.as_ref().map_or(0, Descent::bytes));
         Ok(Self { memory, descent })
+    }
+
+    /// Adds the memory of teams, which only the threaded solver has.
+    pub(crate) fn add_teams(&mut self, backend: &Chosen, system: &System<f32>) {
+        let threaded = !backend.on_gpu() && !backend.is_reference();
+        if let Some(descent) = self.descent.as_mut().filter(|_| threaded) {
+            descent.find_teams(system);
+            let bytes = descent.team_bytes();
+            if bytes > 0 {
+                self.memory.push(MemoryPart { part: "teams".into(), bytes });
+            }
+        }
     }
 
     /// The work of `frames` frames.
@@ -110,10 +123,10 @@ mod tests {
     #[test]
     fn the_estimate_agrees_with_the_solver() {
         for (solver, more) in [
-            ("{ backend = \"cpu\" }", None),
-            ("{ backend = \"cpu\", iterations = 4 }", Some("multipliers")),
-            ("{ backend = \"cpu\", formulation = \"vbd\", iterations = 2 }", Some("incidences")),
-            ("{ backend = \"cpu\", formulation = \"pbd\", iterations = 2 }", None),
+            ("{ backend = \"cpu\" }", vec![]),
+            ("{ backend = \"cpu\", iterations = 4 }", vec!["multipliers"]),
+            ("{ backend = \"cpu\", formulation = \"vbd\", iterations = 2 }", vec!["incidences", "teams"]),
+            ("{ backend = \"cpu\", formulation = \"pbd\", iterations = 2 }", vec![]),
         ] {
             let loaded = scene(solver);
             let built = crate::build_system(&loaded).unwrap();

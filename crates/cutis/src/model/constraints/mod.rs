@@ -52,10 +52,11 @@ pub(super) fn validate(scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
 impl Model for ConstraintModel {
     fn costs(&self, input: &ModelInput<'_>, request: Request) -> Result<ModelCosts, Error> {
         let (system, settings, scene) = (&self.system, &self.settings, input.scene);
-        let estimate =
+        let mut estimate =
             CostEstimate::of(system, settings).map_err(|e| input.file.blame("solver")(Error::Solver(e)))?;
         let work = estimate.work(system, settings, scene.run.frames);
         let backend = request.settle(input.file, &scene.solver, &work)?;
+        estimate.add_teams(&backend, system);
         let colors = match estimate.vertex_colors() {
             Some(number) => BTreeMap::from([(StepProfile::DESCENT.to_owned(), number)]),
             None => self.colors.clone(),
