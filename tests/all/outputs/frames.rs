@@ -1,6 +1,6 @@
 //! `frames.csv` and the times: each column is compared with another output of the same quantity.
 
-use super::body::{DT_S, FRAMES, Finished, finished};
+use super::body::{DT_S, FRAMES, Finished, finished, run};
 
 /// The values of `frames.csv` by the name of their column.
 pub fn column(run: &Finished, name: &str) -> Vec<f64> {
@@ -53,10 +53,11 @@ fn openings_match_the_report() {
 }
 
 /// Frame count, mean and shortest time in the report equal those of the table, and fit into the
-/// time of the stage.
+/// time of the stage. The run has 20 times as many substeps as the others, so that frames take
+/// longer than what a busy machine does in between.
 #[test]
 fn the_report_has_the_times_of_the_table() {
-    let run = finished();
+    let run = &run(&[("solver.substeps", "100")]);
     let ms = &column(run, "ms")[1..];
     assert_eq!(run.number("/frames/count"), FRAMES as f64);
     let mean = ms.iter().sum::<f64>() / FRAMES as f64;
