@@ -52,8 +52,8 @@ const FAT_PA: f64 = 3.25e3;
 const FIRM_PA: f64 = 2e4;
 /// Bulk modulus over Young's modulus, as in the presets.
 const BULK_TO_YOUNG: f64 = 10.0;
-/// Relative gradient at which the body is at rest. With 1e-6 the openings are the same within
-/// 0.01 mm, but some turns take hundreds of iterations: a node at the end of the cut holds little.
+/// Relative gradient at which the body is at rest. A smaller one takes some turns hundreds of
+/// iterations, because a node at the end of the cut holds little.
 const AT_REST: f64 = 1e-4;
 
 /// The skin of the patient.
@@ -247,7 +247,8 @@ impl Patient {
             mean.value()
         };
         let gape = &built.gapes[0];
-        let opening_mm = (lip(gape.left()) - lip(gape.right())).abs();
+        // The axis across the cut points to the left lip, seen along the cut from outside.
+        let opening_mm = lip(gape.left()) - lip(gape.right());
         let tissue_mm = tissue[1].value() - tissue[0].value();
         Ok(TurnedWound { across, normal, opening_mm, tissue_mm })
     }
