@@ -106,9 +106,9 @@ fn results_equal_the_reference_for_any_number_of_threads_and_lanes() {
     parity::<f64>(Formulation::Vbd, 2);
 }
 
-/// In a lattice most vertices are in runs, which vertex block descent processes together.
+/// In a lattice most vertices are in teams, which vertex block descent moves together.
 #[test]
-fn runs_of_a_lattice_have_the_bits_of_the_reference() {
+fn teams_of_a_lattice_have_the_bits_of_the_reference() {
     let lattice = Kuhn::new([40, 5, 5], 0.1);
     let masses: Vec<f32> = lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 }).collect();
     let groups = |colors: &[u16]| Groups::from_colors(colors).unwrap();
