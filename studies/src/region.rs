@@ -25,8 +25,15 @@ pub struct Options {
 /// Number of scenes of the main job in this study.
 const COMPARED: usize = 2;
 /// Tables of the page.
-pub const TABLES: [&str; 6] =
-    ["provenance", "demo", "demo-not-at-rest", "abdomen-incision", "abdomen-incision-not-at-rest", "checks"];
+pub const TABLES: [&str; 7] = [
+    "provenance",
+    "picked",
+    "demo",
+    "demo-not-at-rest",
+    "abdomen-incision",
+    "abdomen-incision-not-at-rest",
+    "checks",
+];
 
 /// Region and grading of each variant, as TOML. The first is the whole body, then the regions by
 /// size.
@@ -51,6 +58,8 @@ const VARIANTS: [(Option<&str>, Option<&str>); 15] = [
 const REGIONS: [usize; 2] = [1, 6];
 /// Index of the region of 40 mm.
 const REGION_40: usize = 3;
+/// Largest relative error of the growth that the picked variants may have.
+const LARGEST_ERROR: f64 = 0.05;
 /// Frames of the second run of each variant, which only measures time.
 const TIMED_FRAMES: &str = "10";
 
@@ -64,6 +73,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let program = Program::build()?;
     let folder = target_dir()?.join("studies/region");
     let mut checks = Checks::default();
+    let mut picked = Table::new(["scene", "region", "grading", "error", "ms/frame", "share of the time"]);
     for (name, scan) in SCENES.into_iter().take(COMPARED) {
         let Some(own) = volume(scan) else {
             ensure!(!options.write, "{name}: the page needs all scans (set CUTIS_TEST_DATA)");
@@ -87,6 +97,9 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
             variant.ms_min = variant.ms_min.min(number_at(&again, "/frames/ms_min")?);
         }
         check(name, &variants, &mut checks);
+        for kind in [Kind::Region, Kind::Any] {
+            picked.add(pick(name, &variants, kind)?);
+        }
         let table = table(&variants).markdown();
         writeln!(out, "{name}\n\n{table}")?;
         let mut moving = Vec::new();
@@ -105,9 +118,12 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
             page.set(&format!("{name}-not-at-rest"), &errors)?;
         }
     }
+    let picked = picked.markdown();
+    writeln!(out, "{picked}")?;
     checks.print(out)?;
     if let Some(mut page) = page.filter(|_| checks.pass()) {
         page.set("provenance", &provenance.markdown())?;
+        page.set("picked", &picked)?;
         page.set("checks", &checks.summary())?;
         page.save(&results())?;
     }
@@ -148,6 +164,37 @@ impl Variant {
     fn error(&self, whole: &Self) -> f64 {
         self.growth_mm / whole.growth_mm - 1.0
     }
+}
+
+/// Variants to pick from.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// Regions without a grading.
+    Region,
+    /// All variants.
+    Any,
+}
+
+/// A row for the fastest variant of a kind whose error is at most [`LARGEST_ERROR`].
+///
+/// # Errors
+/// No variant is that exact. The whole body is, so this is a NaN.
+fn pick(name: &str, variants: &[Variant], kind: Kind) -> Result<[String; 6], Failure> {
+    let whole = &variants[0];
+    let fastest = variants
+        .iter()
+        .filter(|variant| kind == Kind::Any || variant.grading == whole.grading)
+        .filter(|variant| variant.error(whole).abs() <= LARGEST_ERROR)
+        .min_by(|a, b| a.ms_min.total_cmp(&b.ms_min))
+        .with_context(|| format!("{name}: no variant has a known error"))?;
+    Ok([
+        name.to_owned(),
+        fastest.region.clone(),
+        fastest.grading.clone(),
+        format!("{:+.1} %", 100.0 * fastest.error(whole)),
+        format!("{:.1}", fastest.ms_min),
+        format!("{:.0} %", 100.0 * fastest.ms_min / whole.ms_min),
+    ])
 }
 
 /// Checks that the smallest region has a larger error and fewer tetrahedra than the largest one.
