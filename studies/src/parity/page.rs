@@ -110,7 +110,9 @@ fn tables(found: &Value) -> String {
     for details in rows.iter().filter_map(|row| row["details"].as_object()) {
         let mut table = Table::new(["figure", "value"]);
         for (key, value) in details {
-            table.add([key, &optional(value.as_f64(), number)]);
+            // Counts are exact.
+            let figure = |value: f64| if value.fract() == 0.0 { value.to_string() } else { number(value) };
+            table.add([key, &optional(value.as_f64(), figure)]);
         }
         text_of_tables += &format!("\n{}", table.markdown());
     }
@@ -127,7 +129,7 @@ mod tests {
         let figures = json!({"compared": 7, "worst": 2e-7, "of": "extent", "tolerance": 1e-6});
         let row = |control, outcome| {
             json!({"ring": "op", "name": "springs", "adapter": "card", "control": control, "outcome": outcome,
-                   "figures": figures, "details": {"device: first step, s": 1.25}})
+                   "figures": figures, "details": {"device: first step, s": 1.25, "vertices": 4_809_249.0}})
         };
         let found = json!({
             "commit": "0123abc", "load": "1.50",
@@ -138,7 +140,7 @@ mod tests {
         let tables = tables(&found);
         assert!(tables.contains("| op | 1 | 0 | 1 | 7 | 2 |"), "{tables}");
         assert!(tables.contains("| springs | 2.0e-7 of extent | 1.0e-6 |"), "{tables}");
-        assert!(tables.contains("| device: first step, s | 1.25 |"), "{tables}");
+        assert!(tables.contains("| device: first step, s | 1.25 |\n| vertices | 4809249 |"), "{tables}");
         let provenance = provenance(&["--quick"], &found);
         for part in
             ["parity --quick` at commit 0123abc, on chip, 2 threads, linux", "card (software, vulkan, d 1)"]
