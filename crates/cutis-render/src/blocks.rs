@@ -1,64 +1,181 @@
-//! The largest HU of every block of cells, for skipping empty space.
+//! Where a volume is below or above a threshold, block by block, for skipping most voxels.
+
+use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::field::Field;
+use crate::field::{Field, clamp};
 
 /// Cells per block along each axis.
-const SIDE: usize = 8;
+const SIDE: usize = 2;
+/// Blocks per large block along each axis.
+const LARGE: usize = 8;
 
-/// For each block of 8 × 8 × 8 cells: whether it may hold a value at or above a threshold.
-pub struct Blocks {
-    shape: [usize; 3],
-    full: Vec<bool>,
+/// What is known of the values in a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Block {
+    /// All are below the threshold.
+    Empty,
+    /// Some may be below the threshold, and some not.
+    Mixed,
+    /// None is below the threshold.
+    Full,
 }
 
-/// Number of blocks along each axis of a grid of voxels.
-pub fn block_shape(voxels: [usize; 3]) -> [usize; 3] {
-    voxels.map(|n| n.saturating_sub(1).div_ceil(SIDE).max(1))
+/// The blocks of 2 × 2 × 2 cells of a grid, and large blocks of 16 × 16 × 16 cells.
+pub struct Blocks {
+    shape: [usize; 3],
+    blocks: Vec<Block>,
+    large_shape: [usize; 3],
+    /// True for the large blocks in which all blocks are empty.
+    large_empty: Vec<bool>,
+    /// Largest index of a voxel along each axis.
+    last: [f64; 3],
 }
 
 impl Blocks {
     /// Finds the blocks by visiting all voxels in parallel.
     pub fn new(field: &Field<'_>, threshold_hu: f32) -> Self {
         let voxels = field.shape();
-        let shape = block_shape(voxels);
-        let mut full = vec![false; shape.iter().product()];
-        full.par_chunks_mut(shape[0] * shape[1]).enumerate().for_each(|(block_k, full)| {
-            // The voxels at the far faces of a block belong to the next block too.
-            let span = |block: usize, axis: usize| block * SIDE..(block * SIDE + SIDE + 1).min(voxels[axis]);
-            for k in span(block_k, 2) {
-                for block_j in 0..shape[1] {
-                    for j in span(block_j, 1) {
-                        let row = voxels[0] * (j + voxels[1] * k);
-                        for block_i in 0..shape[0] {
-                            let flag = &mut full[block_i + shape[0] * block_j];
-                            *flag = *flag || span(block_i, 0).any(|i| field.voxel(row + i) >= threshold_hu);
-                        }
-                    }
+        let shape = voxels.map(|n| (n - 1).div_ceil(SIDE).max(1));
+        let mut blocks = vec![Block::Mixed; shape.iter().product()];
+        blocks.par_chunks_mut(shape[0]).enumerate().for_each(|(number, blocks)| {
+            let [rows, slices] = [(number % shape[1], 1), (number / shape[1], 2)]
+                .map(|(block, axis)| span(block, voxels[axis]));
+            let first = field.row(rows.start, slices.start);
+            let (mut low, mut high) = (first.to_vec(), first.to_vec());
+            for (k, j) in slices.flat_map(|k| rows.clone().map(move |j| (k, j))) {
+                for ((low, high), &stored) in low.iter_mut().zip(&mut high).zip(field.row(j, k)) {
+                    (*low, *high) = (stored.min(*low), stored.max(*high));
+                }
+            }
+            for (block_i, block) in blocks.iter_mut().enumerate() {
+                let columns = span(block_i, voxels[0]);
+                let low = low[columns.clone()].iter().fold(i16::MAX, |least, &stored| least.min(stored));
+                let high = high[columns].iter().fold(i16::MIN, |most, &stored| most.max(stored));
+                // HU rise or fall with the stored values.
+                let reaches = [low, high].map(|stored| field.hu(stored) >= threshold_hu);
+                *block = match reaches {
+                    [true, true] => Block::Full,
+                    [false, false] => Block::Empty,
+                    _ => Block::Mixed,
+                };
+            }
+        });
+        let large_shape = shape.map(|n| n.div_ceil(LARGE));
+        let mut large_empty = vec![true; large_shape.iter().product()];
+        large_empty.par_chunks_mut(large_shape[0]).enumerate().for_each(|(number, large_empty)| {
+            let part = |large: usize, axis: usize| large * LARGE..((large + 1) * LARGE).min(shape[axis]);
+            let slices = part(number / large_shape[1], 2);
+            for (k, j) in slices.flat_map(|k| part(number % large_shape[1], 1).map(move |j| (k, j))) {
+                let row = &blocks[shape[0] * (j + shape[1] * k)..][..shape[0]];
+                for (empty, blocks) in large_empty.iter_mut().zip(row.chunks(LARGE)) {
+                    *empty &= blocks.iter().all(|&block| block == Block::Empty);
                 }
             }
         });
-        Self { shape, full }
+        Self { shape, blocks, large_shape, large_empty, last: voxels.map(|n| (n - 1) as f64) }
     }
 
-    /// Distance, in units of `step`, from `position` (within the grid) to the end of an empty
-    /// block. `None` if the block at `position` is not empty.
+    /// Number of steps from `position` (within the grid) to the end of an empty block. `None` if
+    /// the block at `position` is not empty. `steps_per_index` is 0 along axes where the steps do
+    /// not move.
     #[inline]
-    pub fn skip(&self, position: Point3<f64>, step: &Vector3<f64>) -> Option<f64> {
-        let mut flat = 0;
-        let mut stride = 1;
+    pub fn skip(&self, position: Point3<f64>, steps_per_index: &Vector3<f64>) -> Option<f64> {
+        let at = self.place(position);
+        let large = at.map(|block| block / LARGE);
+        let (block, cells) = if self.large_empty[number(self.large_shape, large)] {
+            (large, SIDE * LARGE)
+        } else if self.blocks[number(self.shape, at)] == Block::Empty {
+            (at, SIDE)
+        } else {
+            return None;
+        };
         let mut exit = f64::INFINITY;
         for axis in 0..3 {
-            let block = ((position[axis].max(0.0) as usize) / SIDE).min(self.shape[axis] - 1);
-            flat += block * stride;
-            stride *= self.shape[axis];
-            if step[axis] != 0.0 {
-                let wall = if step[axis] > 0.0 { (block + 1) * SIDE } else { block * SIDE };
-                exit = exit.min((wall as f64 - position[axis]) / step[axis]);
+            let steps = steps_per_index[axis];
+            if steps != 0.0 {
+                let wall = (block[axis] + usize::from(steps > 0.0)) * cells;
+                let end = (wall as f64 - position[axis]) * steps;
+                exit = if end < exit { end } else { exit };
             }
         }
-        (!self.full[flat]).then_some(exit.max(0.0))
+        Some(if exit > 0.0 { exit } else { 0.0 })
+    }
+
+    /// The block at a position, moved into the grid.
+    #[inline]
+    pub fn at(&self, position: Point3<f64>) -> Block {
+        self.blocks[number(self.shape, self.place(position))]
+    }
+
+    #[inline]
+    fn place(&self, position: Point3<f64>) -> [usize; 3] {
+        std::array::from_fn(|axis| {
+            let block = clamp(position[axis], self.last[axis]) as i32 as usize / SIDE;
+            block.min(self.shape[axis] - 1)
+        })
+    }
+}
+
+/// The voxels of a block along one axis. Those at the far face belong to the next block too.
+fn span(block: usize, voxels: usize) -> Range<usize> {
+    block * SIDE..(block * SIDE + SIDE + 1).min(voxels)
+}
+
+#[inline]
+fn number(shape: [usize; 3], [i, j, k]: [usize; 3]) -> usize {
+    i + shape[0] * (j + shape[1] * k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cutis_test_kit::Random;
+    use cutis_volume::{Affine, Grid, Volume};
+
+    #[test]
+    fn values_in_blocks_are_on_their_side_of_the_threshold() {
+        let mut random = Random::new(8);
+        for (shape, slope) in [([40, 23, 19], 1.5), ([3, 50, 2], -3.0), ([1, 1, 9], 1.0)] {
+            let grid = Grid { shape, affine: Affine::from_spacing([1.0; 3], [0.0; 3]).unwrap() };
+            // A half of air, a half of tissue, and noise in between.
+            let stored = |v: usize| {
+                let [i, j, k] = grid.point(v);
+                let noise = if random.below(9) == 0 { random.below(800) as i16 } else { 0 };
+                noise + if i + j + k < shape.iter().sum::<usize>() / 2 { -700 } else { 100 }
+            };
+            let volume = Volume::new(grid, (0..grid.len()).map(stored).collect(), slope, 0.0).unwrap();
+            let (field, threshold) = (Field::new(&volume), -200.0);
+            let blocks = Blocks::new(&field, threshold);
+            let mut counts = [0; 3];
+            let mut random = Random::new(9);
+            for _ in 0..2000 {
+                let mut place = |n: usize| random.below(100 * n + 200) as f64 / 100.0 - 1.0;
+                let position = Point3::from(shape.map(&mut place));
+                let block = blocks.at(position);
+                counts[block as usize] += 1;
+                let reaches = field.at(position) >= threshold;
+                assert!(
+                    block == Block::Mixed || reaches == (block == Block::Full),
+                    "{block:?} at {position}"
+                );
+                let inside =
+                    Point3::from([0, 1, 2].map(|a: usize| clamp(position[a], shape[a] as f64 - 1.0)));
+                for step in [Vector3::new(0.3, 0.5, -0.1), Vector3::new(0.0, -0.5, 0.0)] {
+                    let Some(free) = blocks.skip(inside, &step.map(|x| if x == 0.0 { 0.0 } else { 1.0 / x }))
+                    else {
+                        continue;
+                    };
+                    assert_eq!(block, Block::Empty);
+                    for part in 0..=20 {
+                        let on_way = inside + step * (free * f64::from(part) / 20.0 * 0.999);
+                        assert!(field.at(on_way) < threshold, "at {on_way} from {inside}");
+                    }
+                }
+            }
+            assert!(counts[0] > 0 && counts[1] > 0, "{counts:?} of {shape:?}");
+        }
     }
 }

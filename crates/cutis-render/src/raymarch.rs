@@ -37,13 +37,25 @@ pub fn raymarch(volume: &Volume, view: &View<'_>) -> Result<Image, RenderError> 
     let shader = Shader::new(&field, view, &axes);
     let light = |&place: &[f64; 2]| {
         let hit = rays.through(place).and_then(|ray| marcher.cast(&ray));
-        hit.map_or_else(|| decode(BACKGROUND), |hit| shader.color(&hit))
+        hit.map_or_else(|| decode(BACKGROUND), |hit| shader.color(&hit, &marcher.blocks))
     };
     expose(&mut image, view.samples, |places| Ok(places.par_iter().map(light).collect()))?;
     if view.annotate {
         annotate(&mut image, &axes, rays.pixel_mm);
     }
     Ok(image)
+}
+
+/// Draws the orientation letters and the scale bar on a picture of [`raymarch`], as the view's
+/// `annotate` would.
+///
+/// # Errors
+/// [`RenderError::Setting`].
+pub fn draw_annotations(image: &mut Image, volume: &Volume, view: &View<'_>) -> Result<(), RenderError> {
+    view.validate()?;
+    let (axes, field) = (Axes::new(view.side)?, Field::new(volume));
+    annotate(image, &axes, Rays::new(&field, view, &axes).pixel_mm);
+    Ok(())
 }
 
 /// Finds the surface along rays.
@@ -64,9 +76,9 @@ impl<'a> Marcher<'a> {
         let at = |n: f64| self.rays.at(ray, n);
         let mut n = 0.0;
         while n <= ray.length {
-            if let Some(free) = self.blocks.skip(at(n), &self.rays.step) {
+            if let Some(free) = self.blocks.skip(at(n), &self.rays.steps_per_index) {
                 // The next sample behind the block. Samples stay one step apart.
-                n = (n + free).floor().max(n) + 1.0;
+                n += free.min(ray.length) as u32 as f64 + 1.0;
                 continue;
             }
             if self.field.at(at(n)) >= self.threshold_hu {

@@ -20,6 +20,8 @@ pub struct Rays<'a> {
     pub pixel_mm: f64,
     /// Change of the index per step.
     pub step: Vector3<f64>,
+    /// 1/`step`, and 0 where the step is 0.
+    pub steps_per_index: Vector3<f64>,
     /// Faces of the volume in index space. A point is inside if `normal · index ≥ offset`.
     planes: Vec<(Vector3<f64>, f64)>,
     /// Upper limit of the steps of a ray.
@@ -51,7 +53,9 @@ impl<'a> Rays<'a> {
         }
         let longest = field.shape().into_iter().max().unwrap_or(1);
         let half = size.map(|length| length as f64 / 2.0);
-        Self { field, axes: *axes, center_mm, half, pixel_mm, step, planes, most: longest as f64 / STEP }
+        let steps_per_index = step.map(|x| if x == 0.0 { 0.0 } else { 1.0 / x });
+        let most = longest as f64 / STEP;
+        Self { field, axes: *axes, center_mm, half, pixel_mm, step, steps_per_index, planes, most }
     }
 
     /// The ray through a position of the picture, in pixels from its top left corner. `None` if it

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use crate::blocks::{Block, Blocks};
 use crate::field::Field;
 use crate::raymarch::Hit;
 use crate::{Axes, Rgb, View};
@@ -35,6 +36,8 @@ pub struct Shader<'a> {
     pub skin_mm: f64,
     pub occlusion_mm: f64,
     pub directions: [Vector3<f64>; DIRECTIONS],
+    /// Index offsets of the probes in each direction.
+    probes: [[Vector3<f64>; REACHES.len()]; DIRECTIONS],
     pub index_per_mm: Matrix3<f64>,
     pub finest_mm: f64,
     pub toward: Vector3<f64>,
@@ -56,6 +59,10 @@ impl<'a> Shader<'a> {
             let radius = (1.0 - z * z).sqrt();
             Vector3::new(radius * cos, radius * sin, z)
         });
+        let index_per_mm = field.index_per_mm();
+        let probes = directions.map(|direction: Vector3<f64>| {
+            REACHES.map(|part| index_per_mm * direction * (part * view.occlusion_mm))
+        });
         Self {
             field,
             depth,
@@ -63,21 +70,22 @@ impl<'a> Shader<'a> {
             skin_mm: view.skin_mm,
             occlusion_mm: view.occlusion_mm,
             directions,
-            index_per_mm: field.index_per_mm(),
+            probes,
+            index_per_mm,
             finest_mm: field.finest_mm(),
             toward: axes.toward,
             light: (axes.toward * 0.75 + axes.up * 0.55 - axes.right * 0.4).normalize(),
         }
     }
 
-    pub fn color(&self, hit: &Hit) -> Light {
+    pub fn color(&self, hit: &Hit, blocks: &Blocks) -> Light {
         if hit.on_cut {
             let gray = (self.field.at(hit.index) + 160.0) / 400.0;
             return Light::repeat(gray.clamp(0.0, 1.0).powi(2)) * 0.8;
         }
         let normal = self.normal(hit.index);
         let base = self.albedo(hit.index, &normal);
-        let open = self.openness(hit.index, &normal);
+        let open = self.openness(hit.index, &normal, blocks);
         // Light that has passed through tissue is red. Darker places are therefore redder.
         let root = open.sqrt();
         let surface = base.component_mul(&Light::new(open, open * root, open * root * root.sqrt()));
@@ -115,23 +123,24 @@ impl<'a> Shader<'a> {
     }
 
     /// Fraction of the ambient light that reaches the point: 1 on a convex body, less in a cleft.
-    fn openness(&self, index: Point3<f64>, normal: &Vector3<f64>) -> f32 {
+    fn openness(&self, index: Point3<f64>, normal: &Vector3<f64>, blocks: &Blocks) -> f32 {
         if self.occlusion_mm == 0.0 {
             return 1.0;
         }
         let start = index + self.index_per_mm * normal * self.finest_mm;
         let (mut lit, mut all) = (0.0, 0.0);
-        for direction in &self.directions {
+        for (direction, probes) in self.directions.iter().zip(&self.probes) {
             let cosine = direction.dot(normal);
             if cosine <= 0.0 {
                 continue;
             }
             all += cosine;
-            let far = self.index_per_mm * direction * self.occlusion_mm;
-            let free = REACHES
-                .iter()
-                .take_while(|&&part| self.field.at(start + far * part) < self.threshold_hu)
-                .count();
+            let is_free = |position| match blocks.at(position) {
+                Block::Empty => true,
+                Block::Mixed => self.field.at(position) < self.threshold_hu,
+                Block::Full => false,
+            };
+            let free = probes.iter().take_while(|&probe| is_free(start + probe)).count();
             lit += cosine * free as f64 / REACHES.len() as f64;
         }
         if all > 0.0 { (lit / all) as f32 } else { 1.0 }

@@ -6,9 +6,16 @@ use cutis_shaders::render::{LARGEST_PER_BLOCK, largest_per_block};
 use cutis_volume::Volume;
 
 use super::uniform::{ViewUniform, single};
-use crate::blocks::block_shape;
 use crate::expose::BATCH;
 use crate::rays::Rays;
+
+/// Cells per block along each axis, as in the shader.
+const SIDE: usize = 8;
+
+/// Number of blocks along each axis of a grid of voxels.
+pub fn block_shape(voxels: [usize; 3]) -> [usize; 3] {
+    voxels.map(|n| n.saturating_sub(1).div_ceil(SIDE).max(1))
+}
 
 /// Buffers that are reused from view to view.
 pub struct Scene {

@@ -7,10 +7,10 @@ use cutis_test_kit::gpu::{is_exact, on_each_adapter};
 use cutis_volume::{Affine, Grid, phantom::Phantom};
 use nalgebra::Vector3;
 
+use super::scene::block_shape;
 use super::uniform::single;
 use super::*;
 use crate::Side;
-use crate::blocks::block_shape;
 use crate::shade::encode;
 
 /// The same operations as `march.wgsl` and `field.wgsl`.
