@@ -37,6 +37,7 @@ mod font;
 mod gpu;
 mod image;
 mod lines;
+mod outside;
 pub mod plot;
 mod raymarch;
 mod rays;
@@ -47,7 +48,7 @@ mod view;
 
 pub use compose::side_by_side;
 pub use contour::Contour;
-pub use depth::skin_depth;
+pub use depth::{bare_sides, skin_depth};
 pub use error::RenderError;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuRaymarcher, raymarch_gpu};

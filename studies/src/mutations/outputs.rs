@@ -23,8 +23,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: before.png shows the deformed body",
         "crates/cutis/src/output/pictures.rs",
-        "stages.raymarch(&before, &view)?.to_png()",
-        "stages.raymarch(after, &View { depth: Some(&depth_after), ..view })?.to_png()",
+        "stages.raymarch(&before, &View { annotate: false, ..view })?",
+        "stages.raymarch(after, &View { annotate: false, ..view })?",
     ),
     mutation(
         Outputs,

@@ -61,7 +61,7 @@ impl Person {
     fn new() -> Self {
         let phantom = Phantom::new([80, 80, 50], 3).unwrap();
         let whole = phantom.volume().unwrap();
-        let depth = skin_depth(&whole, -300.0, 4.0, 30.0).unwrap();
+        let depth = skin_depth(&whole, -300.0, 4.0, 30.0, None).unwrap();
         let (from, to) = phantom.incision_site();
         let middle = std::array::from_fn(|axis| (from[axis] + to[axis]) / 2.0);
         // A boat-shaped groove, 25 mm to either side at the skin and 30 mm deep.
@@ -185,7 +185,7 @@ fn a_real_scan_looks_the_same() {
     let Some(path) = scans::find("ct/leg_sts013_64x55x58.nii.gz") else { return };
     on_each_adapter(|gpu| {
         let leg = nifti::read(&path).unwrap().volume;
-        let depth = skin_depth(&leg, -300.0, 4.0, 20.0).unwrap();
+        let depth = skin_depth(&leg, -300.0, 4.0, 20.0, None).unwrap();
         let bare = View { depth: Some(&depth), threshold_hu: 0.0, ..plain(Side::Posterior) };
         assert_same(gpu, &[("skin", &leg, plain(TURNED)), ("without its skin", &leg, bare)]);
     });

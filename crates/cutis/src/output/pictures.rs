@@ -3,8 +3,8 @@
 
 use cutis_mesh::Slit;
 use cutis_render::{
-    Contour, Focus, Image, LineField, Plane, Rgb, Side, SliceView, View, draw_lines, side_by_side,
-    skin_depth, slice,
+    Contour, Focus, Image, LineField, Plane, Rgb, Side, SliceView, View, bare_sides, draw_annotations,
+    draw_lines, side_by_side, skin_depth, slice,
 };
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
@@ -25,6 +25,8 @@ const PIXELS: usize = 900;
 const CLOSE_UP: f64 = 1.5;
 /// Depth below which all tissue has the same color, mm.
 const DEEPEST_MM: f64 = 20.0;
+/// Voxels around the walls of wounds for which the depth is known.
+const MARGIN: f64 = 4.0;
 
 /// Colors of the contours at rest and deformed.
 const COLORS: [Rgb; 2] = [[90, 160, 255], [255, 170, 60]];
@@ -46,8 +48,10 @@ pub(super) fn draw(
     let DeformedBody { body, ct, scene, .. } = *deformed;
     let air_below_hu = scene.tissue.air_below_hu;
     let before = warp.cut_at_rest(ct, stages, progress)?;
-    let depth = depth(ct, air_below_hu)?;
-    let depth_after = warp.apply_to_centers(&depth, stages, progress)?.0;
+    let depth = match warp.walls_mm() {
+        Some(walls_mm) => Some(depths(ct, air_below_hu, walls_mm, warp, stages, progress)?),
+        None => None,
+    };
 
     let frame = &body.mesh.frame;
     let pieces = body.cut.pieces.iter().map(|piece| std::slice::from_ref(piece.axis()));
@@ -87,23 +91,25 @@ pub(super) fn draw(
         width: PIXELS,
         height: PIXELS,
         focus: if flap { Some(around(&wounds, frame)) } else { focus },
-        depth: Some(&depth),
+        depth: depth.as_ref().map(|(at_rest, _)| at_rest),
         threshold_hu: air_below_hu,
         ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))
     };
+    // The picture of the lines has the same skin. It is drawn without letters, which the lines
+    // would cross.
+    let skin = stages.raymarch(&before, &View { annotate: false, ..view })?;
+    let mut skin_before = skin.clone();
+    draw_annotations(&mut skin_before, &before, &view)?;
+    let depth_after = depth.as_ref().map(|(_, deformed)| deformed);
+    let skin_after = stages.raymarch(after, &View { depth: depth_after, ..view })?;
     let mut figures = vec![
         Figure {
             path: RunFolder::before,
             caption: "Before the first frame",
             wide: false,
-            png: stages.raymarch(&before, &view)?.to_png()?,
+            png: skin_before.to_png()?,
         },
-        Figure {
-            path: RunFolder::after,
-            caption: "After",
-            wide: false,
-            png: stages.raymarch(after, &View { depth: Some(&depth_after), ..view })?.to_png()?,
-        },
+        Figure { path: RunFolder::after, caption: "After", wide: false, png: skin_after.to_png()? },
         Figure {
             path: RunFolder::slice,
             caption: "Slice across the middle, with the skin of the model at rest (blue) and deformed (orange)",
@@ -112,7 +118,7 @@ pub(super) fn draw(
         },
     ];
     if body.membrane.as_ref().is_some_and(Membrane::has_lines) {
-        let mut picture = stages.raymarch(&before, &View { annotate: false, ..view })?;
+        let mut picture = skin;
         add_lines(&mut picture, body, scene, &before, &view)?;
         figures.push(Figure {
             path: RunFolder::tension,
@@ -147,10 +153,23 @@ fn add_lines(
     Ok(draw_lines(picture, volume, view, &field)?)
 }
 
-/// Depth below the skin at rest, mm, which colors the wound.
-fn depth(ct: &Volume, air_below_hu: f32) -> Result<Volume, Error> {
-    let finest = ct.grid().affine.spacing_mm().into_iter().fold(f64::INFINITY, f64::min);
-    Ok(skin_depth(ct, air_below_hu, finest, DEEPEST_MM)?)
+/// Depth below the skin at rest, mm, which colors the wound: at rest and deformed, around the walls
+/// of wounds.
+fn depths(
+    ct: &Volume,
+    air_below_hu: f32,
+    [low, high]: [Point3<f64>; 2],
+    warp: &BodyWarp<'_>,
+    stages: &mut Stages,
+    progress: &dyn Progress,
+) -> Result<(Volume, Volume), Error> {
+    let spacing = ct.grid().affine.spacing_mm();
+    let finest = spacing.into_iter().fold(f64::INFINITY, f64::min);
+    let margin = Vector3::repeat(MARGIN * spacing.into_iter().fold(0.0, f64::max));
+    let within = Some([low - margin, high + margin]);
+    let at_rest = skin_depth(ct, air_below_hu, finest, DEEPEST_MM, within)?;
+    let deformed = warp.apply_to_centers(&at_rest, stages, progress)?.0;
+    Ok((at_rest, bare_sides(deformed, ct.grid())?))
 }
 
 /// A close-up of several wounds: the middle of the box around their ends, and its diagonal.

@@ -110,6 +110,18 @@ impl<'a> BodyWarp<'a> {
         })
     }
 
+    /// Two opposite corners of a box in mm, along the axes of the patient, that holds all walls of
+    /// wounds at rest and deformed. `None` without a wound.
+    pub(crate) fn walls_mm(&self) -> Option<[Point3<f64>; 2]> {
+        let at_walls = self.at_walls.iter().map(|&tet| &self.tets[tet as usize]);
+        let nodes = at_walls.chain(&self.removed).flatten().map(|&v| v as usize);
+        let mut points = nodes.flat_map(|v| [self.rest[v], self.deformed[v]]);
+        let first = points.next()?;
+        let (low, high) = points.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
+        let origin_mm = self.body.mesh.frame.origin_mm;
+        Some([low, high].map(|corner| origin_mm + corner.coords.cast::<f64>() * 1000.0))
+    }
+
     /// Resamples a volume through the deformation. A voxel that the wall of a wound crosses takes
     /// the mean over the voxel, as in a scan.
     ///
