@@ -63,11 +63,13 @@ impl<'a> Shader<'a> {
         let probes = directions.map(|direction: Vector3<f64>| {
             REACHES.map(|part| index_per_mm * direction * (part * view.occlusion_mm))
         });
+        // Depths are uncertain by a voxel.
+        let skin_mm = depth.as_ref().map_or(view.skin_mm, |(_, spacing)| view.skin_mm.max(*spacing));
         Self {
             field,
             depth,
             threshold_hu: view.threshold_hu,
-            skin_mm: view.skin_mm,
+            skin_mm,
             occlusion_mm: view.occlusion_mm,
             directions,
             probes,

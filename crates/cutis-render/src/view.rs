@@ -31,7 +31,8 @@ pub struct View<'a> {
     /// resampled together with the body. Surfaces that were deep get the color of their tissue.
     /// With `None` all surfaces get the color of skin.
     pub depth: Option<&'a Volume>,
-    /// Thickness of the skin in mm, used with `depth`. Default 2.
+    /// Thickness of the skin in mm, used with `depth`. Default 2. The finest spacing of `depth`
+    /// counts if it is larger.
     pub skin_mm: f64,
     /// Reach in mm of the ambient occlusion that darkens clefts. Default 12; 0 switches it off.
     pub occlusion_mm: f64,

@@ -193,6 +193,11 @@ fn deep_tissue_is_colored_by_hu() {
     assert_eq!(at(&depth(1)), skin);
     let muscle = at(&depth(10));
     assert!(muscle[1] + 40 < skin[1] && muscle[0] > 100, "{muscle:?} is not red");
+    // In voxels of 6 mm, tissue at 10 mm may be the second voxel below the skin.
+    let affine = Affine::from_spacing([6.0; 3], [-30.0; 3]).unwrap();
+    let coarse = |mm| Volume::new(Grid { shape: [11; 3], affine }, vec![mm; 1331], 1.0, 0.0).unwrap();
+    assert_eq!(at(&coarse(10)), skin);
+    assert_eq!(at(&coarse(30)), muscle);
 }
 
 #[test]
