@@ -15,6 +15,7 @@ pub mod parity;
 pub mod patch;
 pub mod region;
 pub mod sheet;
+pub mod speed;
 pub mod stability;
 pub mod tuning;
 pub mod wound;

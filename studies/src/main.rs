@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
-    accuracy, at_rest, cantilever, chainmail, main_job, mutations, parity, patch, region, stability, tuning,
-    wound,
+    accuracy, at_rest, cantilever, chainmail, main_job, mutations, parity, patch, region, speed, stability,
+    tuning, wound,
 };
 
 /// A study and its options.
@@ -23,6 +23,7 @@ enum Study {
     Parity(parity::Options),
     Patch(patch::Options),
     Region(region::Options),
+    Speed(speed::Options),
     Stability(stability::Options),
     Tuning(tuning::Options),
     Wound(wound::Options),
@@ -40,6 +41,7 @@ impl Study {
             Self::Parity(options) => parity::run(options, out),
             Self::Patch(options) => patch::run(options, out),
             Self::Region(options) => region::run(options, out),
+            Self::Speed(options) => speed::run(options, out),
             Self::Stability(options) => stability::run(options, out),
             Self::Tuning(options) => tuning::run(options, out),
             Self::Wound(options) => wound::run(options, out),
