@@ -43,12 +43,17 @@ fn points(mesh: &TetMesh, wound: &Wound, pair: &LipPair) -> [Point3<f32>; 2] {
     [(a, b), (c, d)].map(|(a, b)| Point3::from(a * (1.0 - pair.part) + b * pair.part))
 }
 
-/// What holds for the pairs of any cut.
-fn check_pairs(mesh: &TetMesh, wound: &Wound, pairs: &[LipPair]) -> Result<(), TestCaseError> {
+/// What holds for the pairs of any cut. `tets` are the tetrahedra at its stage.
+fn check_pairs(
+    mesh: &TetMesh,
+    wound: &Wound,
+    tets: &[[u32; 4]],
+    pairs: &[LipPair],
+) -> Result<(), TestCaseError> {
     let mut divided = mesh.clone();
     divided.divide(wound);
     let place = |node: u32| divided.lattice_index[node as usize];
-    let used: BTreeSet<u32> = tets(mesh, wound).into_iter().flatten().collect();
+    let used: BTreeSet<u32> = tets.iter().flatten().copied().collect();
     for pair in pairs {
         let [plus, minus] = points(mesh, wound, pair);
         prop_assert_eq!(plus, minus);
@@ -65,6 +70,14 @@ fn check_pairs(mesh: &TetMesh, wound: &Wound, pairs: &[LipPair]) -> Result<(), T
     Ok(())
 }
 
+/// The tetrahedra at a stage of a growing cut. A copy whose node is still one with another has that
+/// node.
+fn tets_at(mesh: &TetMesh, wound: &Wound, growth: &Growth, reached: &[f64]) -> Vec<[u32; 4]> {
+    let all = tets(mesh, wound);
+    let whole = all[..all.len() - wound.copies.len()].iter().copied();
+    whole.chain(growth.stage(reached).tets.iter().map(|copy| copy.nodes)).collect()
+}
+
 fn area(pairs: &[LipPair]) -> f64 {
     pairs.iter().map(|pair| f64::from(pair.area)).sum()
 }
@@ -78,7 +91,7 @@ fn pairs_of_a_plane_lie_on_it() {
         let (along, inward) = (Vector3::new(0.2, 1.0, 0.0).normalize(), Vector3::new(0.0, 0.0, 1.0));
         let at = Point3::new(0.0003, 0.0011, -0.0007);
         let (wound, pairs) = cut(&mesh, &[plane(at.into(), along.into(), inward.into())]);
-        check_pairs(&mesh, &wound, &pairs).unwrap();
+        check_pairs(&mesh, &wound, &tets(&mesh, &wound), &pairs).unwrap();
         let normal = inward.cross(&along);
         let right = |p: Point3<f64>| (p - at).dot(&normal);
         let pieces = pieces(&tets(&mesh, &wound));
@@ -121,7 +134,7 @@ fn pairs_of_a_blade_on_lattice_points_share_its_area() {
         for offset in [0.0, 1e-9, -1e-9, 1e-4] {
             let blade = plane([at + offset, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
             let (wound, pairs) = cut(&mesh, &[blade]);
-            check_pairs(&mesh, &wound, &pairs).unwrap();
+            check_pairs(&mesh, &wound, &tets(&mesh, &wound), &pairs).unwrap();
             let whole = 0.016 * 0.02;
             assert!((area(&pairs) / whole - 1.0).abs() < 0.02, "{split:?} {offset}: {}", area(&pairs));
             assert!(pairs.iter().all(|pair| pair.normal[0] < -0.9999), "{split:?} {offset}");
@@ -140,7 +153,7 @@ fn pairs_come_behind_the_tip() {
         let mut before = BTreeSet::new();
         for tip in [0.004, 0.008, 0.012, 0.018, 0.024] {
             let pairs = growth.lip_pairs(&[tip]);
-            check_pairs(&mesh, &wound, &pairs).unwrap();
+            check_pairs(&mesh, &wound, &tets(&mesh, &wound), &pairs).unwrap();
             let edges: BTreeSet<[u32; 2]> = pairs.iter().map(|pair| pair.edge).collect();
             assert!(edges.is_superset(&before) && edges.len() > before.len(), "{split:?}");
             before = edges;
@@ -156,16 +169,16 @@ fn pairs_come_behind_the_tip() {
 fn check_growth(mesh: &TetMesh, random: &RandomBlades, share: f64) -> Result<(), TestCaseError> {
     let all = blades(random);
     let (wound, pairs) = cut(mesh, &all);
-    check_pairs(mesh, &wound, &pairs)?;
+    check_pairs(mesh, &wound, &tets(mesh, &wound), &pairs)?;
     let (grown, growth) = grow(mesh, &all);
     let reached: Vec<f64> = growth.lengths().iter().map(|length| share * length).collect();
-    check_pairs(mesh, &grown, &growth.lip_pairs(&reached))?;
+    check_pairs(mesh, &grown, &tets_at(mesh, &grown, &growth, &reached), &growth.lip_pairs(&reached))?;
     prop_assert_eq!(&growth.lip_pairs(&growth.lengths()), &pairs);
 
     let (grown, growth) = grow(mesh, &all[..1]);
     let reached = share * growth.lengths()[0];
     let part = growth.lip_pairs(&[reached]);
-    check_pairs(mesh, &grown, &part)?;
+    check_pairs(mesh, &grown, &tets_at(mesh, &grown, &growth, &[reached]), &part)?;
     let mut severing = Severing::new(mesh);
     severing.add(mesh, &all[0]);
     severing.cut_to(0, reached);
