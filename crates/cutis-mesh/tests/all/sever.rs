@@ -329,27 +329,45 @@ fn check_cut(mesh: &TetMesh, random: &RandomBlades) -> Result<(), TestCaseError>
     let of_edges: BTreeSet<[u32; 2]> = divided.edges.iter().map(|[a, b]| [*a.min(b), *a.max(b)]).collect();
     prop_assert_eq!(of_edges.len(), divided.edges.len());
     prop_assert_eq!(of_edges, of_tets);
-    // In increments the wound is the same at the end, and each is the one from scratch.
-    let mut growing = Severing::new(mesh);
-    let lengths: Vec<f64> = blades.iter().map(Blade::length).collect();
-    blades.iter().for_each(|blade| {
-        growing.add(mesh, blade);
-    });
-    for step in 1..=7 {
-        for (number, length) in lengths.iter().enumerate() {
-            growing.cut_to(number, length * f64::from(step) / 7.0);
+    Ok(())
+}
+
+/// In any number of increments the wound is the same at the end. Control: without the last one
+/// nothing may be cut.
+fn check_increments(mesh: &TetMesh, random: &RandomBlades) -> Result<(), TestCaseError> {
+    let blades = blades(random);
+    let wound = cut(mesh, &blades);
+    for increments in [1, 7, 50] {
+        let mut growing = Severing::new(mesh);
+        blades.iter().for_each(|blade| {
+            growing.add(mesh, blade);
+        });
+        for step in 1..increments {
+            for (number, blade) in blades.iter().enumerate() {
+                growing.cut_to(number, blade.length() * f64::from(step) / f64::from(increments));
+            }
         }
+        let nothing_yet = increments == 1 && !wound.copies.is_empty();
+        prop_assert!(!nothing_yet || growing.wound(mesh).unwrap() != wound);
+        growing.cut_all();
+        prop_assert!(growing.wound(mesh).unwrap() == wound, "{} increments", increments);
     }
-    growing.cut_all();
-    prop_assert_eq!(growing.wound(mesh).unwrap(), wound);
     Ok(())
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn random_cuts_keep_all_invariants((mesh, random) in random_cut()) {
         check_cut(&mesh, &random)?;
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn any_number_of_increments_makes_the_same_cut((mesh, random) in random_cut()) {
+        check_increments(&mesh, &random)?;
     }
 }
 
