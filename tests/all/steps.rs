@@ -168,6 +168,37 @@ fn a_hook_pulls_with_a_force() {
     assert!(run.bytes("report.html").windows(20).any(|text| text == b"Force of the handles"));
 }
 
+/// A hook at a lip that has opened: until its time the body moves as without it, then it moves the
+/// lip from where it is. Control: a hook that holds the lip from the start.
+#[test]
+fn a_hook_grabs_tissue_where_it_is() {
+    let lesion = excise(&ellipse(LENGTH, WIDTH), "");
+    let hook = |at_s: &str| {
+        format!(
+            "{{ kind = 'hook', at_mm = [5, 102, 19], radius_mm = 8, move_mm = [0, 4, 0], at_s = {at_s}, over_s = 0.1 }}"
+        )
+    };
+    let positions = |steps: &[&str], frames: &str| {
+        // A region that does not depend on the hook.
+        let region = ("lattice.region", "{ min_mm = [-60, 40, -70], max_mm = [70, 200, 70] }");
+        let set = [region, ("run.frames", frames), ("run.checkpoint_every", frames), ("output", "{}")];
+        Run::of(&operated(steps, &set)).positions()
+    };
+    // A frame takes 1/60 s, so the hook acts from the seventh on.
+    let (late, early) = (hook("0.09"), hook("0.0"));
+    let [free, waiting] = [&[lesion.as_str()][..], &[&lesion, &late]].map(|steps| positions(steps, "6"));
+    assert!(free == waiting);
+    let [end, held] = [&late, &early].map(|hook| positions(&[&lesion, hook], "20"));
+    let exactly_moved = |v: &usize| {
+        let by = end[*v] - free[*v];
+        by.x.abs() < 1e-7 && (by.y - 0.004).abs() < 1e-7 && by.z.abs() < 1e-7
+    };
+    let grabbed: Vec<usize> = (0..end.len()).filter(exactly_moved).collect();
+    assert!(grabbed.len() > 2, "{grabbed:?}");
+    let opened = grabbed.iter().filter(|&&v| (end[v] - held[v]).norm() > 5e-4).count();
+    assert!(2 * opened > grabbed.len(), "{opened} of {} vertices opened before", grabbed.len());
+}
+
 /// A run that is interrupted between the steps continues with the same bits, on any number of
 /// threads. Control: another time.
 #[test]
@@ -176,6 +207,8 @@ fn a_run_resumes_between_steps() {
         let lesion = excise(&ellipse(LENGTH, WIDTH), &format!(", at_s = {at_s}"));
         let undermine = UNDERMINE.replace(" }", ", at_s = 0.03, speed_mm_s = 300.0 }");
         let sew = SEW.replace("0.3", "0.1");
+        // It grabs tissue next to the piece in frame 2, before the blade of the undermining is there.
+        let hook = "{ kind = 'hook', at_mm = [5, 102, 22], radius_mm = 10, move_mm = [0, 4, 0], at_s = 0.03, over_s = 0.1 }";
         let set = [
             ("lattice.spacing_mm", "9"),
             ("run.frames", frames),
@@ -183,7 +216,7 @@ fn a_run_resumes_between_steps() {
             ("solver.threads", threads),
             ("output", "{ surface = true }"),
         ];
-        run_in(folder, &operated(&[&lesion, &undermine, &sew], &set), resume).unwrap();
+        run_in(folder, &operated(&[&lesion, &undermine, hook, &sew], &set), resume).unwrap();
     };
     let [whole, halves, other] = [(); 3].map(|()| tempfile::tempdir().unwrap());
     run("0.02", "10", "1", whole.path(), false);
@@ -206,6 +239,7 @@ fn a_gpu_does_the_same_steps() {
                 let lesion = excise(&ellipse(LENGTH, WIDTH), ", at_s = 0.02").replace("16,", depth);
                 let undermine = UNDERMINE.replace(" }", ", at_s = 0.03 }");
                 let sew = SEW.replace("0.3", "0.04");
+                let hook = "{ kind = 'hook', at_mm = [5, 102, 22], radius_mm = 10, move_mm = [0, 4, 0], at_s = 0.03, over_s = 0.1 }";
                 let set = [
                     ("lattice.spacing_mm", "9"),
                     ("solver.formulation", formulation),
@@ -213,7 +247,7 @@ fn a_gpu_does_the_same_steps() {
                     ("run.checkpoint_every", "5"),
                     ("output", "{}"),
                 ];
-                operated(&[&lesion, &undermine, &sew], &set)
+                operated(&[&lesion, &undermine, hook, &sew], &set)
             };
             let [cpu, on_gpu, control] = [(); 3].map(|()| tempfile::tempdir().unwrap());
             run_in(cpu.path(), &scene("16,"), false).unwrap();

@@ -1,4 +1,4 @@
-//! Kinematic vertices on the device: their rest positions, and the displacement of each handle in
+//! Kinematic vertices on the device: where they were grabbed, and the displacement of each handle in
 //! each substep of a frame.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
@@ -39,8 +39,8 @@ impl Handles {
         let mut held: Vec<[u32; 4]> = Vec::new();
         let mut owners: Vec<u32> = Vec::new();
         for (owner, handle) in (0..).zip(handles) {
-            for (&vertex, rest) in handle.vertices().iter().zip(handle.rest()) {
-                held.push([rest.x.to_bits(), rest.y.to_bits(), rest.z.to_bits(), vertex]);
+            for (&vertex, start) in handle.vertices().iter().zip(handle.start()) {
+                held.push([start.x.to_bits(), start.y.to_bits(), start.z.to_bits(), vertex]);
                 owners.push(owner);
             }
         }

@@ -311,6 +311,10 @@ impl SolverGpu {
                     self.constraints = Constraints::new(&self.gpu, &self.body, simulation)?;
                 }
             }
+            if !change.handles.is_empty() {
+                let (system, settings) = (simulation.system(), simulation.settings());
+                self.handles = Handles::new(&self.gpu, &self.body, system, settings)?;
+            }
         }
         self.gather = None;
         self.reductions.clear();

@@ -191,8 +191,8 @@ impl<T: Scalar> SystemBuilder<T> {
     /// duration that is not finite, or a negative duration.
     pub fn handle(mut self, handle: Handle) -> Result<Self, SolverError> {
         let System { vertices, handles, .. } = &mut self.system;
-        let handle = KinematicHandle::new(handles.len(), handle, vertices, &mut self.kinematic)?;
-        handles.push(handle);
+        KinematicHandle::<T>::check(handles.len(), &handle, vertices.len(), &mut self.kinematic)?;
+        handles.push(KinematicHandle::grab(handle, vertices));
         Ok(self)
     }
 

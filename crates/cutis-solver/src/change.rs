@@ -1,11 +1,13 @@
-//! Changes of a body between two frames: what a cut that grows makes of it.
+//! Changes of a body between two frames: what a cut that grows and a hook make of it.
+
+use std::collections::HashSet;
 
 use cutis_coloring::{Incidence, Tuples};
 use cutis_constraints::Scalar;
 use nalgebra::Vector3;
 
 use crate::descent::{Descent, check_compliances, groups_error};
-use crate::{Kind, SolverError, System, Vertex};
+use crate::{Handle, Kind, KinematicHandle, SolverError, System, Vertex};
 
 /// New kinds, masses, loads and states for some parts of a body. All other parts stay as they are.
 pub struct Change<T: Scalar> {
@@ -18,11 +20,20 @@ pub struct Change<T: Scalar> {
     /// Pairs of vertices: the first takes the position and the velocity of the second. The pairs
     /// act one after the other, before the masses change.
     pub states: Vec<[u32; 2]>,
+    /// Handles that grab their vertices where these are after the changes of state. They come after
+    /// the handles that the body has.
+    pub handles: Vec<Handle>,
 }
 
 impl<T: Scalar> Default for Change<T> {
     fn default() -> Self {
-        Self { kinds: Vec::new(), inverse_masses: Vec::new(), loads: Vec::new(), states: Vec::new() }
+        Self {
+            kinds: Vec::new(),
+            inverse_masses: Vec::new(),
+            loads: Vec::new(),
+            states: Vec::new(),
+            handles: Vec::new(),
+        }
     }
 }
 
@@ -59,6 +70,9 @@ impl<T: Scalar> System<T> {
             let vertex = &mut self.vertices[vertex as usize];
             *vertex = Vertex::new(vertex.position(), inverse_mass);
         }
+        for handle in &change.handles {
+            self.handles.push(KinematicHandle::grab(handle.clone(), &mut self.vertices));
+        }
         if self.loads.is_empty() && change.loads.iter().any(|(_, load)| *load != Vector3::zeros()) {
             self.loads = vec![Vector3::zeros(); self.vertices.len()];
         }
@@ -94,18 +108,23 @@ impl<T: Scalar> System<T> {
             }
         }
         self.check_vertices(change.states.as_flattened())?;
+        let mut kinematic: HashSet<u32> =
+            self.handles.iter().flat_map(|handle| handle.vertices()).copied().collect();
         let refuse =
             |vertex, what, value, expected| Err(SolverError::Vertex { vertex, what, value, expected });
         for &(vertex, inverse_mass) in &change.inverse_masses {
             self.check_vertices(&[vertex])?;
             let value = inverse_mass.to_f64();
-            let held = self.handles.iter().any(|handle| handle.vertices().contains(&vertex));
+            let held = kinematic.contains(&vertex);
             if !(value.is_finite() && value >= 0.0) {
                 return refuse(vertex as usize, "inverse mass", value, "a finite number, 0 or more");
             }
             if held && value != 0.0 {
                 return refuse(vertex as usize, "inverse mass", value, "0, because a handle moves it");
             }
+        }
+        for (index, handle) in (self.handles.len()..).zip(&change.handles) {
+            KinematicHandle::<T>::check(index, handle, self.vertices.len(), &mut kinematic)?;
         }
         for (vertex, load) in &change.loads {
             self.check_vertices(&[*vertex])?;

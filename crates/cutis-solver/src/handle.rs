@@ -9,9 +9,9 @@ use crate::{SolverError, Vertex};
 
 /// A group of vertices that move along a straight path at constant speed and then stay there.
 ///
-/// The vertices get the inverse mass 0 and the position `rest + move_m·s`, where `s` is
-/// `(t − at_s)/over_s` between 0 and 1. If `over_s` is 0, they are at the end of the path from
-/// `at_s` on.
+/// The vertices get the inverse mass 0 and the position `start + move_m·s`, where `start` is their
+/// position when they are grabbed and `s` is `(t − at_s)/over_s` between 0 and 1. If `over_s` is 0,
+/// they are at the end of the path from `at_s` on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Handle {
     /// Indices of the vertices to move.
@@ -24,25 +24,25 @@ pub struct Handle {
     pub over_s: f64,
 }
 
-/// A validated handle with the rest positions of its vertices.
+/// A validated handle with the positions at which it grabbed its vertices.
 #[derive(Clone, Debug)]
 pub struct KinematicHandle<T: Scalar> {
     vertices: Vec<u32>,
-    rest: Vec<Point3<T>>,
+    start: Vec<Point3<T>>,
     move_m: [f64; 3],
     at_s: f64,
     over_s: f64,
 }
 
 impl<T: Scalar> KinematicHandle<T> {
-    /// Checks the numbers of `handle` and sets the inverse masses of its vertices to 0.
-    /// `kinematic` holds the vertices of all handles so far.
-    pub(crate) fn new(
+    /// Checks a handle of a system with `vertex_count` vertices. `kinematic` holds the vertices of
+    /// all handles so far, and takes those of this one.
+    pub(crate) fn check(
         index: usize,
-        handle: Handle,
-        vertices: &mut [Vertex<T>],
+        handle: &Handle,
+        vertex_count: usize,
         kinematic: &mut HashSet<u32>,
-    ) -> Result<Self, SolverError> {
+    ) -> Result<(), SolverError> {
         for value in handle.move_m {
             if !T::constant(value).is_finite() {
                 let (key, expected) =
@@ -55,18 +55,29 @@ impl<T: Scalar> KinematicHandle<T> {
                 return Err(SolverError::Setting { key, value, expected: "a finite time, 0 s or more" });
             }
         }
-        let mut rest = Vec::with_capacity(handle.vertices.len());
         for &vertex in &handle.vertices {
-            let error = |reason| SolverError::Handle { handle: index, vertex, reason };
-            let state = vertices.get_mut(vertex as usize).ok_or_else(|| error("does not exist"))?;
-            if !kinematic.insert(vertex) {
-                return Err(error("is already moved by another handle"));
+            let error = |reason| Err(SolverError::Handle { handle: index, vertex, reason });
+            if vertex as usize >= vertex_count {
+                return error("does not exist");
             }
-            rest.push(state.position());
-            *state = Vertex::new(state.position(), T::zero());
+            if !kinematic.insert(vertex) {
+                return error("is already moved by another handle");
+            }
         }
-        let Handle { vertices, move_m, at_s, over_s } = handle;
-        Ok(Self { vertices, rest, move_m, at_s, over_s })
+        Ok(())
+    }
+
+    /// Grabs the vertices of a checked handle where they are, and sets their inverse masses to 0.
+    pub(crate) fn grab(handle: Handle, vertices: &mut [Vertex<T>]) -> Self {
+        let Handle { vertices: grabbed, move_m, at_s, over_s } = handle;
+        let grab = |&vertex: &u32| {
+            let state = &mut vertices[vertex as usize];
+            let position = state.position();
+            *state = Vertex::new(position, T::zero());
+            position
+        };
+        let start = grabbed.iter().map(grab).collect();
+        Self { vertices: grabbed, start, move_m, at_s, over_s }
     }
 
     /// Returns the indices of the vertices that the handle moves.
@@ -74,10 +85,11 @@ impl<T: Scalar> KinematicHandle<T> {
         &self.vertices
     }
 
-    /// Returns the rest positions in the order of [`vertices`](Self::vertices), in meters relative
-    /// to [`System::origin`](crate::System::origin).
-    pub fn rest(&self) -> &[Point3<T>] {
-        &self.rest
+    /// Returns the positions at which the vertices were grabbed, in the order of
+    /// [`vertices`](Self::vertices), in meters relative to
+    /// [`System::origin`](crate::System::origin).
+    pub fn start(&self) -> &[Point3<T>] {
+        &self.start
     }
 
     /// Returns the displacement at `time_s`, in meters.
@@ -93,7 +105,7 @@ impl<T: Scalar> KinematicHandle<T> {
     pub(crate) fn to_f64(&self) -> KinematicHandle<f64> {
         KinematicHandle {
             vertices: self.vertices.clone(),
-            rest: self.rest.iter().map(|position| position.map(T::to_f64)).collect(),
+            start: self.start.iter().map(|position| position.map(T::to_f64)).collect(),
             move_m: self.move_m,
             at_s: self.at_s,
             over_s: self.over_s,
@@ -103,12 +115,12 @@ impl<T: Scalar> KinematicHandle<T> {
     /// Moves the vertices to their positions at `time_s`.
     pub(crate) fn advance(&self, vertices: &mut [Vertex<T>], time_s: f64) {
         let path = self.path(time_s);
-        for (&vertex, rest) in self.vertices.iter().zip(&self.rest) {
-            vertices[vertex as usize].set_position(rest + path);
+        for (&vertex, start) in self.vertices.iter().zip(&self.start) {
+            vertices[vertex as usize].set_position(start + path);
         }
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(self.vertices.as_slice()) + size_of_val(self.rest.as_slice())
+        size_of_val(self.vertices.as_slice()) + size_of_val(self.start.as_slice())
     }
 }

@@ -1,7 +1,8 @@
 // Moves the vertices of handles along their paths. The same operations as
 // `KinematicHandle::advance`.
 struct KinematicHandle {
-    rest: vec3f,
+    // Position at which the vertex was grabbed.
+    start: vec3f,
     vertex: u32,
 }
 
@@ -31,5 +32,5 @@ fn kinematic(@builtin(global_invocation_id) id: vec3u) {
     let handle = handles[k];
     let substep = max(status[1], frame.first_substep) - frame.first_substep;
     let path = paths[substep * frame.handles + owners[k]].xyz;
-    vertices[handle.vertex] = vec4f(handle.rest + path, vertices[handle.vertex].w);
+    vertices[handle.vertex] = vec4f(handle.start + path, vertices[handle.vertex].w);
 }

@@ -129,8 +129,8 @@ impl Reference {
         let origin = self.system.origin().coords;
         for handle in self.system.handles() {
             let path = handle.path(time_s);
-            for (&vertex, rest) in handle.vertices().iter().zip(handle.rest()) {
-                x[vertex as usize] = rest + path + origin;
+            for (&vertex, start) in handle.vertices().iter().zip(handle.start()) {
+                x[vertex as usize] = start + path + origin;
             }
         }
     }

@@ -112,8 +112,8 @@ fn work_of_handles<T: Scalar>(system: &System<T>, meter: &Meter, from_s: f64, ov
     let mut after = before.clone();
     for handle in system.handles() {
         let path = handle.path(from_s + over_s).map(T::to_f64);
-        for (&vertex, rest) in handle.vertices().iter().zip(handle.rest()) {
-            after[vertex as usize] = rest.map(T::to_f64) + path;
+        for (&vertex, start) in handle.vertices().iter().zip(handle.start()) {
+            after[vertex as usize] = start.map(T::to_f64) + path;
         }
     }
     (meter.elastic(system, &after) - meter.elastic(system, &before)).max(0.0)

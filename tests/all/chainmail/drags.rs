@@ -65,6 +65,39 @@ fn a_handle_follows_its_path_at_any_time() {
     }
 }
 
+/// A handle with a time moves nothing before it, and then takes the path of one without. Control:
+/// the handle without a time.
+#[test]
+fn a_handle_with_a_time_waits_for_it() {
+    let late = HANDLE.1.replace("over_s", "at_s = 0.2, over_s");
+    let at = |frames: u32, handle: &str| Ended::of(&first(frames, &chain(&[("handle", handle), UNRELAXED])));
+    // The frame that begins at 0.25 s is the third.
+    assert!(at(2, &late).by.iter().all(|by| *by == Vector3::zeros()));
+    assert!(at(2, HANDLE.1).by.iter().any(|by| *by != Vector3::zeros()));
+    assert!(at(5, &late).by == at(3, HANDLE.1).by);
+}
+
+/// A handle grabs tissue where other handles have moved it. Control: it holds it from the start.
+#[test]
+fn a_handle_with_a_time_grabs_tissue_where_it_is() {
+    const FIRST: &str = "{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 30, 0], over_s = 0.25 }";
+    let after = |at_s: &str| {
+        let second = format!(
+            "{{ at_mm = [-12, 100, 0], radius_mm = 13, move_mm = [0, 0, 12], at_s = {at_s}, over_s = 0.25 }}"
+        );
+        Ended::of(&chain(&[("handle", &format!("[{FIRST}, {second}]")), UNRELAXED]))
+    };
+    let (start, late) = (after("0"), after("0.25"));
+    let held = &late.twin.held[1];
+    assert!(held.iter().all(|&v| (start.by[v] - Vector3::new(0.0, 0.0, 12.0)).norm() < EXACT_MM));
+    assert!(held.iter().all(|&v| (late.by[v].z - 12.0).abs() < EXACT_MM));
+    assert!(
+        held.iter().any(|&v| late.by[v].y > 3.0),
+        "{:?}",
+        held.iter().map(|&v| late.by[v]).collect::<Vec<_>>()
+    );
+}
+
 /// Two handles move at different speeds. One of them holds tissue that the scene fixes.
 #[test]
 fn handles_move_independently() {

@@ -6,6 +6,12 @@ use super::*;
 use crate::scenes::{frames, run_in};
 
 const ALL: (&str, &str) = ("output", "{ volume = true, surface = true, report = true }");
+/// Two handles, one of which grabs what the other has moved.
+const TURNS: (&str, &str) = (
+    "handle",
+    "[{ at_mm = [-18, 97, 0], radius_mm = 22, move_mm = [-12, 0, 0], over_s = 0.25 },
+      { at_mm = [-53, 90, 0], radius_mm = 11, move_mm = [0, 12, 0], at_s = 0.25, over_s = 0.25 }]",
+);
 /// A handle that fixed tissue cannot follow.
 const FAR: (&str, &str) =
     ("handle", "[{ at_mm = [-15, 105, 0], radius_mm = 11, move_mm = [-150, 0, 9], over_s = 0.375 }]");
@@ -14,7 +20,8 @@ const FAR: (&str, &str) =
 /// without links beyond their limits.
 #[test]
 fn a_run_in_two_parts_equals_the_whole_run() {
-    for (handle, at_s) in [(ASIDE, "0"), (ASIDE, "0.25"), (FAR, "0"), (FAR, "0.25"), (FAR, "0.5")] {
+    let cases = [(ASIDE, "0"), (ASIDE, "0.25"), (TURNS, "0.25"), (FAR, "0"), (FAR, "0.25"), (FAR, "0.5")];
+    for (handle, at_s) in cases {
         let set = [ALL, INCISION, handle, ("incision.0.at_s", at_s), ("chainmail.relax_per_frame", "3")];
         let scene = chain(&set);
         let whole = Run::of(&scene);

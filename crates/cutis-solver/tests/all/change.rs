@@ -44,6 +44,7 @@ fn exchange() -> Change<f64> {
         inverse_masses: vec![(3, 0.0), (4, 0.5)],
         loads: vec![(2, Vector3::new(0.0, 3.0, 0.0))],
         states: vec![[4, 3]],
+        handles: Vec::new(),
     }
 }
 
@@ -76,6 +77,41 @@ fn a_changed_body_continues_as_one_that_was_built_so() {
     }
 }
 
+/// A handle grabs a mass where it is, and the others move as if it had been built there. Control:
+/// without the handle the mass moves otherwise.
+#[test]
+fn a_handle_grabs_a_vertex_where_it_is() {
+    for formulation in [Formulation::Xpbd, Formulation::Vbd] {
+        let settings = settings(formulation);
+        let mut changed = SolverReference::new(chain(), settings).unwrap();
+        changed.step(7).unwrap();
+        let (x, mut v) = (changed.positions().unwrap(), changed.velocities().unwrap().to_vec());
+        assert_ne!(x[2], points()[2]);
+        let at_s = changed.time_s();
+        let handle = Handle { vertices: vec![2], move_m: [0.0, 0.5, 0.0], at_s, over_s: 2.0 * settings.dt_s };
+        changed.change(&Change { handles: vec![handle.clone()], ..Change::default() }).unwrap();
+        changed.step(1).unwrap();
+        let half = Vector3::new(0.0, 0.25, 0.0);
+        assert!((changed.positions().unwrap()[2] - x[2] - half).norm() < 1e-15, "{formulation:?}");
+        changed.step(4).unwrap();
+        let moved = changed.positions().unwrap();
+        assert_eq!(moved[2], x[2] + 2.0 * half, "{formulation:?}");
+
+        let colors = Groups::from_colors(&[0, 1, 0, 1, 1]).unwrap();
+        let built = SystemBuilder::new(&x, &[0.0, 1.0, 1.0, 1.0, 0.0]).unwrap().vertex_groups(colors);
+        let built = springs(springs(built, &CHAIN[..2], 0.01), &CHAIN[2..], 0.01).handle(handle).unwrap();
+        let mut built = SolverReference::new(built.build(), settings).unwrap();
+        v[2] = Vector3::zeros();
+        built.restore(&x, &v, 7).unwrap();
+        built.step(5).unwrap();
+        assert_eq!(built.positions().unwrap(), moved, "{formulation:?}");
+
+        let mut free = SolverReference::new(chain(), settings).unwrap();
+        free.step(12).unwrap();
+        assert_ne!(free.positions().unwrap()[1], moved[1]);
+    }
+}
+
 #[test]
 fn changes_that_do_not_fit_are_refused_and_change_nothing() {
     let handle = Handle { vertices: vec![0], move_m: [0.0; 3], at_s: 0.0, over_s: 1.0 };
@@ -98,6 +134,12 @@ fn changes_that_do_not_fit_are_refused_and_change_nothing() {
     refuse(Change { inverse_masses: vec![(0, 1.0)], ..none() }, "because a handle moves it");
     refuse(Change { loads: vec![(1, Vector3::repeat(f64::INFINITY))], ..none() }, "load is inf");
     refuse(Change { states: vec![[1, 9]], ..none() }, "vertex 9");
+    let grab = |vertices: &[u32], over_s| Handle { vertices: vertices.to_vec(), over_s, ..Handle::default() };
+    refuse(Change { handles: vec![grab(&[1, 7], 1.0)], ..none() }, "vertex 7");
+    refuse(Change { handles: vec![grab(&[0], 1.0)], ..none() }, "already moved by another handle");
+    let twice = vec![grab(&[1], 1.0), grab(&[2, 1], 1.0)];
+    refuse(Change { handles: twice, ..none() }, "already moved by another handle");
+    refuse(Change { handles: vec![grab(&[1], f64::NAN)], ..none() }, "over_s");
 }
 
 /// A mass that begins to move must have a color of its own among its neighbors, in all kinds.

@@ -132,3 +132,23 @@ pub(crate) struct SimulationEnd {
     pub(crate) chainmail: Option<ChainmailReport>,
     pub(crate) warnings: Vec<String>,
 }
+
+/// The first frame of `dt_s` seconds that begins at `at_s` or later. Frames beyond the range of
+/// `u32` never come.
+fn first_frame(at_s: f64, dt_s: f64) -> u64 {
+    let near = (at_s / dt_s).min(f64::from(u32::MAX)) as u64;
+    (near.saturating_sub(1)..=near + 1).find(|&frame| frame as f64 * dt_s >= at_s).unwrap_or(near + 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_frame;
+
+    #[test]
+    fn a_frame_begins_at_the_time_or_later() {
+        for (at_s, frame) in [(0.0, 0), (1e-9, 1), (0.1, 1), (0.3, 3), (0.31, 4), (12.3, 123)] {
+            assert_eq!(first_frame(at_s, 0.1), frame, "{at_s}");
+        }
+        assert!(first_frame(1e300, 0.1) > u64::from(u32::MAX));
+    }
+}

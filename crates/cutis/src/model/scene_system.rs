@@ -25,7 +25,8 @@ pub struct SceneSystem {
 
 /// Builds the system of a scene: reads the CT, makes the lattice and the cuts, and adds the
 /// constraints and handles that the scene names. Opens no device, makes no step and writes nothing.
-/// Cuts that a run makes while the body moves exist from the start, and sutures do not pull.
+/// Cuts that a run makes while the body moves exist from the start, handles hold their tissue from
+/// the start, and sutures do not pull.
 ///
 /// ```no_run
 /// use cutis::Scene;
@@ -49,7 +50,7 @@ pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
     let sections = BodySections { cuts_grow: false, ..BodySections::of(loaded) };
     let body = Body::build(&sections, &source.volume)?;
     let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body: &body };
-    let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?;
+    let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?.unchanging()?;
     Ok(SceneSystem { system, settings, gapes: body.cut.gapes, frame: body.mesh.frame })
 }
 

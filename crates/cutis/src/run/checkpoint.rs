@@ -3,9 +3,11 @@
 //! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32),
 //! vertex count (u64), positions (3 × f32 per vertex, m, local frame), three words of 32 bits per
 //! vertex, further words, SHA-256 of all that (32). With the model `pbd` the words are velocities
-//! (f32, m/s). With `chainmail` they are coordinates (i32, units of the chain), the energy after
-//! the last drag (f64, mm², two words), and the elements that
-//! [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
+//! (f32, m/s), the distance at which each thread began to pull (f32, m), and the positions at which
+//! handles with an `at_s` grabbed their vertices (f32, m); what has not happened is NaN. With
+//! `chainmail` they are coordinates (i32, units of the chain), the energy after the last drag (f64,
+//! mm², two words), the coordinates at which the handles grabbed their elements (0 before that), and
+//! the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
 
 use std::path::Path;
 
@@ -15,7 +17,7 @@ use sha2::{Digest, Sha256};
 use crate::run::files;
 use crate::{Error, Scene};
 
-const MAGIC: &[u8; 8] = b"CUTISCP2";
+const MAGIC: &[u8; 8] = b"CUTISCP3";
 const HEADER: usize = 8 + 32 + 4 + 8;
 const SEAL: usize = 32;
 

@@ -156,7 +156,7 @@ impl Baseline<'_> {
         };
         let body = other.as_ref().unwrap_or(self.body);
         let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body };
-        let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?;
+        let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?.unchanging()?;
         let bench = Bench::new(&system, settings, &body.cut.gapes, self.bench.backend, self.bench.frames);
         let run = bench.run(self.setting, progress, |_| std::ops::ControlFlow::Continue(()))?;
         let field = match &other {

@@ -91,7 +91,8 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         clock.stage("constraints of all formulations", 0, |_| {
             let mut all = loaded.clone();
             all.scene.solver.formulation = Formulation::Vbd;
-            ConstraintModel::build(&ModelInput { file: all.file(), scene: &all.scene, body: &body })
+            let input = ModelInput { file: all.file(), scene: &all.scene, body: &body };
+            Ok(ConstraintModel::build(&input)?.unchanging()?)
         })?;
     let backend = backend.kept_open()?;
     plan.warnings.iter().for_each(|warning| progress.note(warning));

@@ -6,7 +6,7 @@ use anyhow::bail;
 
 use crate::parity::bench::Failure;
 
-const MAGIC: &[u8] = b"CUTISCP2";
+const MAGIC: &[u8] = b"CUTISCP3";
 /// Length of magic, fingerprint, frame, and number of vertices.
 const HEADER: usize = 8 + 32 + 4 + 8;
 /// Length of the checksum after the state.

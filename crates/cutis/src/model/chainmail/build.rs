@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 use super::{ChainCut, ChainHandle, ChainmailModel};
 use crate::Error;
 use crate::body::Body;
-use crate::model::ModelInput;
+use crate::model::{ModelInput, first_frame};
 use crate::scene::IncisionSection;
 
 impl ChainmailModel {
@@ -112,7 +112,8 @@ fn handles(input: &ModelInput<'_>) -> Result<Vec<ChainHandle>, Error> {
                 &why,
             ));
         }
-        handles.push(ChainHandle { elements, steps, over_s: handle.over_s });
+        let frame = u32::try_from(first_frame(handle.at_s, scene.solver.dt_s)).unwrap_or(u32::MAX);
+        handles.push(ChainHandle { elements, frame, steps, over_s: handle.over_s });
     }
     Ok(handles)
 }

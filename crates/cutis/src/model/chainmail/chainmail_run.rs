@@ -1,6 +1,6 @@
 //! A simulation by ChainMail: cuts, propagation of drags, relaxation.
 
-use cutis_chainmail::{Drag, LinkViolation, Order};
+use cutis_chainmail::{Drag, LinkViolation, Order, UNITS_PER_STEP};
 use cutis_solver::{SolverError, StepProfile};
 use cutis_solver_cpu::CpuError;
 use nalgebra::{Point3, Vector3};
@@ -34,8 +34,10 @@ pub(super) struct ChainmailRun<'a> {
     pool: ThreadPool,
     /// Relaxation on a GPU. `None` if the host relaxes the chain.
     relaxer: Option<Relaxer>,
-    /// All elements that handles grab.
+    /// All elements that handles have grabbed.
     held: Vec<u32>,
+    /// For each handle that has grabbed its elements, their positions then in units of the chain.
+    starts: Vec<Option<Vec<[i32; 3]>>>,
     frame: u32,
     /// The last frame in which a handle moves.
     last_drag: u32,
@@ -71,12 +73,13 @@ impl<'a> ChainmailRun<'a> {
         let origin = affine.to_mm(Point3::origin());
         let step_m =
             |axis| (affine.to_mm(Point3::origin() + Vector3::<f64>::ith(axis, 1.0)) - origin) / 1000.0;
-        let frames = |handle: &ChainHandle| (handle.over_s / dt_s).ceil() as u32;
+        let end = |handle: &ChainHandle| handle.frame.saturating_add((handle.over_s / dt_s).ceil() as u32);
         Ok(Self {
             steps_m: [0, 1, 2].map(step_m),
             order: if threads.is_some() { Order::Slabs } else { Order::Fifo },
-            held: model.handles.iter().flat_map(|handle| handle.elements.iter().copied()).collect(),
-            last_drag: model.handles.iter().map(frames).max().unwrap_or(0).min(input.scene.run.frames),
+            held: Vec::new(),
+            starts: vec![None; model.handles.len()],
+            last_drag: model.handles.iter().map(end).max().unwrap_or(0).min(input.scene.run.frames),
             model,
             body,
             dt_s,
@@ -106,15 +109,29 @@ impl<'a> ChainmailRun<'a> {
         self.cuts_made > first || !links.is_empty()
     }
 
+    /// Lets the handles grab their elements that drag them from the present frame on.
+    fn grab(&mut self) {
+        let Self { model: ChainmailModel { chain, handles, .. }, starts, held, frame, .. } = self;
+        for (handle, start) in handles.iter().zip(starts) {
+            if start.is_none() && handle.frame <= *frame {
+                *start = Some(handle.elements.iter().map(|&element| chain.units(element)).collect());
+                held.extend(&handle.elements);
+            }
+        }
+    }
+
     /// Targets of the grabbed elements at the end of a frame.
     fn drags(&self, frame: u32) -> Vec<Drag> {
-        let (grid, time_s) = (self.body.mesh.lattice.grid(), f64::from(frame) * self.dt_s);
         let mut drags = Vec::with_capacity(self.held.len());
-        for handle in &self.model.handles {
+        for (handle, start) in self.model.handles.iter().zip(&self.starts) {
+            let Some(start) = start else { continue };
+            let time_s = f64::from(frame - handle.frame) * self.dt_s;
             let share = if time_s < handle.over_s { time_s / handle.over_s } else { 1.0 };
-            drags.extend(handle.elements.iter().map(|&element| {
-                let rest = grid.point(element as usize);
-                Drag { element, to: [0, 1, 2].map(|axis| rest[axis] as f64 + share * handle.steps[axis]) }
+            drags.extend(handle.elements.iter().zip(start).map(|(&element, start)| {
+                let along = |axis: usize| {
+                    f64::from(start[axis]) / f64::from(UNITS_PER_STEP) + share * handle.steps[axis]
+                };
+                Drag { element, to: [0, 1, 2].map(along) }
             }));
         }
         drags
@@ -202,7 +219,9 @@ impl Simulation for ChainmailRun<'_> {
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
         let count = 3 * self.model.elements.len();
         let (units, rest) = saved.words.split_at(count.min(saved.words.len()));
-        let (energy, strained) = rest.split_at(ENERGY_WORDS.min(rest.len()));
+        let (energy, rest) = rest.split_at(ENERGY_WORDS.min(rest.len()));
+        let grabbed: usize = self.model.handles.iter().map(|handle| handle.elements.len()).sum();
+        let (mut starts, strained) = rest.split_at((3 * grabbed).min(rest.len()));
         let units: Vec<(u32, [i32; 3])> = self
             .model
             .elements
@@ -215,6 +234,14 @@ impl Simulation for ChainmailRun<'_> {
         if let Some(last) = saved.frame.checked_sub(1) {
             self.frame = last;
             self.cut();
+        }
+        for (handle, start) in self.model.handles.iter().zip(&mut self.starts) {
+            let (own, others) = starts.split_at((3 * handle.elements.len()).min(starts.len()));
+            starts = others;
+            if handle.frame < saved.frame {
+                *start = Some(own.chunks_exact(3).map(|at| [0, 1, 2].map(|n| at[n].cast_signed())).collect());
+                self.held.extend(&handle.elements);
+            }
         }
         self.frame = saved.frame;
         self.report.energy_before =
@@ -231,6 +258,7 @@ impl Simulation for ChainmailRun<'_> {
         if !self.model.cuts.is_empty() || self.wound.is_some() {
             changed = profile.time(CUTS, || self.cut());
         }
+        self.grab();
         self.frame += 1;
         if !self.held.is_empty() && (changed || self.frame <= self.last_drag) {
             profile.time(PROPAGATION, || self.propagate())?;
@@ -263,8 +291,12 @@ impl Simulation for ChainmailRun<'_> {
         let units = self.model.elements.iter().flat_map(|&element| chain.units(element));
         let energy = self.report.energy_before.to_bits();
         let energy: [u32; ENERGY_WORDS] = [energy as u32, (energy >> 32) as u32];
-        let words =
-            units.map(i32::cast_unsigned).chain(energy).chain(chain.strained().iter().copied()).collect();
+        let starts = self.model.handles.iter().zip(&self.starts).flat_map(|(handle, start)| {
+            let start = |n: usize| start.as_ref().map_or([0; 3], |start| start[n]);
+            (0..handle.elements.len()).flat_map(start).map(i32::cast_unsigned).collect::<Vec<u32>>()
+        });
+        let words = units.map(i32::cast_unsigned).chain(energy).chain(starts);
+        let words = words.chain(chain.strained().iter().copied()).collect();
         Ok(Checkpoint { frame, positions: self.positions(), words })
     }
 

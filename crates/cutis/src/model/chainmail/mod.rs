@@ -35,9 +35,11 @@ pub(crate) struct ChainmailModel {
     relax_per_frame: u32,
 }
 
-/// Elements that are dragged along a straight line.
+/// Elements that are dragged along a straight line, from the place where they are grabbed.
 struct ChainHandle {
     elements: Vec<u32>,
+    /// The first frame in which they are dragged.
+    frame: u32,
     /// The whole path, in lattice steps.
     steps: Vector3<f64>,
     /// Duration of the movement, s.

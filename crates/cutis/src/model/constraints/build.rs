@@ -4,18 +4,19 @@ use std::collections::{BTreeMap, HashSet};
 
 use cutis_coloring::Groups;
 use cutis_mesh::Stitch;
-use cutis_solver::{Change, Formulation, Handle, Settings, System, SystemBuilder};
+use cutis_solver::{Change, Formulation, Settings, SolverError, System, SystemBuilder};
 use nalgebra::Vector3;
 
 use super::ConstraintModel;
 use super::elements::Elements;
+use super::hooks::{self, Hooks};
 use super::kinds::{BodyParts, contact};
 use super::threads::{self, Threads};
 use super::wound::{self, GrowingWound, WholeParts};
 use crate::Error;
 use crate::body::GrowingCuts;
 use crate::model::ModelInput;
-use crate::scene::{HandleSection, Scene, SolverSection};
+use crate::scene::{Scene, SolverSection};
 
 impl SolverSection {
     /// The solver settings that the section describes.
@@ -44,6 +45,19 @@ pub(crate) fn settings(scene: &Scene) -> Settings {
 fn hold(system: &System<f32>, loads: &mut [Vector3<f32>]) -> Result<(), Error> {
     let forces = system.constraint_forces()?;
     loads.iter_mut().zip(forces).for_each(|(load, force)| *load -= force);
+    Ok(())
+}
+
+/// Checks that no vertex is in two handles, one of which may grab it later than the other. The error
+/// comes with the number of the handle.
+fn check_handles(grabbed: &[Vec<u32>]) -> Result<(), (usize, SolverError)> {
+    let mut held = HashSet::new();
+    for (handle, vertices) in grabbed.iter().enumerate() {
+        if let Some(&vertex) = vertices.iter().find(|vertex| !held.insert(**vertex)) {
+            let reason = "is already moved by another handle";
+            return Err((handle, SolverError::Handle { handle, vertex, reason }));
+        }
+    }
     Ok(())
 }
 
@@ -92,11 +106,14 @@ impl ConstraintModel {
             }
             builder = builder.vertex_groups(Groups::from_colors(&colors)?);
         }
-        for (n, (handle, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {
-            let move_m = (Vector3::from(handle.move_mm) / 1000.0).into();
-            let HandleSection { at_s, over_s, .. } = *handle;
-            let handle = Handle { vertices: grabbed.clone(), move_m, at_s, over_s };
-            builder = builder.handle(handle).map_err(file.blame(&format!("handle[{n}]")))?;
+        check_handles(&body.grabbed).map_err(|(n, error)| file.blame(&format!("handle[{n}]"))(error))?;
+        let hooks = Hooks::new(&scene.handle, &body.grabbed, &scene.solver.settings());
+        let holds = |n: usize| hooks.as_ref().is_none_or(|hooks| !hooks.waits(n));
+        for (n, (section, grabbed)) in scene.handle.iter().zip(&body.grabbed).enumerate() {
+            if holds(n) {
+                let handle = hooks::handle(section, grabbed, section.at_s);
+                builder = builder.handle(handle).map_err(file.blame(&format!("handle[{n}]")))?;
+            }
         }
         let mut system = builder.build();
         let rounded = loads.iter().map(|load| load.map(|newton| newton as f32));
@@ -107,7 +124,12 @@ impl ConstraintModel {
         system.set_loads(&balanced)?;
         let wound = match &body.growing {
             None => None,
-            Some(cuts) => Some(add_wound(input, cuts, &mut system, &inverse_masses, &loads)?),
+            Some(cuts) => {
+                let held =
+                    (0..).zip(&body.grabbed).filter(|(n, _)| holds(*n)).flat_map(|(_, grabbed)| grabbed);
+                let held = held.copied().collect();
+                Some(add_wound(input, cuts, &mut system, &inverse_masses, &loads, &held)?)
+            }
         };
         let mut threads = Threads::new(input, system.kinds().len())?;
         if let Some(threads) = &mut threads {
@@ -115,21 +137,22 @@ impl ConstraintModel {
             colors.insert("suture".to_owned(), kind.colors());
             system.add_kinds(vec![kind])?;
         }
-        Ok(Self { system, settings: settings(scene), colors, warnings, wound, threads })
+        Ok(Self { system, settings: settings(scene), colors, warnings, wound, threads, hooks })
     }
 }
 
-/// Adds the constraints along growing cuts, as they are at the start.
+/// Adds the constraints along growing cuts, as they are at the start. `moved` are the vertices that
+/// handles hold from the start.
 fn add_wound(
     input: &ModelInput<'_>,
     cuts: &GrowingCuts,
     system: &mut System<f32>,
     inverse_masses: &[f32],
     loads: &[Vector3<f64>],
+    moved: &HashSet<u32>,
 ) -> Result<GrowingWound, Error> {
     let ModelInput { file, scene, body } = *input;
     let fixed = body.fixed(file, &scene.fixed)?;
-    let moved: HashSet<u32> = body.grabbed.iter().flatten().copied().collect();
     let rest = wound::at_rest(&body.mesh.positions, inverse_masses);
     let whole = WholeParts {
         builder: SystemBuilder::in_place(&body.mesh.positions, inverse_masses)?,

@@ -3,6 +3,7 @@
 mod build;
 mod elements;
 mod estimate;
+mod hooks;
 pub(crate) mod kinds;
 mod measure;
 mod solver_run;
@@ -12,7 +13,7 @@ mod wound;
 
 use std::collections::BTreeMap;
 
-use cutis_solver::{Formulation, Settings, StepProfile, System};
+use cutis_solver::{Change, Formulation, Settings, SolverError, StepProfile, System};
 
 use super::costs::{lines_that_hold, sizes, unfinished_cuts, unfinished_handles, unfinished_sutures};
 use super::{Model, ModelCosts, ModelInput, Started};
@@ -24,6 +25,7 @@ use crate::scene::{Scene, TissueMaterials};
 use crate::{CostReport, Error, Progress};
 
 pub(crate) use estimate::CostEstimate;
+use hooks::Hooks;
 pub(super) use kinds::contact::fill_default;
 use solver_run::SolverRun;
 pub(crate) use start::{device_memory, start};
@@ -42,6 +44,22 @@ pub(crate) struct ConstraintModel {
     wound: Option<GrowingWound>,
     /// The threads of sutures; none if the scene has none.
     threads: Option<Threads>,
+    /// The handles that grab tissue later; none if the scene has none.
+    hooks: Option<Hooks>,
+}
+
+impl ConstraintModel {
+    /// The system for a program that does not change it while the body moves: handles with an
+    /// `at_s` hold their tissue from the start, too.
+    ///
+    /// # Errors
+    /// The errors of the solver.
+    pub(crate) fn unchanging(mut self) -> Result<Self, SolverError> {
+        if let Some(hooks) = self.hooks.take() {
+            self.system.change(&Change { handles: hooks.into_handles(), ..Change::default() })?;
+        }
+        Ok(self)
+    }
 }
 
 /// Checks the sections of the constraint kinds.
@@ -103,14 +121,15 @@ impl Model for ConstraintModel {
         backend: &Chosen,
         clock: &mut Clock<'_>,
     ) -> Result<Started<'a>, Error> {
-        let Self { system, settings, wound, threads, .. } = *self;
+        let Self { system, settings, wound, threads, hooks, .. } = *self;
         let (solver, device) = if backend.on_gpu() {
             let start = |_: &dyn Progress| start(backend, system, settings);
             clock.stage_on("gpu", "start the GPU", 0, start).map_err(input.file.blame("solver.backend"))?
         } else {
             start(backend, system, settings).map_err(input.file.blame("solver"))?
         };
-        Ok(Started { simulation: Box::new(SolverRun { solver, wound, threads, input: *input }), device })
+        let run = SolverRun { solver, wound, threads, hooks, input: *input };
+        Ok(Started { simulation: Box::new(run), device })
     }
 }
 
@@ -152,7 +171,9 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
         ),
         (
             scene.constraints.contact.as_ref().is_some_and(|contact| contact.acts)
-                && scene.incision.iter().all(|cut| cut.width_mm.is_some()),
+                && scene.incision.iter().all(|cut| cut.width_mm.is_some())
+                && scene.undermining.is_empty()
+                && scene.excision.is_empty(),
             "constraints.contact has no effect without an incision without width_mm",
         ),
         (

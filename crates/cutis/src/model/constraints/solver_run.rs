@@ -3,6 +3,7 @@
 use cutis_solver::{Change, Formulation, StepProfile, System};
 use nalgebra::{Point3, Vector3};
 
+use super::hooks::Hooks;
 use super::start::StartedSolver;
 use super::threads::Threads;
 use super::wound::GrowingWound;
@@ -22,6 +23,9 @@ const CUT: &str = "cut";
 /// Name of the work of sutures in a profile.
 const SUTURE: &str = "suture";
 
+/// Name of the work of hooks that grab tissue in a profile.
+const HOOK: &str = "hook";
+
 /// A solver with a body in it.
 pub(crate) struct SolverRun<'a> {
     pub(crate) solver: StartedSolver,
@@ -29,6 +33,8 @@ pub(crate) struct SolverRun<'a> {
     pub(crate) wound: Option<GrowingWound>,
     /// The threads of sutures; none if the scene has none.
     pub(crate) threads: Option<Threads>,
+    /// The handles that grab tissue later; none if the scene has none.
+    pub(crate) hooks: Option<Hooks>,
     pub(crate) input: ModelInput<'a>,
 }
 
@@ -52,6 +58,25 @@ impl<'a> SolverRun<'a> {
             self.solver.solver().change(&change)?;
         }
         Ok(())
+    }
+
+    /// Lets the hooks grab tissue that hold it from the present frame on. A vertex that a cut has
+    /// not reached begins where the vertex is that it follows.
+    fn grab(&mut self) -> Result<(), Error> {
+        let frame = self.solver.reader().simulation().clock().frame;
+        let vertices = self.hooks.as_ref().map_or_else(Vec::new, |hooks| hooks.vertices(frame));
+        if vertices.is_empty() {
+            return Ok(());
+        }
+        let positions = self.positions_of(&vertices)?;
+        let mut states = Vec::new();
+        if let (Some(cuts), Some(wound)) = (&self.input.body.growing, &mut self.wound) {
+            wound.hold(cuts, &vertices);
+            let pairs = vertices.iter().map(|&vertex| [vertex, wound.leader(cuts, vertex)]);
+            states.extend(pairs.filter(|[vertex, leader]| vertex != leader));
+        }
+        let handles = self.hooks.iter_mut().flat_map(|hooks| hooks.grab(frame, &positions)).collect();
+        Ok(self.solver.solver().change(&Change { states, handles, ..Change::default() })?)
     }
 
     /// Pulls the threads as far as they are tightened at the present time.
@@ -81,17 +106,24 @@ impl<'a> SolverRun<'a> {
 impl Simulation for SolverRun<'_> {
     fn restore(&mut self, saved: &Checkpoint) -> Result<(), Error> {
         let (velocities, starts) = saved.words.split_at(3 * saved.positions.len());
-        if let Some(threads) = &mut self.threads {
-            threads.restore(starts);
+        let threads = self.threads.as_ref().map_or(0, Threads::count);
+        let (threads, hooks) = starts.split_at(threads.min(starts.len()));
+        if let Some(own) = &mut self.threads {
+            own.restore(threads);
         }
         let velocities: Vec<Vector3<f32>> =
             velocities.chunks_exact(3).map(|v| Vector3::from_fn(|axis, _| f32::from_bits(v[axis]))).collect();
         let frame = u64::from(saved.frame);
-        if (self.wound.is_some() || self.threads.is_some()) && frame > 0 {
-            // Cuts and threads are as they were when the last frame began. All nodes have their
-            // states.
-            self.solver.solver().restore(&saved.positions, &velocities, frame - 1)?;
+        if (self.wound.is_some() || self.threads.is_some() || self.hooks.is_some()) && frame > 0 {
+            // Cuts, hooks and threads are as they were when the last frame began. All nodes have
+            // their states.
+            let mut positions = saved.positions.clone();
+            if let Some(own) = &self.hooks {
+                own.place(hooks, &mut positions);
+            }
+            self.solver.solver().restore(&positions, &velocities, frame - 1)?;
             self.cut_with(|change| change.states.clear())?;
+            self.grab()?;
             self.tighten()?;
         }
         Ok(self.solver.solver().restore(&saved.positions, &velocities, frame)?)
@@ -99,6 +131,7 @@ impl Simulation for SolverRun<'_> {
 
     fn step(&mut self) -> Result<(), Error> {
         self.cut()?;
+        self.grab()?;
         self.tighten()?;
         Ok(self.solver.solver().step(1)?)
     }
@@ -106,6 +139,9 @@ impl Simulation for SolverRun<'_> {
     fn step_timed(&mut self, profile: &mut StepProfile) -> Result<(), Error> {
         if self.wound.is_some() {
             profile.time(CUT, || self.cut())?;
+        }
+        if self.hooks.is_some() {
+            profile.time(HOOK, || self.grab())?;
         }
         if self.threads.is_some() {
             profile.time(SUTURE, || self.tighten())?;
@@ -152,7 +188,9 @@ impl Simulation for SolverRun<'_> {
             let own = of_vertices.by_ref().take(grabbed.len());
             own.fold(Vector3::zeros(), |sum: Vector3<f64>, force| sum + force.cast()).norm()
         };
-        Ok(body.grabbed.iter().map(force).collect())
+        let waits = |n: usize| self.hooks.as_ref().is_some_and(|hooks| hooks.waits(n));
+        let forces = body.grabbed.iter().map(force).enumerate();
+        Ok(forces.map(|(n, force)| if waits(n) { 0.0 } else { force }).collect())
     }
 
     fn save(&mut self, frame: u32) -> Result<Checkpoint, Error> {
@@ -162,7 +200,8 @@ impl Simulation for SolverRun<'_> {
             wound.complete(cuts, &mut velocities);
         }
         let words = velocities.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits));
-        let words = words.chain(self.threads.iter().flat_map(Threads::starts)).collect();
+        let words = words.chain(self.threads.iter().flat_map(Threads::starts));
+        let words = words.chain(self.hooks.iter().flat_map(Hooks::starts)).collect();
         Ok(Checkpoint { frame, positions, words })
     }
 

@@ -132,6 +132,11 @@ impl Threads {
         self.threads.iter().map(|thread| thread.suture)
     }
 
+    /// The number of threads.
+    pub(crate) fn count(&self) -> usize {
+        self.threads.len()
+    }
+
     /// The vertices of all threads, six for each.
     pub(crate) fn vertices(&self) -> &[u32] {
         self.vertices.as_flattened()

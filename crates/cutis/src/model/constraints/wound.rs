@@ -122,6 +122,7 @@ impl GrowingWound {
             states: states.collect(),
             inverse_masses: nodes.iter().copied().zip(parts.inverse_masses).collect(),
             loads: nodes.iter().copied().zip(parts.loads).collect(),
+            ..Change::default()
         };
         self.follows = parts.follows;
         Ok(Some(change))
@@ -191,6 +192,15 @@ impl GrowingWound {
     fn inverse_masses_at(&self, cuts: &GrowingCuts, stage: &Stage) -> Vec<f32> {
         let masses = cuts.masses(stage).into_iter().zip(&self.held);
         masses.map(|(mass, held)| if *held || mass <= 0.0 { 0.0 } else { 1.0 / mass as f32 }).collect()
+    }
+
+    /// Holds vertices from now on, so that increments of the cuts give them no mass.
+    pub(crate) fn hold(&mut self, cuts: &GrowingCuts, vertices: &[u32]) {
+        for vertex in vertices {
+            if let Ok(place) = cuts.growth.nodes().binary_search(vertex) {
+                self.held[place] = true;
+            }
+        }
     }
 
     /// The vertex at whose place a vertex is.

@@ -62,7 +62,8 @@ pub struct HandleSection {
     pub radius_mm: f64,
     /// Displacement at the end of the movement, mm.
     pub move_mm: [f64; 3],
-    /// Start of the movement, s. The tissue is held from the start of the run.
+    /// Time in s at which the handle grabs the tissue, where it is then, and begins to move it. It
+    /// does so when a frame begins at that time or later.
     #[serde(default)]
     pub at_s: f64,
     /// Duration of the movement, s.
