@@ -8,6 +8,7 @@ mod json;
 mod looks;
 mod paper_form;
 mod printed;
+mod steps;
 mod tune;
 
 use std::path::PathBuf;
