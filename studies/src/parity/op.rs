@@ -8,9 +8,9 @@
 
 use cutis_conformance::{ConformanceError, Finding, Limit, Report, Subject, device};
 use cutis_constraints::{
-    Constraint, Distance, DistanceMaterial, MaterialError, SkinStrip, SkinStripAtRest, SkinStripLaw,
-    SkinStripMaterial, SkinStripTurn, SkinTension, SkinTensionMaterial, SkinTensionPaper,
-    SkinTensionPaperMaterial, Volume, VolumeMaterial,
+    Constraint, Distance, DistanceMaterial, LipContact, LipContactMaterial, MaterialError, SkinStrip,
+    SkinStripAtRest, SkinStripLaw, SkinStripMaterial, SkinStripTurn, SkinTension, SkinTensionMaterial,
+    SkinTensionPaper, SkinTensionPaperMaterial, Thread, ThreadMaterial, Volume, VolumeMaterial,
 };
 use cutis_gpu::Gpu;
 
@@ -32,6 +32,17 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     examine(bench, &Subject::<Volume, 4>::new(shares().map(|rest_scale| VolumeMaterial { rest_scale })))?;
     examine(bench, &Subject::<SkinTension, 3>::new(shares().map(tension)))?;
     examine(bench, &Subject::<SkinTensionPaper, 3>::new(shares().map(paper)).direction_only())?;
+    let thread = |share: f64| ThreadMaterial {
+        ends: [[0.3 * share, 0.2], [0.5 - 0.2 * share, 0.4]],
+        length_scale: 1.6 - share,
+    };
+    examine(bench, &Subject::<Thread, 6>::new(shares().map(thread)))?;
+    let contact = |share: f64| {
+        let normal = [0.6, 0.8 * (1.0 - share), 0.8 * share];
+        let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        LipContactMaterial { part: share - 0.5, normal: normal.map(|x| x / length) }
+    };
+    examine(bench, &Subject::<LipContact, 4>::new(shares().map(contact)).oriented())?;
     let strips = || shares().map(strip).collect::<Result<Vec<_>, _>>();
     examine(bench, &Subject::<SkinStrip, 3>::new(strips()?).oriented())?;
     examine(bench, &Subject::<SkinStripAtRest, 3>::new(strips()?).oriented())?;

@@ -1,5 +1,7 @@
 //! Scenes of the outer ring.
 
+use std::f64::consts::TAU;
+
 use cutis::scene::{HandleSection, OutputSection, StcForm};
 use cutis::solver::Formulation;
 use cutis::{LoadedScene, Override, Scene};
@@ -50,6 +52,48 @@ pub fn all(effort: Effort) -> Result<Vec<SceneCase>, Failure> {
         cases.push(SceneCase::new("demo as it is", cutis::demo(&[])?, 40, true));
     }
     cases.extend(kinds(frames)?);
+    cases.extend(steps()?);
+    Ok(cases)
+}
+
+/// A piece that is excised, undermining that grows, a hook and sutures with contact, in each
+/// formulation.
+fn steps() -> Result<Vec<SceneCase>, Failure> {
+    let outline: Vec<String> = (0..=20)
+        .map(|n| {
+            let angle = TAU * f64::from(n % 20) / 20.0;
+            let (x, z) = (5.0 + 38.0 * angle.cos(), 16.0 * angle.sin());
+            format!("[{x:.2}, {:.2}, {z:.2}]", 102.5 - x * x / 700.0)
+        })
+        .collect();
+    let steps = format!(
+        "[{{ kind = 'excise', name = 'lesion', path_mm = [{}], depth_mm = 16 }},
+          {{ kind = 'undermine', wound = 'lesion', distance_mm = 22, depth_mm = 9, at_s = 0.01,
+             speed_mm_s = 300.0 }},
+          {{ kind = 'hook', at_mm = [5, 102, 22], radius_mm = 10, move_mm = [0, 4, 0], at_s = 0.02,
+             over_s = 0.1 }},
+          {{ kind = 'suture', wound = 'lesion', every_mm = 9, bite_mm = 8, at_s = 0.04,
+             tighten_s = 0.02 }}]",
+        outline.join(", ")
+    );
+    let mut cases = Vec::new();
+    for (formula, formulation) in [("XPBD", "xpbd"), ("PBD", "pbd"), ("VBD", "vbd")] {
+        let overrides = [
+            ("scan_is_at_rest", "true"),
+            ("lattice.split", "five"),
+            ("lattice.spacing_mm", "9"),
+            ("lattice.region", "{ around_mm = 45 }"),
+            ("constraints.membrane", "{ preset = 'trunk' }"),
+            ("incision", "[]"),
+            ("step", steps.as_str()),
+            ("solver.formulation", formulation),
+            ("solver.substeps", "2"),
+            ("solver.iterations", "2"),
+        ];
+        let mut loaded = fixture("phantom-small", &overrides)?;
+        loaded.scene.constraints.stc = None;
+        cases.push(SceneCase::new(&format!("steps of a surgeon, {formula}"), loaded, 6, false));
+    }
     Ok(cases)
 }
 
