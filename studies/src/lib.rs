@@ -8,6 +8,7 @@ pub mod accuracy;
 pub mod at_rest;
 pub mod cantilever;
 pub mod chainmail;
+pub mod closing;
 pub mod kit;
 pub mod main_job;
 pub mod mutations;
@@ -32,6 +33,7 @@ mod tests {
             ("at-rest", &crate::at_rest::TABLES),
             ("cantilever", &crate::cantilever::TABLES),
             ("chainmail", &crate::chainmail::TABLES),
+            ("closing", &crate::closing::TABLES),
             ("main-job", &crate::main_job::TABLES),
             ("parity", &crate::parity::TABLES),
             (crate::patch::PAGE, &crate::patch::TABLES),

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
-    accuracy, at_rest, cantilever, chainmail, main_job, mutations, parity, patch, region, speed, stability,
-    tuning, wound,
+    accuracy, at_rest, cantilever, chainmail, closing, main_job, mutations, parity, patch, region, speed,
+    stability, tuning, wound,
 };
 
 /// A study and its options.
@@ -18,6 +18,7 @@ enum Study {
     AtRest(at_rest::Options),
     Cantilever(cantilever::Options),
     Chainmail(chainmail::Options),
+    Closing(closing::Options),
     MainJob(main_job::Options),
     Mutations(mutations::Options),
     Parity(parity::Options),
@@ -36,6 +37,7 @@ impl Study {
             Self::AtRest(options) => at_rest::run(options, out),
             Self::Cantilever(options) => cantilever::run(options, out),
             Self::Chainmail(options) => chainmail::run(options, out),
+            Self::Closing(options) => closing::run(options, out),
             Self::MainJob(options) => main_job::run(options, out),
             Self::Mutations(options) => mutations::run(options, out),
             Self::Parity(options) => parity::run(options, out),

@@ -45,6 +45,7 @@ usage: cargo xtask COMMAND
       at-rest         ways to hold the scan at rest; with --scans, how far the skin of scans moves
       cantilever      a bent beam and scikit-fem; always writes its page
       chainmail       ChainMail on scans, and position-based dynamics
+      closing         what opens a cut, and the force of sutures that close an excision
       main-job        the main job on the phantom and on real scans, with and without skin tension
       region          cost and error of a region of interest and of a graded lattice
       tuning          `cutis tune` on the demo, compared with a full run
