@@ -3,7 +3,9 @@
 use std::io::Write;
 use std::path::Path;
 
+use anyhow::Context;
 use clap::Parser;
+use serde_json::Value;
 
 use crate::kit::{Checks, Failure, Page, Program, Provenance, Table, number_at, results, scene, target_dir};
 
@@ -29,6 +31,8 @@ const FRAMES: &str = "20";
 const ROUNDS: usize = 3;
 /// Largest time of a frame with a cut, relative to one without.
 const MOST: f64 = 1.2;
+/// Largest time of an increment of the cut, ms.
+const MOST_CUT_MS: f64 = 5.0;
 
 /// Measures all variants in turns. Returns whether all checks hold.
 ///
@@ -39,19 +43,29 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let provenance = Provenance::start(if options.write { "wound --write" } else { "wound" });
     let program = Program::build()?;
     let folder = target_dir()?.join("studies/wound");
-    let mut frames = VARIANTS.map(|(name, _)| Frames { name, vertices: 0.0, ms: f64::INFINITY });
+    let mut frames =
+        VARIANTS.map(|(name, _)| Frames { name, vertices: 0.0, ms: f64::INFINITY, cut_ms: None });
     for _ in 0..ROUNDS {
         for (frames, (_, changes)) in frames.iter_mut().zip(VARIANTS) {
             frames.measure(&program, changes, &folder)?;
         }
     }
-    let mut table = Table::new(["demo", "vertices", "ms/frame", "relative"]);
+    let mut table = Table::new(["demo", "vertices", "ms/frame", "relative", "cutting, ms/frame"]);
     let mut checks = Checks::default();
-    for Frames { name, vertices, ms } in &frames {
+    for Frames { name, vertices, ms, cut_ms } in &frames {
         let share = ms / frames[0].ms;
-        table.add([(*name).to_owned(), vertices.to_string(), format!("{ms:.1}"), format!("{share:.2}")]);
+        table.add([
+            (*name).to_owned(),
+            vertices.to_string(),
+            format!("{ms:.1}"),
+            format!("{share:.2}"),
+            cut_ms.map_or_else(|| "–".to_owned(), |ms| format!("{ms:.2}")),
+        ]);
         checks.add(format!("{name}: {share:.3} of a frame without a cut, at most {MOST}"), share <= MOST);
     }
+    let cut_ms = frames[2].cut_ms.unwrap_or(f64::NAN);
+    checks.add(format!("an increment takes {cut_ms:.2} ms, at most {MOST_CUT_MS}"), cut_ms <= MOST_CUT_MS);
+    checks.control("a cut that does not grow takes no time".to_owned(), frames[1].cut_ms.is_none());
     let copies = frames[1].vertices - frames[0].vertices;
     checks.control(format!("the cut has {copies} vertices of its own"), copies > 0.0);
     let table = table.markdown();
@@ -72,6 +86,8 @@ struct Frames {
     vertices: f64,
     /// The shortest mean of a round.
     ms: f64,
+    /// The shortest mean time of the cut in a frame; none if nothing is cut in a frame.
+    cut_ms: Option<f64>,
 }
 
 impl Frames {
@@ -81,6 +97,10 @@ impl Frames {
         let report = program.scene(&scene("demo"), &set, &["--frames", FRAMES], folder)?;
         self.vertices = number_at(&report, "/sizes/vertices")?;
         self.ms = self.ms.min(number_at(&report, "/frames/ms_mean")?);
+        let parts = report.pointer("/ledger/parts").and_then(Value::as_array).context("no cost report")?;
+        let cut = parts.iter().find(|part| part["part"] == "cut");
+        let cut_ms = cut.map(|part| number_at(part, "/ms_per_frame")).transpose()?;
+        self.cut_ms = self.cut_ms.into_iter().chain(cut_ms).reduce(f64::min);
         Ok(())
     }
 }
