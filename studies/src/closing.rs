@@ -1,5 +1,5 @@
-//! What opens a wound and what closes it: the opening of a cut by its depth, length and tension, and
-//! the force of sutures that close an excision.
+//! What opens a wound and what closes it: the opening of a cut by its depth, length and tension,
+//! and the force of sutures that close an excision.
 
 use std::f64::consts::TAU;
 use std::io::Write;

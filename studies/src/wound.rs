@@ -97,7 +97,7 @@ impl Frames {
         let report = program.scene(&scene("demo"), &set, &["--frames", FRAMES], folder)?;
         self.vertices = number_at(&report, "/sizes/vertices")?;
         self.ms = self.ms.min(number_at(&report, "/frames/ms_mean")?);
-        let parts = report.pointer("/ledger/parts").and_then(Value::as_array).context("no cost report")?;
+        let parts = report["ledger"]["parts"].as_array().context("no cost report")?;
         let cut = parts.iter().find(|part| part["part"] == "cut");
         let cut_ms = cut.map(|part| number_at(part, "/ms_per_frame")).transpose()?;
         self.cut_ms = self.cut_ms.into_iter().chain(cut_ms).reduce(f64::min);

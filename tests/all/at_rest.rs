@@ -115,9 +115,10 @@ fn an_uncut_body_does_not_move_on_a_gpu() {
 }
 
 /// The bodies of single precision, stepped in double precision. Their rest lengths and areas are
-/// rounded to single precision, which is all that moves them: by less than the rounding of the size of
-/// the body, 400 mm. In PBD no modulus weighs these errors against each other, and the body comes to
-/// rest a little farther away, in the same place for all settings. Control: without the load.
+/// rounded to single precision, which is all that moves them: by less than the rounding of the size
+/// of the body, 400 mm. In PBD no modulus weighs these errors against each other, and the body
+/// comes to rest a little farther away, in the same place for all settings. Control: without the
+/// load.
 #[test]
 fn an_uncut_membrane_does_not_move_in_double_precision() {
     let moved_mm = |set: &[(&str, &str)], frames: usize| {

@@ -105,10 +105,10 @@ fn cuts_that_cross_open_together() {
     }
 }
 
-/// The opening does not depend on where the blade lies within its cells of 4 mm, in ten places. Near
-/// 30.4 mm it comes close to lattice points, so that parts of tetrahedra are thin. The body is not the
-/// same everywhere: two cuts that lie alike in their cells, at 30 and 34 mm, differ by 2 %. Openings
-/// are relative to the line through these two. Control: a cut of half the depth.
+/// The opening does not depend on where the blade lies within its cells of 4 mm, in ten places.
+/// Near 30.4 mm it comes close to lattice points, so that parts of tetrahedra are thin. The body is
+/// not the same everywhere: two cuts that lie alike in their cells, at 30 and 34 mm, differ by 2 %.
+/// Openings are relative to the line through these two. Control: a cut of half the depth.
 #[test]
 fn the_opening_does_not_depend_on_the_place_within_a_cell() {
     let opening = |x: f64, depth_mm: f64| {

@@ -207,7 +207,8 @@ fn a_run_resumes_between_steps() {
         let lesion = excise(&ellipse(LENGTH, WIDTH), &format!(", at_s = {at_s}"));
         let undermine = UNDERMINE.replace(" }", ", at_s = 0.03, speed_mm_s = 300.0 }");
         let sew = SEW.replace("0.3", "0.1");
-        // It grabs tissue next to the piece in frame 2, before the blade of the undermining is there.
+        // It grabs tissue next to the piece in frame 2, before the blade of the undermining is
+        // there.
         let hook = "{ kind = 'hook', at_mm = [5, 102, 22], radius_mm = 10, move_mm = [0, 4, 0], at_s = 0.03, over_s = 0.1 }";
         let set = [
             ("lattice.spacing_mm", "9"),

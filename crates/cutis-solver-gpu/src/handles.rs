@@ -1,5 +1,5 @@
-//! Kinematic vertices on the device: where they were grabbed, and the displacement of each handle in
-//! each substep of a frame.
+//! Kinematic vertices on the device: where they were grabbed, and the displacement of each handle
+//! in each substep of a frame.
 
 use cutis_gpu::{BindGroup, Buffer, Gpu, GpuError, Kernel, Pass};
 use cutis_shaders::solver;

@@ -6,8 +6,8 @@
 //! (f32, m/s), the distance at which each thread began to pull (f32, m), and the positions at which
 //! handles with an `at_s` grabbed their vertices (f32, m); what has not happened is NaN. With
 //! `chainmail` they are coordinates (i32, units of the chain), the energy after the last drag (f64,
-//! mm², two words), the coordinates at which the handles grabbed their elements (0 before that), and
-//! the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
+//! mm², two words), the coordinates at which the handles grabbed their elements (0 before that),
+//! and the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
 
 use std::path::Path;
 

@@ -48,8 +48,8 @@ fn hold(system: &System<f32>, loads: &mut [Vector3<f32>]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that no vertex is in two handles, one of which may grab it later than the other. The error
-/// comes with the number of the handle.
+/// Checks that no vertex is in two handles, one of which may grab it later than the other. The
+/// error comes with the number of the handle.
 fn check_handles(grabbed: &[Vec<u32>]) -> Result<(), (usize, SolverError)> {
     let mut held = HashSet::new();
     for (handle, vertices) in grabbed.iter().enumerate() {

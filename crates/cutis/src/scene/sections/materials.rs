@@ -46,9 +46,9 @@ pub struct TissueMaterialSection {
     /// Range of the depth below the skin that `skin.mode` finds, mm. Left out: any depth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_mm: Option<[f64; 2]>,
-    /// Young's modulus of the tissue, Pa (`xpbd`, `vbd`). The springs get four times as much with the
-    /// split `kuhn6`, which gives the body this modulus along the axes of the lattice, and five times
-    /// as much with `five`, which gives it this modulus in all directions.
+    /// Young's modulus of the tissue, Pa (`xpbd`, `vbd`). The springs get four times as much with
+    /// the split `kuhn6`, which gives the body this modulus along the axes of the lattice, and five
+    /// times as much with `five`, which gives it this modulus in all directions.
     pub youngs_modulus_pa: f64,
     /// Bulk modulus, Pa (`xpbd`, `vbd`).
     pub bulk_modulus_pa: f64,
