@@ -18,6 +18,40 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn quads(self, mut quad: impl FnMut(usize, [$number; 4])) {
+                quad(0, self.into());
+            }
+
+            #[inline(always)]
+            fn from_slice(numbers: &[$number]) -> Self {
+                let mut array = [0.0; 4];
+                array.copy_from_slice(&numbers[..4]);
+                array.into()
+            }
+
+            #[inline(always)]
+            fn write_to(self, numbers: &mut [$number]) {
+                let array: [$number; 4] = self.into();
+                numbers[..4].copy_from_slice(&array);
+            }
+
+            #[inline(always)]
+            fn transposed(vectors: [Self; 4]) -> [Self; 4] {
+                let rows: [[$number; 4]; 4] = vectors.map(|vector| vector.into());
+                std::array::from_fn(|column| Self::from_lanes(|row| rows[row][column]))
+            }
+
+            #[inline(always)]
+            fn interleaved(self) -> Self {
+                self
+            }
+
+            #[inline(always)]
+            fn sequential(self) -> Self {
+                self
+            }
+
+            #[inline(always)]
             fn columns(row: impl Fn(usize) -> [$number; 4]) -> [Self; 4] {
                 let rows: [[$number; 4]; 4] = std::array::from_fn(row);
                 std::array::from_fn(|column| Self::from_lanes(|lane| rows[lane][column]))

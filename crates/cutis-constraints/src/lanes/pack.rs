@@ -53,6 +53,10 @@ pub trait Register: Copy + Send + Sync + 'static {
     fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self;
     /// Transposes the blocks of 4 × 4 numbers that four registers have at the same place.
     fn transposed(registers: [Self; 4]) -> [Self; 4];
+    /// Moves lane `n · LANES/4 + p` to lane `4p + n`, for all `n` below 4.
+    fn interleaved(self) -> Self;
+    /// The inverse of `interleaved`.
+    fn sequential(self) -> Self;
 }
 
 /// A number with one value per lane of a register.
@@ -92,6 +96,42 @@ impl<R: Register> Lanes<f32> for Pack<R> {
     #[inline(always)]
     fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
         Self(R::from_quads(quad))
+    }
+
+    #[inline(always)]
+    fn quads(self, mut quad: impl FnMut(usize, [f32; 4])) {
+        let numbers = self.0.to_array();
+        for (n, numbers) in numbers.as_ref().as_chunks::<4>().0.iter().enumerate() {
+            quad(n, *numbers);
+        }
+    }
+
+    #[inline(always)]
+    fn from_slice(numbers: &[f32]) -> Self {
+        let mut array = R::splat(0.0).to_array();
+        array.as_mut().copy_from_slice(&numbers[..R::LANES]);
+        Self(R::from_array(array))
+    }
+
+    #[inline(always)]
+    fn write_to(self, numbers: &mut [f32]) {
+        numbers[..R::LANES].copy_from_slice(self.0.to_array().as_ref());
+    }
+
+    #[inline(always)]
+    fn transposed(vectors: [Self; 4]) -> [Self; 4] {
+        let [a, b, c, d] = R::transposed([vectors[0].0, vectors[1].0, vectors[2].0, vectors[3].0]);
+        [Self(a), Self(b), Self(c), Self(d)]
+    }
+
+    #[inline(always)]
+    fn interleaved(self) -> Self {
+        Self(self.0.interleaved())
+    }
+
+    #[inline(always)]
+    fn sequential(self) -> Self {
+        Self(self.0.sequential())
     }
 
     #[inline(always)]

@@ -105,6 +105,43 @@ impl LaneTask<f32> for Transposition {
             seen[lane] = true;
         });
         assert!(seen.iter().all(|seen| *seen));
+        let vectors = [0, 1, 2, 3].map(|n| {
+            let rows = |place| row(n * L::LANES / 4 + place);
+            L::from_quads(rows)
+        });
+        for (column, interleaved) in columns.iter().zip(L::transposed(vectors)) {
+            for lane in 0..L::LANES {
+                assert_eq!(column.interleaved().extract(lane), interleaved.extract(lane));
+                assert_eq!(column.extract(lane), interleaved.sequential().extract(lane));
+            }
+        }
+    }
+}
+
+/// Moves lanes to slices, quads and other lanes.
+struct Moves;
+
+impl LaneTask<f32> for Moves {
+    fn run<L: Lanes<f32>>(self) {
+        let numbers: Vec<f32> = (0..20).map(|n| n as f32).collect();
+        let lanes = L::from_slice(&numbers[1..]);
+        let mut written = [-1.0; 20];
+        lanes.write_to(&mut written[2..]);
+        let quarter = L::LANES / 4;
+        for lane in 0..L::LANES {
+            assert_eq!(lanes.extract(lane), numbers[1 + lane]);
+            assert_eq!(written[2 + lane], numbers[1 + lane]);
+            let from = lane % 4 * quarter + lane / 4;
+            assert_eq!(lanes.interleaved().extract(lane), numbers[1 + from]);
+            assert_eq!(lanes.interleaved().sequential().extract(lane), numbers[1 + lane]);
+        }
+        assert!(written[..2].iter().chain(&written[2 + L::LANES..]).all(|&number| number == -1.0));
+        let mut quads = 0;
+        lanes.quads(|n, quad| {
+            assert_eq!(quad[..], numbers[1 + 4 * n..5 + 4 * n]);
+            quads += 1;
+        });
+        assert_eq!(quads, quarter);
     }
 }
 
@@ -128,6 +165,13 @@ fn every_operation_of_every_level_has_the_bits_of_the_scalar_operation() {
 fn rows_and_columns_are_each_others_inverse() {
     for level in SimdLevel::available() {
         f32::in_lanes(level, Transposition);
+    }
+}
+
+#[test]
+fn lanes_move_to_slices_quads_and_other_lanes() {
+    for level in SimdLevel::available() {
+        f32::in_lanes(level, Moves);
     }
 }
 
