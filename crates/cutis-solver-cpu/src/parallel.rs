@@ -1,11 +1,17 @@
 //! Distribution of passes over threads.
 
+use std::ops::Range;
+
 use cutis_constraints::{Scalar, SimdLevel};
 use cutis_solver::{Colored, ColoredVertices, ConstraintColor, Execute, Vertex, VertexBlock, VertexColor};
 use rayon::prelude::*;
 
 /// Number of vertices that a thread processes at a time.
 const BLOCK: usize = 8192;
+
+/// Least number of chunks of a color for each thread. With fewer a thread does less work in a color
+/// than it takes to wake it.
+const CHUNKS_PER_THREAD: usize = 2;
 
 /// Executes passes on the threads of the current pool, or on the calling thread if `threads` is 1.
 pub(crate) struct Parallel {
@@ -19,13 +25,14 @@ impl<T: Scalar> Execute<T> for Parallel {
     }
 
     fn project(&self, color: ConstraintColor<'_, T>) {
-        let color = Colored::new(color, self.level);
-        fan_out(self.threads.min(color.chunks()), &|| while color.project_next_chunk() {});
+        let color = Colored::new(color, self.level, self.threads);
+        let threads = self.threads.min(color.chunks() / CHUNKS_PER_THREAD);
+        fan_out(0..threads, &|worker| while color.project_next_chunk(worker) {});
     }
 
     fn descend(&self, color: VertexColor<'_, T>) {
         let color = ColoredVertices::new(color, self.level);
-        fan_out(self.threads.min(color.chunks()), &|| while color.move_next_chunk() {});
+        fan_out(0..self.threads.min(color.chunks()), &|_| while color.move_next_chunk() {});
     }
 
     fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {
@@ -48,11 +55,11 @@ fn split<T: Scalar>(block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>
     rayon::join(|| split(first, pass), || split(second, pass));
 }
 
-/// Runs `work` on `threads` threads. `work` returns when no chunk is left.
-fn fan_out(threads: usize, work: &(dyn Fn() + Sync)) {
-    if threads <= 1 {
-        return work();
+/// Runs `work` for each worker, on as many threads. `work` returns when no chunk is left.
+fn fan_out(workers: Range<usize>, work: &(dyn Fn(usize) + Sync)) {
+    if workers.len() <= 1 {
+        return work(workers.start);
     }
-    let half = threads / 2;
-    rayon::join(|| fan_out(threads - half, work), || fan_out(half, work));
+    let middle = workers.end - workers.len() / 2;
+    rayon::join(|| fan_out(workers.start..middle, work), || fan_out(middle..workers.end, work));
 }

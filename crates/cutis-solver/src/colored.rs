@@ -3,8 +3,9 @@
 //! Soundness for constraints: (1) A batch checks when it is built that each index is below the
 //! number of vertices, and `Groups::verify` checks that no two constraints of one color share a
 //! vertex. The fields of a batch are private and never change. (2) [`Colored`] borrows the vertices
-//! mutably for its whole lifetime, so that no other code reads or moves them. (3) A chunk is a
-//! range of one color, and an atomic counter that only grows hands out each chunk once. So two
+//! mutably for its whole lifetime, so that no other code reads or moves them. (3) The chunks are
+//! ranges of one color that do not overlap, and atomic counters that only grow hand out each chunk
+//! once: a counter per share, where the shares are ranges of chunks that do not overlap. So two
 //! threads never access the same vertex or the same multiplier.
 //!
 //! Soundness for vertices: (1) A `Descent` and the system that it was built from are owned by one
@@ -33,6 +34,9 @@ use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex,
 /// that a tiny body has several.
 const CHUNK: usize = if cfg!(miri) { 8 } else { 1024 };
 
+/// Largest number of shares. More threads than that work on the same shares.
+const MOST_SHARES: usize = 16;
+
 /// Number of vertices of a chunk that are in no team. Results do not depend on it.
 const VERTEX_CHUNK: usize = if cfg!(miri) { 4 } else { 128 };
 
@@ -50,10 +54,11 @@ const VERTEX_CHUNK: usize = if cfg!(miri) { 4 } else { 128 };
 /// let (vertices, kinds) = system.projection_parts();
 /// let (set, step) = (&*kinds[0], Step::Pbd);
 /// let color = ConstraintColor { set, color: 0, vertices, step, multipliers: &mut [] };
-/// let color = Colored::new(color, cutis_constraints::SimdLevel::best());
+/// let color = Colored::new(color, cutis_constraints::SimdLevel::best(), 2);
+/// let color = &color;
 /// std::thread::scope(|scope| {
-///     for _ in 0..2 {
-///         scope.spawn(|| while color.project_next_chunk() {});
+///     for worker in 0..2 {
+///         scope.spawn(move || while color.project_next_chunk(worker) {});
 ///     }
 /// });
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -63,24 +68,31 @@ pub struct Colored<'a, T: Scalar> {
     level: SimdLevel,
     range: Range<usize>,
     step: Step<T>,
-    next: AtomicUsize,
+    /// Number of shares, and for each of them the number of chunks that were handed out.
+    shares: usize,
+    next: [Counter; MOST_SHARES],
     vertices: *mut Vertex<T>,
     multipliers: *mut T,
     keeps_multipliers: bool,
     borrow: PhantomData<&'a mut [T]>,
 }
 
+/// A counter with a cache line of its own, so that threads do not wait for each other's counters.
+#[derive(Default)]
+#[repr(align(128))]
+struct Counter(AtomicUsize);
+
 // SAFETY: threads that share a `Colored` can only take distinct chunks, which access distinct
 // vertices and multipliers (see the top of the file). `T` is plain data that any thread may use.
 unsafe impl<T: Scalar> Sync for Colored<'_, T> {}
 
 impl<'a, T: Scalar> Colored<'a, T> {
-    /// Prepares a color for several threads, with the SIMD lanes of `level`.
+    /// Prepares a color for `workers` threads, with the SIMD lanes of `level`.
     ///
     /// # Panics
     /// Panics if the set was built for more vertices than given, or if there are multipliers but
     /// not one per constraint of the set.
-    pub fn new(color: ConstraintColor<'a, T>, level: SimdLevel) -> Self {
+    pub fn new(color: ConstraintColor<'a, T>, level: SimdLevel, workers: usize) -> Self {
         let ConstraintColor { set, color, vertices, step, multipliers } = color;
         assert!(set.vertex_count() <= vertices.len(), "the set refers to vertices that do not exist");
         let keeps_multipliers = !multipliers.is_empty();
@@ -93,7 +105,8 @@ impl<'a, T: Scalar> Colored<'a, T> {
             level,
             range: set.range(color),
             step,
-            next: AtomicUsize::new(0),
+            shares: workers.clamp(1, MOST_SHARES),
+            next: Default::default(),
             vertices: vertices.as_mut_ptr(),
             multipliers: multipliers.as_mut_ptr(),
             keeps_multipliers,
@@ -101,9 +114,14 @@ impl<'a, T: Scalar> Colored<'a, T> {
         }
     }
 
-    /// Takes the next free chunk and projects it. Returns `false` if no chunk is left.
-    pub fn project_next_chunk(&self) -> bool {
-        let Some(range) = next_chunk(&self.next, &self.range, CHUNK) else { return false };
+    /// Takes a free chunk and projects it. Returns `false` if no chunk is left.
+    ///
+    /// Each worker first takes the chunks of its own share, which is the same part of every color.
+    /// The vertices there stay in the cache of its processor.
+    pub fn project_next_chunk(&self, worker: usize) -> bool {
+        let shares = (0..self.shares).map(|n| (worker + n) % self.shares);
+        let next = |share: usize| next_chunk(&self.next[share].0, &self.share(share), CHUNK);
+        let Some(range) = shares.into_iter().find_map(next) else { return false };
         let multipliers: &mut [T] = if self.keeps_multipliers {
             // SAFETY: the range lies within the set, and there is one multiplier per constraint of
             // the set. The counter hands the range out once, so that no other slice overlaps it.
@@ -115,6 +133,15 @@ impl<'a, T: Scalar> Colored<'a, T> {
         let chunk = ConstraintChunk { range, vertices, step: self.step, multipliers };
         self.set.project_shared(self.level, chunk);
         true
+    }
+
+    /// The constraints of a share: some of the chunks.
+    fn share(&self, share: usize) -> Range<usize> {
+        let start = |share: usize| {
+            let first = self.chunks() * share / self.shares;
+            self.range.end.min(self.range.start + first * CHUNK)
+        };
+        start(share)..start(share + 1)
     }
 
     /// Returns the number of chunks, which is an upper bound of the threads that can help.

@@ -29,12 +29,12 @@ fn system(each: bool) -> System<f64> {
 }
 
 /// Runs `work` on `threads` threads at the same time.
-fn on_threads(threads: usize, work: &(dyn Fn() + Sync)) {
+fn on_threads(threads: usize, work: &(dyn Fn(usize) + Sync)) {
     std::thread::scope(|scope| {
-        for _ in 1..threads {
-            scope.spawn(work);
+        for worker in 1..threads {
+            scope.spawn(move || work(worker));
         }
-        work();
+        work(0);
     });
 }
 
@@ -62,9 +62,9 @@ fn shared_constraints_have_the_bits_of_serial_ones() {
         let serial = swept(each, keeps_multipliers, |color| color.project());
         for threads in [1, 2] {
             let shared = swept(each, keeps_multipliers, |color| {
-                let color = Colored::new(color, SimdLevel::best());
-                on_threads(threads, &|| while color.project_next_chunk() {});
-                assert!(!color.project_next_chunk(), "no chunk is left");
+                let color = Colored::new(color, SimdLevel::best(), threads);
+                on_threads(threads, &|worker| while color.project_next_chunk(worker) {});
+                assert!(!color.project_next_chunk(0), "no chunk is left");
             });
             assert_eq!(shared, serial, "{threads} threads");
         }
@@ -91,7 +91,7 @@ fn shared_vertices_have_the_bits_of_serial_ones() {
         for threads in [1, 2] {
             let shared = descended(each, |color| {
                 let color = ColoredVertices::new(color, SimdLevel::best());
-                on_threads(threads, &|| while color.move_next_chunk() {});
+                on_threads(threads, &|_| while color.move_next_chunk() {});
             });
             assert_eq!(shared, serial, "{threads} threads");
         }
@@ -121,9 +121,9 @@ fn threads_take_each_chunk_once() {
     };
     let serial = run(&|color| color.project());
     let shared = run(&|color| {
-        let color = Colored::new(color, SimdLevel::best());
+        let color = Colored::new(color, SimdLevel::best(), 2);
         assert_eq!(color.chunks(), 3);
-        on_threads(2, &|| while color.project_next_chunk() {});
+        on_threads(2, &|worker| while color.project_next_chunk(worker) {});
     });
     assert!(shared == serial);
     assert!(serial.1.iter().all(|&multiplier| multiplier != 0.0));
@@ -138,6 +138,7 @@ fn a_set_for_more_vertices_is_rejected() {
     Colored::new(
         ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers: &mut [] },
         SimdLevel::best(),
+        1,
     );
 }
 
@@ -150,5 +151,6 @@ fn too_few_multipliers_are_rejected() {
     Colored::new(
         ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers },
         SimdLevel::best(),
+        1,
     );
 }
