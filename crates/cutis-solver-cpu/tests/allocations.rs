@@ -99,14 +99,13 @@ fn steps_allocate_nothing_and_memory_is_only_for_parts_in_use() {
     let descending = SolverReference::new(body(true), descent).unwrap();
     assert_eq!(descending.bytes().last().map(|part| part.name), Some("incidences"));
 
-    // A vertex has 4 + 3 + 3 numbers. A spring has two indices and a length, plus the color
-    // offsets.
+    // A vertex has 4 + 3 + 3 numbers. A spring has two indices and a length, plus the color offsets
+    // and a few runs of each color.
     let lattice = Kuhn::new([30, 20, 20], 0.1);
     let solver = SolverReference::new(body(false), settings(1)).unwrap();
     let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();
     assert_eq!(bytes[0], lattice.positions.len() * 40);
-    assert_eq!(
-        bytes[1],
-        lattice.edges.len() * 12 + solver.simulation().system().kinds()[0].offsets().len() * 4
-    );
+    let offsets = solver.simulation().system().kinds()[0].offsets().len();
+    let runs = bytes[1] - (lattice.edges.len() * 12 + offsets * 4);
+    assert!(runs <= offsets * 72, "{runs} bytes for {offsets} colors");
 }

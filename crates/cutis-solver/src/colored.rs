@@ -6,7 +6,9 @@
 //! mutably for its whole lifetime, so that no other code reads or moves them. (3) The chunks are
 //! ranges of one color that do not overlap, and atomic counters that only grow hand out each chunk
 //! once: a counter per share, where the shares are ranges of chunks that do not overlap. So two
-//! threads never access the same vertex or the same multiplier.
+//! threads never access the same vertex or the same multiplier. (4) A batch finds the strides of
+//! its runs by comparison of the checked indices, and reads a row of vertices only where each of
+//! them is a vertex of a constraint of the chunk.
 //!
 //! Soundness for vertices: (1) A `Descent` and the system that it was built from are owned by one
 //! `Simulation`. Its incidences are those of the system's kinds. `Groups::verify_vertices` checks
@@ -25,7 +27,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
-use crate::batch::{ConstraintChunk, Load, Store, TeamForces, VertexChunk};
+use crate::batch::{Blocks, ConstraintChunk, Load, Store, TeamForces, VertexChunk};
 use crate::loads::load_of;
 use crate::teams::{MOST_NEIGHBORS, Neighborhood, TEAM, TEAM_CHUNK};
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
@@ -119,9 +121,9 @@ impl<'a, T: Scalar> Colored<'a, T> {
     /// Each worker first takes the chunks of its own share, which is the same part of every color.
     /// The vertices there stay in the cache of its processor.
     pub fn project_next_chunk(&self, worker: usize) -> bool {
-        let shares = (0..self.shares).map(|n| (worker + n) % self.shares);
+        let mut shares = (0..self.shares).map(|n| (worker % self.shares + n) % self.shares);
         let next = |share: usize| next_chunk(&self.next[share].0, &self.share(share), CHUNK);
-        let Some(range) = shares.into_iter().find_map(next) else { return false };
+        let Some(range) = shares.find_map(next) else { return false };
         let multipliers: &mut [T] = if self.keeps_multipliers {
             // SAFETY: the range lies within the set, and there is one multiplier per constraint of
             // the set. The counter hands the range out once, so that no other slice overlaps it.
@@ -353,6 +355,27 @@ impl<T: Copy> Store<T> for SharedVertices<'_, T> {
     fn store(&mut self, index: u32, vertex: Vertex<T>) {
         // SAFETY: the conditions of `load` hold. No other thread reads this vertex meanwhile.
         unsafe { *self.vertices.add(index as usize) = vertex }
+    }
+}
+
+impl<T: Scalar> Blocks<T> for SharedVertices<'_, T> {
+    #[inline(always)]
+    fn block(&self, first: u32, offset: usize, count: usize) -> &[T] {
+        // SAFETY: a batch passes only vertices of constraints that it projects, to which the
+        // conditions of `load` apply. A vertex is four numbers.
+        unsafe {
+            let numbers = self.vertices.add(first as usize + offset).cast::<T>();
+            std::slice::from_raw_parts(numbers, 4 * count)
+        }
+    }
+
+    #[inline(always)]
+    fn block_mut(&mut self, first: u32, offset: usize, count: usize) -> &mut [T] {
+        // SAFETY: the conditions of `block` hold. No other thread reads these vertices meanwhile.
+        unsafe {
+            let numbers = self.vertices.add(first as usize + offset).cast::<T>();
+            std::slice::from_raw_parts_mut(numbers, 4 * count)
+        }
     }
 }
 

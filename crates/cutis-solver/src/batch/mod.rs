@@ -3,6 +3,7 @@
 
 mod access;
 mod project;
+mod runs;
 mod set;
 mod vertex_force;
 
@@ -17,7 +18,9 @@ use crate::colored::SharedVertices;
 use crate::teams::TeamConstraints;
 use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
 
-pub use access::{Load, Store};
+use runs::Runs;
+
+pub use access::{Blocks, Load, Store};
 pub use vertex_force::TeamForces;
 
 /// Upper bound of the number of SIMD lanes over all levels and number types.
@@ -71,6 +74,7 @@ pub trait Project<T: Scalar> {
 pub(crate) struct Batch<C, const N: usize, T, P> {
     vertex_count: usize,
     offsets: Vec<u32>,
+    runs: Runs,
     indices: Vec<[u32; N]>,
     params: Vec<P>,
     stiffness: Stiffness<T>,
@@ -78,7 +82,7 @@ pub(crate) struct Batch<C, const N: usize, T, P> {
 }
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
-    /// Checks everything that the inner loops rely on, then sorts the constraints by color.
+    /// Checks everything that the inner loops rely on, then sorts the constraints by color and run.
     pub(crate) fn new(
         vertex_count: usize,
         indices: &[[u32; N]],
@@ -107,13 +111,19 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         groups
             .verify(indices, vertex_count)
             .map_err(|error| SolverError::Groups { kind, reason: error.to_string() })?;
-        let order = &groups.order;
+        let mut order = groups.order.clone();
+        let (mut runs, mut scratch) = (Runs::default(), runs::Scratch::default());
+        for part in groups.offsets.windows(2).map(|part| part[0] as usize..part[1] as usize) {
+            let start = part.start;
+            runs::arrange(&mut order[part], start, indices, &mut runs, &mut scratch);
+        }
         Ok(Self {
             vertex_count,
             offsets: groups.offsets.clone(),
+            runs,
             indices: order.iter().map(|&k| indices[k as usize]).collect(),
             params: order.iter().map(|&k| params[k as usize]).collect(),
-            stiffness: stiffness.validated(kind, count, order)?,
+            stiffness: stiffness.validated(kind, count, &order)?,
             kind: PhantomData,
         })
     }

@@ -1,12 +1,22 @@
 //! The loops over a range of constraints: scalar for the reference, with SIMD lanes for threads.
 
+use std::ops::Range;
+
 use cutis_constraints::{Constraint, LaneTask, Lanes, Params, Scalar, SimdLevel};
 use nalgebra::Point3;
 
-use super::{Batch, ConstraintChunk, MAX_LANES, Project, Store, TeamForces, VertexChunk};
+use super::runs::BLOCK;
+use super::{Batch, Blocks, ConstraintChunk, MAX_LANES, Project, Store, TeamForces, VertexChunk};
 use crate::colored::SharedVertices;
 use crate::teams::TeamConstraints;
 use crate::{Step, Values, Vertex, project};
+
+/// Each vertex has its own index.
+const INDEXED: u8 = 0;
+/// The vertices of a block are one behind the other.
+const CONTIGUOUS: u8 = 1;
+/// The vertices of a block have a stride.
+const STRIDED: u8 = 2;
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     /// Projects one constraint after the other.
@@ -33,59 +43,173 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     /// has the same bits as that of the scalar loop, because the constraints share no vertex and
     /// each lane executes the scalar operations.
     #[inline(always)]
-    fn project_in_lanes<L: Lanes<T>, S: Store<T>>(&self, chunk: ConstraintChunk<'_, T, S>) {
-        let ConstraintChunk { range, vertices: mut store, step, multipliers } = chunk;
-        let lanes = L::LANES;
-        let stiffness = self.stiffness.values();
+    fn project_in_lanes<L: Lanes<T>, S: Blocks<T>>(&self, chunk: ConstraintChunk<'_, T, S>) {
+        let ConstraintChunk { range, mut vertices, step, multipliers } = chunk;
         let rule = match step {
             Step::Pbd => Step::Pbd,
             Step::Xpbd { inverse_h_squared } => Step::Xpbd { inverse_h_squared: L::splat(inverse_h_squared) },
         };
-        let groups = range.len() / lanes;
-        let (mut rest, keeps) = (range.clone(), !multipliers.is_empty());
-        for group in 0..groups {
-            let first = range.start + group * lanes;
-            let tuples = &self.indices[first..first + lanes];
-            let params = &self.params[first..first + lanes];
-            let mut x = [Point3::origin(); N];
-            let mut w = [L::splat(T::zero()); N];
-            for i in 0..N {
-                let [a, b, c, d] = L::columns(|lane| store.load(tuples[lane][i]).components());
-                (x[i], w[i]) = (Point3::new(a, b, c), d);
+        let (start, keeps) = (range.start, !multipliers.is_empty());
+        let mut first = start;
+        while first < range.end {
+            let (stride, part) = self.runs.part(first..range.end);
+            let whole = first..part.end - part.len() % L::LANES;
+            let own = if keeps { &mut multipliers[first - start..] } else { &mut [][..] };
+            match stride {
+                0 => self.project_run::<L, S, INDEXED>(whole.clone(), stride, &mut vertices, rule, own),
+                1 => self.project_run::<L, S, CONTIGUOUS>(whole.clone(), stride, &mut vertices, rule, own),
+                _ => self.project_run::<L, S, STRIDED>(whole.clone(), stride, &mut vertices, rule, own),
             }
-            let params = Params::from_fn(|j| L::from_lanes(|lane| params[lane].as_ref()[j]));
-            let stiffness = match stiffness {
-                Values::Uniform(value) => L::splat(*value),
-                Values::Each(values) => {
-                    let values = &values[first..first + lanes];
-                    L::from_lanes(|lane| values[lane])
-                }
-            };
-            let offset = group * lanes;
-            let multiplier = if keeps {
-                let multipliers = &multipliers[offset..offset + lanes];
-                L::from_lanes(|lane| multipliers[lane])
-            } else {
-                L::splat(T::zero())
-            };
-            let projection = project::<C, N, L, _>(&x, &w, &params, rule, stiffness, multiplier);
-            if keeps {
-                let sum: L = multiplier + projection.multiplier;
-                for lane in 0..lanes {
-                    multipliers[offset + lane] = sum.extract(lane);
-                }
-            }
-            for i in 0..N {
-                let moved = x[i] + projection.corrections[i];
-                L::rows([moved.x, moved.y, moved.z, w[i]], |lane, components| {
-                    store.store(tuples[lane][i], Vertex::from_components(components));
-                });
-            }
-            rest.start = first + lanes;
+            first = whole.end;
+            let multipliers =
+                if keeps { &mut multipliers[first - start..part.end - start] } else { &mut [][..] };
+            let rest = first..part.end;
+            let rest = ConstraintChunk { range: rest, vertices: &mut vertices, step, multipliers };
+            self.project_scalar(rest);
+            first = part.end;
         }
-        let multipliers = if keeps { &mut multipliers[groups * lanes..] } else { multipliers };
-        let rest = ConstraintChunk { range: rest, vertices: &mut store, step, multipliers };
-        self.project_scalar(rest);
+    }
+
+    /// Projects constraints of one stride, whose number is a multiple of the lanes. The first
+    /// multipliers are theirs, if there are any.
+    #[inline(always)]
+    fn project_run<L: Lanes<T>, S: Blocks<T>, const ACCESS: u8>(
+        &self,
+        range: Range<usize>,
+        stride: usize,
+        vertices: &mut S,
+        rule: Step<L>,
+        multipliers: &mut [T],
+    ) {
+        let tuples = self.indices[range.clone()].chunks_exact(L::LANES);
+        let params = self.params[range.clone()].chunks_exact(L::LANES);
+        let (same, each) = match self.stiffness.values() {
+            Values::Uniform(value) => (L::splat(*value), &[][..]),
+            Values::Each(values) => (L::splat(T::zero()), &values[range]),
+        };
+        for (n, (tuples, params)) in tuples.zip(params).enumerate() {
+            let first = n * L::LANES;
+            let stiffness = if each.is_empty() { same } else { L::from_slice(&each[first..]).interleaved() };
+            let multipliers = if multipliers.is_empty() { &mut [] } else { &mut multipliers[first..] };
+            let group = Group { tuples, params, stiffness, stride };
+            group.project::<C, T, S, ACCESS>(vertices, rule, multipliers);
+        }
+    }
+}
+
+/// As many constraints of one stride as there are lanes.
+struct Group<'a, P, L, const N: usize> {
+    tuples: &'a [[u32; N]],
+    params: &'a [P],
+    stiffness: L,
+    stride: usize,
+}
+
+/// Repeats a statement for each corner `$i` below `$n`, with a constant `$i` for the first four.
+/// The numbers of a corner then stay in registers.
+macro_rules! for_each_corner {
+    ($i:ident, $n:expr, $body:block) => {
+        for_each_corner!(once 0, $i, $n, $body);
+        for_each_corner!(once 1, $i, $n, $body);
+        for_each_corner!(once 2, $i, $n, $body);
+        for_each_corner!(once 3, $i, $n, $body);
+        for $i in 4..$n $body
+    };
+    (once $number:literal, $i:ident, $n:expr, $body:block) => {
+        if $number < $n {
+            let $i = $number;
+            $body
+        }
+    };
+}
+
+impl<P, L, const N: usize> Group<'_, P, L, N> {
+    /// Projects the constraints. The first multipliers are theirs, if there are any.
+    ///
+    /// The lanes are [interleaved](Lanes::interleaved), so that vertices are read and written in
+    /// rows.
+    #[inline(always)]
+    fn project<C, T, S, const ACCESS: u8>(&self, vertices: &mut S, rule: Step<L>, multipliers: &mut [T])
+    where
+        C: Constraint<N, Params<T> = P>,
+        P: Params<T>,
+        T: Scalar,
+        L: Lanes<T>,
+        S: Blocks<T>,
+    {
+        let Self { tuples, params, stiffness, stride } = self;
+        let mut x = [Point3::origin(); N];
+        let mut w = [L::splat(T::zero()); N];
+        for_each_corner!(i, N, {
+            let [a, b, c, d] = L::transposed(rows::<L, T, S, N, ACCESS>(vertices, tuples, i, *stride));
+            (x[i], w[i]) = (Point3::new(a, b, c), d);
+        });
+        let params = if P::LEN == 1 {
+            Params::from_fn(|_| L::from_slice(P::flat(params)).interleaved())
+        } else {
+            Params::from_fn(|j| L::from_lanes(|lane| params[lane].as_ref()[j]).interleaved())
+        };
+        let keeps = !multipliers.is_empty();
+        let multiplier = if keeps { L::from_slice(multipliers).interleaved() } else { L::splat(T::zero()) };
+        let projection = project::<C, N, L, _>(&x, &w, &params, rule, *stiffness, multiplier);
+        if keeps {
+            let sum: L = multiplier + projection.multiplier;
+            sum.sequential().write_to(multipliers);
+        }
+        for_each_corner!(i, N, {
+            let moved = x[i] + projection.corrections[i];
+            let moved = L::transposed([moved.x, moved.y, moved.z, w[i]]);
+            write_rows::<L, T, S, N, ACCESS>(vertices, tuples, i, *stride, moved);
+        });
+    }
+}
+
+/// Reads vertex `i` of each constraint. Each of the four results has those of a quarter of the
+/// constraints, a vertex after the other.
+#[inline(always)]
+fn rows<L: Lanes<T>, T: Scalar, S: Blocks<T>, const N: usize, const ACCESS: u8>(
+    vertices: &S,
+    tuples: &[[u32; N]],
+    i: usize,
+    stride: usize,
+) -> [L; 4] {
+    let quarter = L::LANES / 4;
+    let mut rows = [L::splat(T::zero()); 4];
+    for (n, row) in rows.iter_mut().enumerate() {
+        let (k, place) = (n * quarter, n * quarter % BLOCK);
+        let first = tuples[k - place][i];
+        *row = match ACCESS {
+            INDEXED => L::from_quads(|p| vertices.load(tuples[k + p][i]).components()),
+            CONTIGUOUS => L::from_slice(vertices.block(first, place, quarter)),
+            _ => L::from_quads(|p| {
+                let numbers = vertices.block(first, (place + p) * stride, 1);
+                [numbers[0], numbers[1], numbers[2], numbers[3]]
+            }),
+        };
+    }
+    rows
+}
+
+/// The inverse of [`rows`].
+#[inline(always)]
+fn write_rows<L: Lanes<T>, T: Scalar, S: Blocks<T>, const N: usize, const ACCESS: u8>(
+    vertices: &mut S,
+    tuples: &[[u32; N]],
+    i: usize,
+    stride: usize,
+    rows: [L; 4],
+) {
+    let quarter = L::LANES / 4;
+    for (n, row) in rows.into_iter().enumerate() {
+        let (k, place) = (n * quarter, n * quarter % BLOCK);
+        let first = tuples[k - place][i];
+        match ACCESS {
+            INDEXED => row.quads(|p, quad| vertices.store(tuples[k + p][i], Vertex::from_components(quad))),
+            CONTIGUOUS => row.write_to(vertices.block_mut(first, place, quarter)),
+            _ => row.quads(|p, quad| {
+                vertices.block_mut(first, (place + p) * stride, 1).copy_from_slice(&quad);
+            }),
+        }
     }
 }
 

@@ -89,6 +89,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
         Arc::new(Batch::<C, N, f64, C::Params<f64>> {
             vertex_count: self.vertex_count,
             offsets: self.offsets.clone(),
+            runs: self.runs.clone(),
             indices: self.indices.clone(),
             params: self.params.iter().map(to_f64).collect(),
             stiffness: self.stiffness.to_f64(),
@@ -102,6 +103,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
             Values::Each(values) => size_of_val(values.as_slice()),
         };
         size_of_val(self.offsets.as_slice())
+            + self.runs.bytes()
             + size_of_val(self.indices.as_slice())
             + size_of_val(self.params.as_slice())
             + stiffness

@@ -2,7 +2,7 @@
 //! Miri runs them in seconds: `cargo +nightly miri test -p cutis-solver --lib colored::`.
 
 use cutis_coloring::{Groups, greedy};
-use cutis_constraints::{Distance, Volume};
+use cutis_constraints::{Constraint, Distance, Volume};
 use nalgebra::Point3;
 
 use super::*;
@@ -127,6 +127,99 @@ fn threads_take_each_chunk_once() {
     });
     assert!(shared == serial);
     assert!(serial.1.iter().all(|&multiplier| multiplier != 0.0));
+}
+
+/// A kind whose constraints advance by a stride, with its multipliers.
+type Swept<T> = (Vec<Vertex<T>>, Vec<T>);
+
+/// Springs between two rows of vertices, or tetrahedra between four rows, at the places `places` of
+/// a row. Parameters and compliances are the same for all constraints or differ.
+fn in_rows<T: Scalar, C: Constraint<N>, const N: usize>(
+    places: &[u32],
+    varied: bool,
+    scale: f64,
+    run: impl Fn(ConstraintColor<'_, T>),
+) -> Swept<T>
+where
+    C::Params<T>: From<[T; 1]>,
+{
+    let row = places.iter().max().unwrap() + 1;
+    let tuples: Vec<[u32; N]> =
+        places.iter().map(|place| std::array::from_fn(|corner| row * corner as u32 + place)).collect();
+    // Corners of a deformed cube, so that each constraint is violated.
+    let corner = |n: u32| [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.0, 1.2, 0.1], [0.2, 0.0, 0.9]][n as usize];
+    let positions: Vec<Point3<f64>> = (0..N as u32 * row)
+        .map(|n| Point3::from(corner(n / row)) * (1.0 + 0.01 * f64::from(n % 17)))
+        .collect();
+    let masses: Vec<f64> = (0..positions.len()).map(|n| (n % 5) as f64).collect();
+    let value = |k: usize| T::constant(if varied { scale * (1.0 + 0.1 * (k % 7) as f64) } else { scale });
+    let params: Vec<C::Params<T>> = (0..tuples.len()).map(|k| [value(k)].into()).collect();
+    let stiffness = match varied {
+        true => Stiffness::Compliance(crate::Values::Each((0..tuples.len()).map(value).collect())),
+        false => Stiffness::compliance(T::constant(scale)),
+    };
+    let groups = Groups::from_colors(&vec![0; tuples.len()]).unwrap();
+    let mut system = SystemBuilder::<T>::in_place(&positions, &masses)
+        .unwrap()
+        .add::<C, N>(&tuples, &params, stiffness, &groups)
+        .unwrap()
+        .build();
+    let mut multipliers: Vec<T> = (0..tuples.len()).map(|k| T::constant(0.01 * k as f64)).collect();
+    let (vertices, kinds) = system.projection_parts();
+    let step = Step::Xpbd { inverse_h_squared: T::constant(100.0) };
+    let set = &*kinds[0];
+    run(ConstraintColor { set, color: 0, vertices, step, multipliers: &mut multipliers });
+    (system.vertices, multipliers)
+}
+
+/// Compares every level with the serial code, for constraints at some places of their rows.
+fn check_rows<T: Scalar, C: Constraint<N>, const N: usize>(places: &[u32])
+where
+    C::Params<T>: From<[T; 1]>,
+{
+    for varied in [false, true] {
+        let serial = in_rows::<T, C, N>(places, varied, 0.5, |color| color.project());
+        assert!(serial.1.iter().any(|&multiplier| multiplier != T::zero()));
+        for level in SimdLevel::available() {
+            let shared = |scale| {
+                in_rows::<T, C, N>(places, varied, scale, |color| {
+                    let color = Colored::new(color, level, 2);
+                    on_threads(2, &|worker| while color.project_next_chunk(worker) {});
+                })
+            };
+            assert!(shared(0.5) == serial, "{level:?}, varied: {varied}");
+            assert!(shared(0.50001) != serial, "the comparison can fail");
+        }
+    }
+}
+
+#[test]
+fn runs_of_every_stride_have_the_bits_of_serial_constraints() {
+    let count = if cfg!(miri) { 21 } else { 1100 };
+    for stride in [1, 2, 4, 5, 9] {
+        let row: Vec<u32> = (0..count).map(|k| k * stride).collect();
+        check_rows::<f32, Distance, 2>(&row);
+        check_rows::<f64, Volume, 4>(&row);
+        if !cfg!(miri) {
+            check_rows::<f32, Volume, 4>(&row);
+        }
+    }
+}
+
+#[test]
+fn broken_runs_have_the_bits_of_serial_constraints() {
+    let count = if cfg!(miri) { 45 } else { 1100 };
+    // Rows of eleven places with a gap, and strides that change along a row.
+    let gaps: Vec<u32> = (0..count).map(|k| 20 * (k / 11) + k % 11).collect();
+    let mixed: Vec<u32> = (0..count).map(|k| if k < count / 2 { k } else { 2 * k }).collect();
+    let backwards: Vec<u32> = (0..count).rev().collect();
+    for places in [gaps, mixed, backwards] {
+        check_rows::<f32, Distance, 2>(&places);
+        if !cfg!(miri) {
+            check_rows::<f32, Volume, 4>(&places);
+            check_rows::<f64, Volume, 4>(&places);
+        }
+    }
 }
 
 #[test]
