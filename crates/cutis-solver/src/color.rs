@@ -1,18 +1,22 @@
 //! The work on one color: constraints to project or vertices to move, with serial versions in safe
 //! code.
 
+use std::ops::Range;
+
 use cutis_constraints::Scalar;
 
 use crate::batch::{ConstraintChunk, VertexChunk};
 use crate::loads::load_of;
 use crate::{ColorPass, ConstraintSet, Descent, Step, System, Vertex, VertexForce};
 
-/// One color of one kind of constraint, with everything that its projection needs.
+/// One color of one kind of constraint, or the part of it in one tile, with everything that its projection needs.
 pub struct ConstraintColor<'a, T: Scalar> {
     /// All constraints of the kind.
     pub set: &'a dyn ConstraintSet<T>,
     /// The color to project.
     pub color: usize,
+    /// The tile to project, or `None` for the whole color.
+    pub tile: Option<usize>,
     /// All vertices of the system.
     pub vertices: &'a mut [Vertex<T>],
     /// Parameters of the substep.
@@ -22,10 +26,18 @@ pub struct ConstraintColor<'a, T: Scalar> {
 }
 
 impl<T: Scalar> ConstraintColor<'_, T> {
+    /// Returns the constraints to project as a range of indices.
+    pub fn range(&self) -> Range<usize> {
+        match self.tile {
+            Some(tile) => self.set.part(self.color, tile),
+            None => self.set.range(self.color),
+        }
+    }
+
     /// Projects the constraints one after the other, in ascending order.
     pub fn project(self) {
-        let Self { set, color, vertices, step, multipliers } = self;
-        let range = set.range(color);
+        let range = self.range();
+        let Self { set, vertices, step, multipliers, .. } = self;
         let multipliers = multipliers.get_mut(range.clone()).unwrap_or_default();
         set.project(ConstraintChunk { range, vertices, step, multipliers });
     }

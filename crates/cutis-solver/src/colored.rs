@@ -55,7 +55,7 @@ const VERTEX_CHUNK: usize = if cfg!(miri) { 4 } else { 128 };
 /// #     .add::<Distance, 2>(&spring, &[[1.0]], Stiffness::pbd(1.0), &groups)?.build();
 /// let (vertices, kinds) = system.projection_parts();
 /// let (set, step) = (&*kinds[0], Step::Pbd);
-/// let color = ConstraintColor { set, color: 0, vertices, step, multipliers: &mut [] };
+/// let color = ConstraintColor { set, color: 0, tile: None, vertices, step, multipliers: &mut [] };
 /// let color = Colored::new(color, cutis_constraints::SimdLevel::best(), 2);
 /// let color = &color;
 /// std::thread::scope(|scope| {
@@ -95,7 +95,8 @@ impl<'a, T: Scalar> Colored<'a, T> {
     /// Panics if the set was built for more vertices than given, or if there are multipliers but
     /// not one per constraint of the set.
     pub fn new(color: ConstraintColor<'a, T>, level: SimdLevel, workers: usize) -> Self {
-        let ConstraintColor { set, color, vertices, step, multipliers } = color;
+        let range = color.range();
+        let ConstraintColor { set, vertices, step, multipliers, .. } = color;
         assert!(set.vertex_count() <= vertices.len(), "the set refers to vertices that do not exist");
         let keeps_multipliers = !multipliers.is_empty();
         assert!(
@@ -105,7 +106,7 @@ impl<'a, T: Scalar> Colored<'a, T> {
         Self {
             set,
             level,
-            range: set.range(color),
+            range,
             step,
             shares: workers.clamp(1, MOST_SHARES),
             next: Default::default(),

@@ -40,7 +40,8 @@ pub struct Schedule {
     /// Number of iterations of a substep.
     pub iterations: u32,
     /// The projections of one iteration, in order, without empty colors. Empty in vertex block
-    /// descent.
+    /// descent. A backend may divide the colors of a kind into
+    /// [tiles](crate::ConstraintSet::tiles), which changes no bit.
     pub sweeps: Vec<Sweep>,
     /// All colors of the moving vertices, in order, without empty colors. Empty except in vertex
     /// block descent. See [`color_passes_of`](Self::color_passes_of).

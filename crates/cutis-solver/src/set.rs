@@ -32,6 +32,13 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     fn arity(&self) -> usize;
     /// Returns the start of each color and the end of the last one: `colors + 1` numbers.
     fn offsets(&self) -> &[u32];
+    /// Returns the number of tiles. A backend may project all colors of the first tile, then those
+    /// of the second one, and so on, with the bits of a sweep over whole colors. The vertices of a
+    /// tile stay in the cache of a processor.
+    fn tiles(&self) -> usize;
+    /// Returns the constraints of `color` in `tile` as a range of indices. The range is empty for a
+    /// color or a tile that does not exist.
+    fn part(&self, color: usize, tile: usize) -> Range<usize>;
     /// Returns the vertices of all constraints, `arity` of them in a row.
     fn indices(&self) -> &[u32];
     /// Returns the number of parameters of one constraint.

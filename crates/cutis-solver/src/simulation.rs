@@ -293,15 +293,23 @@ impl<T: Scalar> Simulation<T> {
         for iteration in 0..self.schedule.iterations {
             match &self.method {
                 Method::Project(step) => {
-                    for &sweep in &self.schedule.sweeps {
-                        let (vertices, kinds) = self.system.projection_parts();
-                        execute.project(ConstraintColor {
-                            set: &*kinds[sweep.kind],
-                            color: sweep.color,
-                            vertices,
-                            step: *step,
-                            multipliers: &mut self.multipliers[sweep.kind],
-                        });
+                    let (vertices, kinds) = self.system.projection_parts();
+                    for (kind, multipliers) in kinds.iter().zip(&mut self.multipliers) {
+                        let set = &**kind;
+                        let parts = (0..set.tiles())
+                            .flat_map(|tile| (0..set.colors()).map(move |color| (tile, color)));
+                        for (tile, color) in parts.filter(|&(tile, color)| !set.part(color, tile).is_empty())
+                        {
+                            let (tile, step) = (Some(tile), *step);
+                            execute.project(ConstraintColor {
+                                set,
+                                color,
+                                tile,
+                                vertices,
+                                step,
+                                multipliers,
+                            });
+                        }
                     }
                 }
                 Method::Descend(descent) => {

@@ -5,6 +5,7 @@ mod access;
 mod project;
 mod runs;
 mod set;
+mod tiles;
 mod vertex_force;
 
 use std::marker::PhantomData;
@@ -19,6 +20,7 @@ use crate::teams::TeamConstraints;
 use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
 
 use runs::Runs;
+use tiles::Tiles;
 
 pub use access::{Blocks, Load, Store};
 pub use vertex_force::TeamForces;
@@ -74,6 +76,7 @@ pub trait Project<T: Scalar> {
 pub(crate) struct Batch<C, const N: usize, T, P> {
     vertex_count: usize,
     offsets: Vec<u32>,
+    tiles: Tiles,
     runs: Runs,
     indices: Vec<[u32; N]>,
     params: Vec<P>,
@@ -82,7 +85,8 @@ pub(crate) struct Batch<C, const N: usize, T, P> {
 }
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
-    /// Checks everything that the inner loops rely on, then sorts the constraints by color and run.
+    /// Checks everything that the inner loops rely on, then sorts the constraints by color, tile and
+    /// run.
     pub(crate) fn new(
         vertex_count: usize,
         indices: &[[u32; N]],
@@ -111,15 +115,17 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         groups
             .verify(indices, vertex_count)
             .map_err(|error| SolverError::Groups { kind, reason: error.to_string() })?;
-        let mut order = groups.order.clone();
+        let (tiles, mut order) = tiles::divide(indices, groups, vertex_count);
         let (mut runs, mut scratch) = (Runs::default(), runs::Scratch::default());
-        for part in groups.offsets.windows(2).map(|part| part[0] as usize..part[1] as usize) {
+        let offsets = if tiles.count == 1 { &groups.offsets } else { &tiles.offsets };
+        for part in offsets.windows(2).map(|part| part[0] as usize..part[1] as usize) {
             let start = part.start;
             runs::arrange(&mut order[part], start, indices, &mut runs, &mut scratch);
         }
         Ok(Self {
             vertex_count,
             offsets: groups.offsets.clone(),
+            tiles,
             runs,
             indices: order.iter().map(|&k| indices[k as usize]).collect(),
             params: order.iter().map(|&k| params[k as usize]).collect(),

@@ -1,6 +1,7 @@
 //! The arrays of one kind of constraint, and measurements over its constraints.
 
 use std::marker::PhantomData;
+use std::ops::Range;
 use std::sync::Arc;
 
 use cutis_constraints::{Constraint, Params, Scalar};
@@ -20,6 +21,21 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
 
     fn offsets(&self) -> &[u32] {
         &self.offsets
+    }
+
+    fn tiles(&self) -> usize {
+        self.tiles.count
+    }
+
+    fn part(&self, color: usize, tile: usize) -> Range<usize> {
+        if color >= self.colors() || tile >= self.tiles.count {
+            return 0..0;
+        }
+        if self.tiles.count == 1 {
+            return self.range(color);
+        }
+        let first = color * self.tiles.count + tile;
+        self.tiles.offsets[first] as usize..self.tiles.offsets[first + 1] as usize
     }
 
     fn indices(&self) -> &[u32] {
@@ -89,6 +105,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
         Arc::new(Batch::<C, N, f64, C::Params<f64>> {
             vertex_count: self.vertex_count,
             offsets: self.offsets.clone(),
+            tiles: self.tiles.clone(),
             runs: self.runs.clone(),
             indices: self.indices.clone(),
             params: self.params.iter().map(to_f64).collect(),
@@ -103,6 +120,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
             Values::Each(values) => size_of_val(values.as_slice()),
         };
         size_of_val(self.offsets.as_slice())
+            + size_of_val(self.tiles.offsets.as_slice())
             + self.runs.bytes()
             + size_of_val(self.indices.as_slice())
             + size_of_val(self.params.as_slice())

@@ -48,7 +48,7 @@ fn swept(each: bool, keeps_multipliers: bool, run: impl Fn(ConstraintColor<'_, f
         let set = &**kind;
         let mut multipliers = vec![0.25; if keeps_multipliers { set.len() } else { 0 }];
         for color in 0..set.colors() {
-            run(ConstraintColor { set, color, vertices, step, multipliers: &mut multipliers });
+            run(ConstraintColor { set, color, tile: None, vertices, step, multipliers: &mut multipliers });
         }
         kept.push(multipliers);
     }
@@ -116,7 +116,14 @@ fn threads_take_each_chunk_once() {
     let run = |run: &dyn Fn(ConstraintColor<'_, f64>)| {
         let (mut system, mut multipliers) = (build(), vec![0.0; edges.len()]);
         let (vertices, kinds) = system.projection_parts();
-        run(ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers: &mut multipliers });
+        run(ConstraintColor {
+            set: &*kinds[0],
+            color: 0,
+            tile: None,
+            vertices,
+            step,
+            multipliers: &mut multipliers,
+        });
         (system.vertices, multipliers)
     };
     let serial = run(&|color| color.project());
@@ -168,7 +175,7 @@ where
     let (vertices, kinds) = system.projection_parts();
     let step = Step::Xpbd { inverse_h_squared: T::constant(100.0) };
     let set = &*kinds[0];
-    run(ConstraintColor { set, color: 0, vertices, step, multipliers: &mut multipliers });
+    run(ConstraintColor { set, color: 0, tile: None, vertices, step, multipliers: &mut multipliers });
     (system.vertices, multipliers)
 }
 
@@ -222,6 +229,41 @@ fn broken_runs_have_the_bits_of_serial_constraints() {
     }
 }
 
+/// All vertices of a body of several tiles after two sweeps in the order of `passes`: pairs of a
+/// tile and a color. `None` stands for a sweep over whole colors.
+fn tiled(tiles: Option<fn(usize) -> Vec<usize>>) -> Vec<Vertex<f32>> {
+    let lattice = cutis_test_kit::Kuhn::new([5, 4, 20], 0.1);
+    let masses: Vec<f32> = lattice.positions.iter().map(|p| if p.z == 0.0 { 0.0 } else { 1.0 }).collect();
+    let positions: Vec<Point3<f64>> =
+        lattice.positions.iter().map(|p| Point3::new(p.x * 1.2, p.y + 0.1 * p.z, p.z * p.z)).collect();
+    let groups = Groups::from_colors(&lattice.tet_colors).unwrap();
+    let mut system = SystemBuilder::<f32>::in_place(&positions, &masses)
+        .unwrap()
+        .add::<Volume, 4>(&lattice.tets, &vec![[2e-4]; lattice.tets.len()], Stiffness::pbd(0.8), &groups)
+        .unwrap()
+        .build();
+    let (vertices, kinds) = system.projection_parts();
+    let (set, step) = (&*kinds[0], Step::Pbd);
+    assert!(set.tiles() > 3);
+    for _ in 0..2 {
+        let order =
+            tiles.map_or_else(|| vec![None], |order| order(set.tiles()).into_iter().map(Some).collect());
+        for tile in order {
+            for color in 0..set.colors() {
+                ConstraintColor { set, color, tile, vertices, step, multipliers: &mut [] }.project();
+            }
+        }
+    }
+    system.vertices
+}
+
+#[test]
+fn tiles_have_the_bits_of_whole_colors() {
+    let whole = tiled(None);
+    assert!(tiled(Some(|count| (0..count).collect())) == whole);
+    assert!(tiled(Some(|count| (0..count).rev().collect())) != whole, "the order of the tiles matters");
+}
+
 #[test]
 #[should_panic(expected = "vertices that do not exist")]
 fn a_set_for_more_vertices_is_rejected() {
@@ -229,7 +271,7 @@ fn a_set_for_more_vertices_is_rejected() {
     let (vertices, kinds) = system.projection_parts();
     let (vertices, step) = (&mut vertices[..7], Step::Pbd);
     Colored::new(
-        ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers: &mut [] },
+        ConstraintColor { set: &*kinds[0], color: 0, tile: None, vertices, step, multipliers: &mut [] },
         SimdLevel::best(),
         1,
     );
@@ -242,7 +284,7 @@ fn too_few_multipliers_are_rejected() {
     let (vertices, kinds) = system.projection_parts();
     let (multipliers, step) = (&mut [0.0; 6][..], Step::Pbd);
     Colored::new(
-        ConstraintColor { set: &*kinds[0], color: 0, vertices, step, multipliers },
+        ConstraintColor { set: &*kinds[0], color: 0, tile: None, vertices, step, multipliers },
         SimdLevel::best(),
         1,
     );

@@ -131,6 +131,7 @@ impl Body {
                 Serial.project(ConstraintColor {
                     set: kind,
                     color: sweep.color,
+                    tile: None,
                     vertices: &mut vertices,
                     step,
                     multipliers: &mut multipliers,
