@@ -96,8 +96,9 @@ pub(crate) fn generate(
 impl TetMesh {
     /// Colors of lattice edges in closed form. Edges of one color share no vertex.
     ///
-    /// The color is 2 · direction + the parity of the first point along the first axis of the
-    /// direction. There are 14 colors for `kuhn6` (7 directions) and 18 for `five` (9 directions).
+    /// The color is 2 · direction + the parity of the first point along the last axis of the
+    /// direction. So all edges of a row along x that start there have one color, except those along
+    /// x itself, and a solver reads their vertices one behind the other. There are 14 colors for `kuhn6` (7 directions) and 18 for `five` (9 directions).
     /// The copies of edges along a cut add as many colors for each number among the copies.
     pub fn edge_colors(&self) -> Vec<u16> {
         let color = |(n, edge): (usize, &[u32; 2])| self.edge_color(*edge, self.copy_of_edge(n));
@@ -110,7 +111,7 @@ impl TetMesh {
         let count = directions.iter().flatten().map(|d| d.number + 1).max().unwrap_or(0);
         let (p, q) = (self.point(a), self.point(b));
         let step: [i8; 3] = std::array::from_fn(|axis| (q[axis] as isize - p[axis] as isize) as i8);
-        let axis = step.iter().position(|&s| s != 0).unwrap_or(0);
+        let axis = step.iter().rposition(|&s| s != 0).unwrap_or(0);
         let own = &directions[p.iter().sum::<usize>() & 1];
         let number = own.iter().find(|d| d.step == step).map_or(0, |d| d.number);
         2 * (number + count * u16::from(copy)) + (p[axis] & 1) as u16

@@ -18,7 +18,7 @@ pub struct Kuhn {
     pub positions: Vec<Point3<f64>>,
     /// Two vertices each.
     pub edges: Vec<[u32; 2]>,
-    /// Direction × parity along the first axis of the direction: 14 colors.
+    /// Direction × parity along the last axis of the direction: 14 colors.
     pub edge_colors: Vec<u16>,
     /// Four vertices each, positively oriented.
     pub tets: Vec<[u32; 4]>,
@@ -42,7 +42,7 @@ impl Kuhn {
         for p in points() {
             for (direction, d) in DIRECTIONS.iter().enumerate() {
                 let end = [p[0] + d[0], p[1] + d[1], p[2] + d[2]];
-                let axis = d.iter().position(|&step| step == 1).unwrap_or(0);
+                let axis = d.iter().rposition(|&step| step == 1).unwrap_or(0);
                 if inside(&end) {
                     lattice.edges.push([index(p), index(end)]);
                     lattice.edge_colors.push((direction * 2 + p[axis] % 2) as u16);
