@@ -184,7 +184,8 @@ fn check_rows<T: Scalar, C: Constraint<N>, const N: usize>(places: &[u32])
 where
     C::Params<T>: From<[T; 1]>,
 {
-    for varied in [false, true] {
+    // Miri takes the case with most reads.
+    for varied in if cfg!(miri) { vec![true] } else { vec![false, true] } {
         let serial = in_rows::<T, C, N>(places, varied, 0.5, |color| color.project());
         assert!(serial.1.iter().any(|&multiplier| multiplier != T::zero()));
         for level in SimdLevel::available() {
@@ -202,29 +203,29 @@ where
 
 #[test]
 fn runs_of_every_stride_have_the_bits_of_serial_constraints() {
-    let count = if cfg!(miri) { 21 } else { 1100 };
-    for stride in [1, 2, 4, 5, 9] {
+    let (count, strides) = if cfg!(miri) { (21, vec![1, 2]) } else { (1100, vec![1, 2, 4, 5, 9]) };
+    for stride in strides {
         let row: Vec<u32> = (0..count).map(|k| k * stride).collect();
         check_rows::<f32, Distance, 2>(&row);
-        check_rows::<f64, Volume, 4>(&row);
         if !cfg!(miri) {
             check_rows::<f32, Volume, 4>(&row);
+            check_rows::<f64, Volume, 4>(&row);
         }
     }
 }
 
 #[test]
 fn broken_runs_have_the_bits_of_serial_constraints() {
-    let count = if cfg!(miri) { 45 } else { 1100 };
+    let count = if cfg!(miri) { 33 } else { 1100 };
     // Rows of eleven places with a gap, and strides that change along a row.
     let gaps: Vec<u32> = (0..count).map(|k| 20 * (k / 11) + k % 11).collect();
-    let mixed: Vec<u32> = (0..count).map(|k| if k < count / 2 { k } else { 2 * k }).collect();
-    let backwards: Vec<u32> = (0..count).rev().collect();
-    for places in [gaps, mixed, backwards] {
-        check_rows::<f32, Distance, 2>(&places);
-        if !cfg!(miri) {
+    check_rows::<f64, Distance, 2>(&gaps);
+    if !cfg!(miri) {
+        let mixed: Vec<u32> = (0..count).map(|k| if k < count / 2 { k } else { 2 * k }).collect();
+        let backwards: Vec<u32> = (0..count).rev().collect();
+        for places in [gaps, mixed, backwards] {
+            check_rows::<f32, Distance, 2>(&places);
             check_rows::<f32, Volume, 4>(&places);
-            check_rows::<f64, Volume, 4>(&places);
         }
     }
 }
@@ -258,6 +259,7 @@ fn tiled(tiles: Option<fn(usize) -> Vec<usize>>) -> Vec<Vertex<f32>> {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too slow, and serial code has no unsafe part")]
 fn tiles_have_the_bits_of_whole_colors() {
     let whole = tiled(None);
     assert!(tiled(Some(|count| (0..count).collect())) == whole);
