@@ -20,6 +20,10 @@ pub(crate) struct Parallel {
 }
 
 impl<T: Scalar> Execute<T> for Parallel {
+    fn workers(&self) -> usize {
+        self.threads
+    }
+
     fn vertices(&self, block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync)) {
         if self.threads == 1 { pass(block) } else { split(block, pass) }
     }

@@ -83,6 +83,10 @@ impl<'a, E> Timed<'a, E> {
 }
 
 impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
+    fn workers(&self) -> usize {
+        self.inner.workers()
+    }
+
     fn vertices(&self, block: VertexBlock<'_, T>, pass: &(dyn Fn(VertexBlock<'_, T>) + Sync)) {
         self.profile.borrow_mut().time(StepProfile::VERTICES, || self.inner.vertices(block, pass));
     }

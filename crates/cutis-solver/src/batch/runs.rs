@@ -31,16 +31,19 @@ struct Run {
 pub(super) struct Runs(Vec<Run>);
 
 impl Runs {
-    /// Returns the stride of the constraints from `first` on, 0 if they have none, and how many of
-    /// the constraints in `range` have it. Counted from `first`, each four constraints are a block
-    /// if the stride is not 0.
+    /// Returns the stride of the first constraints in `range`, 0 if they have none, and which ones
+    /// have it. Counted from their start, each four of them are a block if the stride is not 0. A
+    /// range that starts within a block has no stride up to the next one.
     #[inline]
     pub(super) fn part(&self, range: Range<usize>) -> (usize, Range<usize>) {
         let next = self.0.partition_point(|run| run.start as usize <= range.start);
         let end = self.0.get(next).map_or(range.end, |run| range.end.min(run.start as usize));
         let Some(run) = next.checked_sub(1).map(|last| self.0[last]) else { return (0, range.start..end) };
-        let in_step = (range.start - run.start as usize).is_multiple_of(BLOCK);
-        (if in_step { run.stride as usize } else { 0 }, range.start..end)
+        match (range.start - run.start as usize) % BLOCK {
+            0 => (run.stride as usize, range.start..end),
+            _ if run.stride == 0 => (0, range.start..end),
+            place => (0, range.start..end.min(range.start + BLOCK - place)),
+        }
     }
 
     /// Returns the memory in bytes.
@@ -189,7 +192,9 @@ mod tests {
         arrange(&mut order, 100, &indices, &mut runs, &mut Scratch::default());
         assert_eq!(runs.part(100..132), (1, 100..132));
         assert_eq!(runs.part(112..120), (1, 112..120));
-        assert_eq!(runs.part(113..120), (0, 113..120));
+        assert_eq!(runs.part(113..120), (0, 113..116));
+        assert_eq!(runs.part(116..120), (1, 116..120));
+        assert_eq!(runs.part(118..119), (0, 118..119));
         assert_eq!(runs.part(3..120), (0, 3..100), "before the first run");
     }
 }

@@ -14,9 +14,9 @@
 
 use cutis_coloring::Groups;
 
-/// The usual number of vertices of a tile: 16 MiB in `f32`. A tile has at least as many, unless the
-/// body has fewer. Results do not depend on it. In the unit tests a small body has several tiles.
-const TILE: usize = if cfg!(test) { 64 } else { 1 << 20 };
+/// The least number of vertices of a tile: 6 MiB in `f32`. Results do not depend on it. In the unit
+/// tests a small body has several tiles.
+const TILE: usize = if cfg!(test) { 64 } else { 3 << 17 };
 
 /// The constraints of a kind by color and tile.
 #[derive(Clone, Debug)]

@@ -232,7 +232,7 @@ fn broken_runs_have_the_bits_of_serial_constraints() {
 
 /// All vertices of a body of several tiles after two sweeps in the order of `passes`: pairs of a
 /// tile and a color. `None` stands for a sweep over whole colors.
-fn tiled(tiles: Option<fn(usize) -> Vec<usize>>) -> Vec<Vertex<f32>> {
+fn tiled(tiles: Option<fn(usize) -> Vec<usize>>, project: fn(ConstraintColor<'_, f32>)) -> Vec<Vertex<f32>> {
     let lattice = cutis_test_kit::Kuhn::new([5, 4, 20], 0.1);
     let masses: Vec<f32> = lattice.positions.iter().map(|p| if p.z == 0.0 { 0.0 } else { 1.0 }).collect();
     let positions: Vec<Point3<f64>> =
@@ -251,7 +251,7 @@ fn tiled(tiles: Option<fn(usize) -> Vec<usize>>) -> Vec<Vertex<f32>> {
             tiles.map_or_else(|| vec![None], |order| order(set.tiles()).into_iter().map(Some).collect());
         for tile in order {
             for color in 0..set.colors() {
-                ConstraintColor { set, color, tile, vertices, step, multipliers: &mut [] }.project();
+                project(ConstraintColor { set, color, tile, vertices, step, multipliers: &mut [] });
             }
         }
     }
@@ -261,9 +261,18 @@ fn tiled(tiles: Option<fn(usize) -> Vec<usize>>) -> Vec<Vertex<f32>> {
 #[test]
 #[cfg_attr(miri, ignore = "too slow, and serial code has no unsafe part")]
 fn tiles_have_the_bits_of_whole_colors() {
-    let whole = tiled(None);
-    assert!(tiled(Some(|count| (0..count).collect())) == whole);
-    assert!(tiled(Some(|count| (0..count).rev().collect())) != whole, "the order of the tiles matters");
+    let serial = |color: ConstraintColor<'_, f32>| color.project();
+    let shared = |color: ConstraintColor<'_, f32>| {
+        let color = Colored::new(color, SimdLevel::best(), 2);
+        on_threads(2, &|worker| while color.project_next_chunk(worker) {});
+    };
+    let whole = tiled(None, serial);
+    assert!(tiled(None, shared) == whole);
+    for project in [serial, shared] {
+        assert!(tiled(Some(|count| (0..count).collect()), project) == whole);
+        let backwards = tiled(Some(|count| (0..count).rev().collect()), project);
+        assert!(backwards != whole, "the order of the tiles matters");
+    }
 }
 
 #[test]
