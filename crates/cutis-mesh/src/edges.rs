@@ -97,9 +97,10 @@ impl TetMesh {
     /// Colors of lattice edges in closed form. Edges of one color share no vertex.
     ///
     /// The color is 2 · direction + the parity of the first point along the last axis of the
-    /// direction. So all edges of a row along x that start there have one color, except those along
-    /// x itself, and a solver reads their vertices one behind the other. There are 14 colors for `kuhn6` (7 directions) and 18 for `five` (9 directions).
-    /// The copies of edges along a cut add as many colors for each number among the copies.
+    /// direction. So the edges of one direction that start in a row along x have one color, except
+    /// those along x itself, and a solver reads their vertices one behind the other. There are 14
+    /// colors for `kuhn6` (7 directions) and 18 for `five` (9 directions). The copies of edges along
+    /// a cut add as many colors for each number among the copies.
     pub fn edge_colors(&self) -> Vec<u16> {
         let color = |(n, edge): (usize, &[u32; 2])| self.edge_color(*edge, self.copy_of_edge(n));
         self.edges.par_iter().enumerate().map(color).collect()

@@ -9,7 +9,8 @@ use crate::batch::{ConstraintChunk, VertexChunk};
 use crate::loads::load_of;
 use crate::{ColorPass, ConstraintSet, Descent, Step, System, Vertex, VertexForce};
 
-/// One color of one kind of constraint, or the part of it in one tile, with everything that its projection needs.
+/// One color of one kind of constraint, or the part of it in one tile, with everything that its
+/// projection needs.
 pub struct ConstraintColor<'a, T: Scalar> {
     /// All constraints of the kind.
     pub set: &'a dyn ConstraintSet<T>,

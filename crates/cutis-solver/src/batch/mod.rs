@@ -85,8 +85,8 @@ pub(crate) struct Batch<C, const N: usize, T, P> {
 }
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
-    /// Checks everything that the inner loops rely on, then sorts the constraints by color, tile and
-    /// run.
+    /// Checks everything that the inner loops rely on, then sorts the constraints by color, tile
+    /// and run.
     pub(crate) fn new(
         vertex_count: usize,
         indices: &[[u32; N]],

@@ -7,8 +7,8 @@
 //! color that shares a vertex with it. All other constraints do not depend on each other. So the
 //! result has the bits of a sweep over whole colors.
 //!
-//! A constraint is in the tile of its highest vertex, where the tiles divide the vertices into equal
-//! parts, or in a later one if it has to be. The indices of a mesh are usually sorted along
+//! A constraint is in the tile of its highest vertex, where the tiles divide the vertices into
+//! equal parts, or in a later one if it has to be. The indices of a mesh are usually sorted along
 //! some direction, so that a tile is a slab. With any other indices most constraints are in the
 //! last tile, and the sweep is one over whole colors.
 
