@@ -99,8 +99,8 @@ impl TetMesh {
     /// The color is 2 · direction + the parity of the first point along the last axis of the
     /// direction. So the edges of one direction that start in a row along x have one color, except
     /// those along x itself, and a solver reads their vertices one behind the other. There are 14
-    /// colors for `kuhn6` (7 directions) and 18 for `five` (9 directions). The copies of edges along
-    /// a cut add as many colors for each number among the copies.
+    /// colors for `kuhn6` (7 directions) and 18 for `five` (9 directions). The copies of edges
+    /// along a cut add as many colors for each number among the copies.
     pub fn edge_colors(&self) -> Vec<u16> {
         let color = |(n, edge): (usize, &[u32; 2])| self.edge_color(*edge, self.copy_of_edge(n));
         self.edges.par_iter().enumerate().map(color).collect()
