@@ -1,13 +1,13 @@
-//! Lists of the tets that touch each z-slab.
-
-use std::ops::Range;
+//! Lists of the tets that touch each tile.
 
 use rayon::prelude::*;
 
-/// Number of tets in a chunk that is sorted independently.
-const CHUNK: usize = 1 << 17;
+use crate::tiling::{TileBox, Tiling};
 
-/// For each slab the tets that touch it, in ascending order. A counting sort of chunks with fixed
+/// Number of tets in a chunk that is sorted independently.
+const CHUNK: usize = 1 << 16;
+
+/// For each tile the tets that touch it, in ascending order. A counting sort of chunks with fixed
 /// sizes runs in parallel, so that the result does not depend on the number of threads.
 pub struct Buckets {
     chunks: Vec<Chunk>,
@@ -19,41 +19,38 @@ struct Chunk {
 }
 
 impl Buckets {
-    /// Sorts the tets `0..count`. `slabs_of` gives the slabs that a tet touches, a range within
-    /// `0..slabs` that may be empty.
-    pub fn new(count: usize, slabs: usize, slabs_of: impl Fn(usize) -> Range<usize> + Sync) -> Self {
+    /// Sorts the tets `0..count`. `tiles_of` gives the tiles that a tet touches.
+    pub fn new(count: usize, tiling: &Tiling, tiles_of: impl Fn(usize) -> TileBox + Sync) -> Self {
+        let tiles = tiling.len();
         let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
             let tets = chunk * CHUNK..count.min((chunk + 1) * CHUNK);
-            let touched: Vec<(u32, u32)> =
-                tets.clone().map(&slabs_of).map(|range| (range.start as u32, range.end as u32)).collect();
-            let mut offsets = vec![0_u32; slabs + 1];
-            for &(start, end) in &touched {
-                for slab in start..end {
-                    offsets[slab as usize + 1] += 1;
-                }
+            let touched: Vec<TileBox> = tets.clone().map(&tiles_of).collect();
+            let mut offsets = vec![0_u32; tiles + 1];
+            for touched in &touched {
+                tiling.each(touched, |tile| offsets[tile + 1] += 1);
             }
-            for slab in 0..slabs {
-                offsets[slab + 1] += offsets[slab];
+            for tile in 0..tiles {
+                offsets[tile + 1] += offsets[tile];
             }
             let mut next = offsets.clone();
-            let mut order = vec![0; offsets[slabs] as usize];
-            for (tet, &(start, end)) in tets.zip(&touched) {
-                for slab in start..end {
-                    let slot = &mut next[slab as usize];
+            let mut order = vec![0; offsets[tiles] as usize];
+            for (tet, touched) in tets.zip(&touched) {
+                tiling.each(touched, |tile| {
+                    let slot = &mut next[tile];
                     order[*slot as usize] = tet as u32;
                     *slot += 1;
-                }
+                });
             }
             Chunk { order, offsets }
         });
         Self { chunks: chunks.collect() }
     }
 
-    /// The tets of a slab in ascending order.
-    pub fn slab(&self, slab: usize) -> impl Iterator<Item = usize> + '_ {
+    /// The tets of a tile in ascending order.
+    pub fn tile(&self, tile: usize) -> impl Iterator<Item = u32> + '_ {
         self.chunks.iter().flat_map(move |chunk| {
-            let range = chunk.offsets[slab] as usize..chunk.offsets[slab + 1] as usize;
-            chunk.order[range].iter().map(|&tet| tet as usize)
+            let range = chunk.offsets[tile] as usize..chunk.offsets[tile + 1] as usize;
+            chunk.order[range].iter().copied()
         })
     }
 }
@@ -61,15 +58,25 @@ impl Buckets {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tiling::TILE;
 
     #[test]
-    fn every_slab_lists_its_tets_in_ascending_order() {
+    fn every_tile_lists_its_tets_in_ascending_order() {
         let count = CHUNK + 1000;
+        let tiling = Tiling::new([TILE[0], TILE[1], 7 * TILE[2]]);
         let range = |tet: usize| (tet * 7 % 5)..(tet * 7 % 5 + tet % 3);
-        let buckets = Buckets::new(count, 7, range);
-        for slab in 0..7 {
-            let expected: Vec<usize> = (0..count).filter(|&tet| range(tet).contains(&slab)).collect();
-            assert!(buckets.slab(slab).eq(expected), "slab {slab}");
+        let buckets = Buckets::new(count, &tiling, |tet| {
+            let slices = range(tet);
+            if slices.is_empty() {
+                return TileBox::default();
+            }
+            let [low, high] = [slices.start, slices.end - 1].map(|tile| (TILE[2] * tile) as f64 + 7.0);
+            tiling.touched([1.0, 1.0, low], [2.0, 2.0, high])
+        });
+        for tile in 0..7 {
+            let expected: Vec<u32> =
+                (0..count).filter(|&tet| range(tet).contains(&tile)).map(|tet| tet as u32).collect();
+            assert!(buckets.tile(tile).eq(expected), "tile {tile}");
         }
     }
 }

@@ -47,12 +47,17 @@ mod buckets;
 mod error;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod lanes;
 mod partial_volume;
 mod raster;
 mod report;
+mod resampler;
+mod rows;
 mod sample;
-mod slab;
+mod samples;
 mod space;
+mod tile;
+mod tiling;
 mod warp;
 
 pub use error::ResampleError;
@@ -60,6 +65,7 @@ pub use error::ResampleError;
 pub use gpu::{GridUniform, ResamplerGpu, ResamplerOptions, Setup, SlabState, resample_gpu};
 pub use partial_volume::blend_walls;
 pub use report::ResampleReport;
+pub use resampler::Resampler;
 pub use warp::{Warp, resample};
 
 #[cfg(doctest)]

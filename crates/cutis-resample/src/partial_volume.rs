@@ -10,9 +10,8 @@ use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::raster::TetRaster;
+use crate::raster::{Rasters, TetRaster, in_all_lanes};
 use crate::sample::{scanned_range, stored_air, trilinear};
-use crate::slab::RestMap;
 use crate::space::IndexSpace;
 use crate::{ResampleError, Warp};
 
@@ -133,16 +132,18 @@ impl Walls<'_> {
                 for &(_, tet) in of(&held, at) {
                     let vertices = &warp.tets[tet as usize];
                     let corners = self.corners(warp.deformed, vertices);
-                    let Some(raster) = TetRaster::new(&corners, self.space.tolerance) else { continue };
-                    let own = self.inside(&raster, &points) & !covered;
+                    let rasters = Rasters::new(&in_all_lanes(&corners), self.space.tolerance);
+                    let Some(raster) = rasters.tet(0) else { continue };
+                    let own = self.inside(raster, &points) & !covered;
                     if own == 0 {
                         continue;
                     }
                     let moved = warp.tet_moved(tet as usize);
-                    let map = moved.then(|| RestMap::new(&raster, self.corners(warp.rest, vertices)));
+                    let at_rest = || in_all_lanes(&self.corners(warp.rest, vertices));
+                    let map = moved.then(|| rasters.rest_maps(&at_rest()));
                     for point in bits(own) {
                         let point = points[point];
-                        sum += value_at(map.as_ref().map_or(point, |map| map.at(point.into()).into()));
+                        sum += value_at(map.as_ref().map_or(point, |map| map.at(0, point.into()).into()));
                     }
                     covered |= own;
                     if covered == u64::MAX {
@@ -153,8 +154,9 @@ impl Walls<'_> {
                 for (pairs, tets) in [(&left, warp.tets), (&removed, warp.removed)] {
                     for &(_, tet) in of(pairs, at) {
                         let corners = self.corners(warp.rest, &tets[tet as usize]);
-                        if let Some(raster) = TetRaster::new(&corners, self.space.tolerance) {
-                            empty |= self.inside(&raster, &points) & !covered;
+                        let rasters = Rasters::new(&in_all_lanes(&corners), self.space.tolerance);
+                        if let Some(raster) = rasters.tet(0) {
+                            empty |= self.inside(raster, &points) & !covered;
                         }
                     }
                 }
@@ -247,7 +249,7 @@ impl Walls<'_> {
     }
 
     /// The points in a tet, as bits.
-    fn inside(&self, raster: &TetRaster, points: &[Vector3<f64>; POINTS]) -> u64 {
+    fn inside(&self, raster: TetRaster<'_>, points: &[Vector3<f64>; POINTS]) -> u64 {
         let mut held = u64::MAX;
         for corner in 0..4 {
             let (gradient, constant) = (raster.gradient_of(corner), raster.constant_of(corner));

@@ -3,6 +3,8 @@
 use cutis_volume::{AIR_HU, Volume};
 use rayon::prelude::*;
 
+use crate::lanes::{floor, integer};
+
 /// The trilinear value at a continuous index, rounded to the nearest stored value (halves upwards).
 ///
 /// Positions outside the grid are clamped to it, so that the value lies between the smallest and
@@ -45,19 +47,54 @@ pub fn trilinear(voxels: &[i16], shape: [usize; 3], scanned: [i16; 2], position:
         a + fy * (b - a)
     };
     let (a, b) = (along_y(0), along_y(4));
-    // Shifted to positive numbers, for which truncation is a floor.
+    nearest(a + fz * (b - a))
+}
+
+/// The voxels of a volume, for sampling many positions.
+pub struct Sampler<'a> {
+    pub voxels: &'a [i16],
+    pub shape: [usize; 3],
+    /// Range of stored values that are not padding.
+    pub scanned: [i16; 2],
+    /// Whether some voxels are padding.
+    pub has_padding: bool,
+}
+
+/// A value within the range of `i16`, rounded to the nearest integer, halves upwards.
+#[inline(always)]
+pub fn nearest(value: f64) -> i16 {
     let shift = 32768.0;
-    (((a + fz * (b - a)) + (shift + 0.5)) as i32 - shift as i32) as i16
+    (integer(floor(value + (shift + 0.5))) as i32 - shift as i32) as i16
+}
+
+/// The smallest and the largest stored value.
+fn extremes(volume: &Volume) -> (i16, i16) {
+    let widen = |(a, b): (i16, i16), (c, d): (i16, i16)| (a.min(c), b.max(d));
+    let empty = (i16::MAX, i16::MIN);
+    let part = |voxels: &[i16]| voxels.iter().fold(empty, |range, &v| widen(range, (v, v)));
+    volume.voxels().par_chunks(1 << 16).map(part).reduce(|| empty, widen)
 }
 
 /// The stored value nearest to −1024 HU, clamped to the range of the stored values.
 pub fn stored_air(volume: &Volume) -> i16 {
-    let widen = |(a, b): (i16, i16), (c, d): (i16, i16)| (a.min(c), b.max(d));
-    let empty = (i16::MAX, i16::MIN);
-    let (low, high) =
-        volume.voxels().par_iter().fold(|| empty, |range, &v| widen(range, (v, v))).reduce(|| empty, widen);
+    air_within(volume, extremes(volume))
+}
+
+fn air_within(volume: &Volume, (low, high): (i16, i16)) -> i16 {
     let exact = (f64::from(AIR_HU) - f64::from(volume.intercept())) / f64::from(volume.slope());
     (exact.round() as i16).max(low).min(high)
+}
+
+impl<'a> Sampler<'a> {
+    /// A sampler of a volume, and the stored value of air.
+    pub fn new(volume: &'a Volume) -> (Self, i16) {
+        let (low, high) = extremes(volume);
+        let air = air_within(volume, (low, high));
+        let scanned = scanned_range(volume, air);
+        let has_padding = low < scanned[0] || high > scanned[1];
+        let (voxels, shape) = (volume.voxels(), volume.grid().shape);
+        (Self { voxels, shape, scanned, has_padding }, air)
+    }
 }
 
 /// The range of stored values that can come from a scan: air (see [`stored_air`]) and everything

@@ -44,6 +44,11 @@ impl IndexSpace {
         Point3::from(self.linear * local.coords.map(f64::from) + self.offset)
     }
 
+    /// Continuous voxel indices of positions in local meters.
+    pub fn indices(&self, positions: &[Point3<f32>]) -> Vec<Point3<f64>> {
+        positions.par_iter().map(|&position| self.index(position)).collect()
+    }
+
     /// The third component of [`IndexSpace::index`], with the same bits.
     #[inline]
     pub fn slice(&self, local: Point3<f32>) -> f64 {

@@ -5,4 +5,5 @@ mod errors;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod identities;
+mod updates;
 mod walls;

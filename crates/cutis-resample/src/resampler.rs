@@ -1,0 +1,294 @@
+//! A resampler that keeps its output between the states of a mesh.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
+use cutis_volume::Volume;
+use nalgebra::Point3;
+use rayon::prelude::*;
+
+use crate::buckets::Buckets;
+use crate::report::ResampleReport;
+use crate::sample::Sampler;
+use crate::space::IndexSpace;
+use crate::tile::{Source, Tile};
+use crate::tiling::{TILE, TileBox, Tiling};
+use crate::warp::check_finite;
+use crate::{ResampleError, Warp};
+
+/// Margin around tets at rest, in voxels, within which the tolerance of a state lies.
+const MARGIN: f64 = 1.0 / 64.0;
+
+/// Resamples one volume through many states of one mesh, on the CPU.
+///
+/// The output stays in memory. [`Resampler::update`] rewrites it only where the mesh differs from
+/// its rest shape, or differed in the state before. The result is that of
+/// [`resample`](crate::resample), bit for bit.
+///
+/// ```
+/// use cutis_resample::{Resampler, Warp, resample};
+/// # use cutis_volume::{Affine, Grid, Volume};
+/// # use nalgebra::Point3;
+/// # let grid = Grid { shape: [4, 4, 4], affine: Affine::from_spacing([1.0; 3], [0.0; 3])? };
+/// # let volume = Volume::new(grid, (0..64).collect(), 1.0, 0.0)?;
+/// # let rest = [[0.0; 3], [0.002, 0.0, 0.0], [0.0, 0.002, 0.0], [0.0, 0.0, 0.002]].map(Point3::from);
+/// # let tets = [[0, 1, 2, 3]];
+/// # let origin_mm = Point3::origin();
+/// let at_rest = Warp { origin_mm, rest: &rest, deformed: &rest, tets: &tets, body_tets: 1, removed: &[] };
+/// let mut resampler = Resampler::new(&volume, &at_rest)?;
+/// for frame in 0..3 {
+///     let deformed = rest.map(|p| Point3::new(p.x + 0.0004 * frame as f32, p.y, p.z));
+///     let report = resampler.update(&deformed)?;
+///     let (expected, whole) = resample(&volume, &Warp { deformed: &deformed, ..at_rest }, &|_, _| {})?;
+///     assert_eq!((resampler.voxels(), report), (expected.voxels(), whole));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Resampler<'a> {
+    volume: &'a Volume,
+    warp: Warp<'a>,
+    tiling: Tiling,
+    /// Continuous voxel indices of the vertices at rest.
+    rest: Vec<Point3<f64>>,
+    /// Tets at rest.
+    still: Buckets,
+    /// Margin around the tets of `still`, in voxels.
+    margin: f64,
+    removed: Buckets,
+    values: Vec<i16>,
+    /// The tolerance of the state before. `None` before the first one.
+    tolerance: Option<f64>,
+    /// The tiles that a moved tet touches, deformed or at rest, in the state before.
+    touched: Vec<AtomicBool>,
+    /// Counts of each tile.
+    reports: Vec<ResampleReport>,
+}
+
+impl<'a> Resampler<'a> {
+    /// Prepares a volume and a warp. The deformed positions of the warp are only validated.
+    ///
+    /// # Errors
+    /// The errors of [`resample`](crate::resample).
+    pub fn new(volume: &'a Volume, warp: &Warp<'a>) -> Result<Self, ResampleError> {
+        warp.validate()?;
+        let grid = volume.grid();
+        let tiling = Tiling::new(grid.shape);
+        let space = IndexSpace::new(&grid.affine, warp.origin_mm, [warp.rest, &[]]);
+        let rest = space.indices(warp.rest);
+        let margin = MARGIN.max(2.0 * space.tolerance);
+        Ok(Self {
+            volume,
+            warp: *warp,
+            still: buckets(&tiling, warp.tets, &rest, margin),
+            removed: buckets(&tiling, warp.removed, &rest, margin),
+            rest,
+            margin,
+            values: vec![0; volume.voxels().len()],
+            tolerance: None,
+            touched: (0..tiling.len()).map(|_| AtomicBool::new(false)).collect(),
+            reports: vec![ResampleReport::default(); tiling.len()],
+            tiling,
+        })
+    }
+
+    /// Resamples through deformed positions in local meters, one per vertex.
+    ///
+    /// # Errors
+    /// [`ResampleError::VertexCount`], [`ResampleError::NotFinite`].
+    pub fn update(&mut self, deformed: &[Point3<f32>]) -> Result<ResampleReport, ResampleError> {
+        self.update_with(deformed, &|_done, _total| {})
+    }
+
+    /// As [`Resampler::update`], and calls `progress(done, total)` after each of `total` parts.
+    pub(crate) fn update_with(
+        &mut self,
+        deformed: &[Point3<f32>],
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<ResampleReport, ResampleError> {
+        let rest = self.warp.rest;
+        if deformed.len() != rest.len() {
+            return Err(ResampleError::VertexCount { rest: rest.len(), deformed: deformed.len() });
+        }
+        check_finite("deformed", deformed)?;
+        let warp = Warp { deformed, ..self.warp };
+        let (grid, tiling) = (self.volume.grid(), self.tiling);
+        let space = IndexSpace::new(&grid.affine, warp.origin_mm, [rest, deformed]);
+        if space.tolerance > self.margin {
+            self.margin = 2.0 * space.tolerance;
+            self.still = buckets(&tiling, warp.tets, &self.rest, self.margin);
+            self.removed = buckets(&tiling, warp.removed, &self.rest, self.margin);
+        }
+        let places = space.indices(deformed);
+        let touched: Vec<AtomicBool> = (0..tiling.len()).map(|_| AtomicBool::new(false)).collect();
+        let touch = |tiles: &TileBox| tiling.each(tiles, |tile| touched[tile].store(true, Ordering::Relaxed));
+        let is_moved = warp.moved_tets();
+        let moved = Buckets::new(warp.tets.len(), &tiling, |tet| {
+            if !is_moved[tet] {
+                return TileBox::default();
+            }
+            let corners = &warp.tets[tet];
+            touch(&tiles_of(&tiling, corners, &self.rest, space.tolerance));
+            let tiles = tiles_of(&tiling, corners, &places, space.tolerance);
+            touch(&tiles);
+            tiles
+        });
+        let all = self.tolerance != Some(space.tolerance);
+        let before = std::mem::replace(&mut self.touched, touched);
+        let is_stale =
+            |tile: usize| all || [&before, &self.touched].iter().any(|set| set[tile].load(Ordering::Relaxed));
+
+        let (sampler, air) = Sampler::new(self.volume);
+        let source = Source {
+            sampler,
+            air,
+            warp: &warp,
+            moved: &is_moved,
+            rest: &self.rest,
+            deformed: &places,
+            tolerance: space.tolerance,
+        };
+        let level = SimdLevel::best();
+        let mut blocks = blocks(&tiling, &mut self.values, &mut self.reports);
+        blocks.retain(|block| (0..tiling.counts[0]).any(|i| is_stale(block.first + i)));
+        let (done, total) = (AtomicUsize::new(0), blocks.len());
+        blocks.par_iter_mut().for_each_init(Scratch::new, |scratch, block| {
+            let first = block.first;
+            for i in (0..tiling.counts[0]).filter(|i| is_stale(first + i)) {
+                let number = first + i;
+                scratch.list(&source, &self.still, &moved, &self.removed, number);
+                let region = tiling.region([i, block.tile[0], block.tile[1]]);
+                f32::in_lanes(level, TileTask { scratch, source: &source, region });
+                scratch.tile.finish(grid.shape[0], &mut block.slices);
+                block.reports[i] = scratch.tile.report();
+            }
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+        });
+        self.tolerance = Some(space.tolerance);
+        let report = self.reports.iter().fold(ResampleReport::default(), |sum, tile| sum + *tile);
+        Ok(ResampleReport { inverted_tets: warp.inverted_tets(), ..report })
+    }
+
+    /// The output of the last update, in the order of [`Volume::voxels`]. All zeros before the
+    /// first one.
+    pub fn voxels(&self) -> &[i16] {
+        &self.values
+    }
+
+    /// The output of the last update.
+    ///
+    /// # Errors
+    /// None in practice: the volume has the grid and the scale of the input.
+    pub fn into_volume(self) -> Result<Volume, ResampleError> {
+        let volume = self.volume;
+        Ok(Volume::new(*volume.grid(), self.values, volume.slope(), volume.intercept())?)
+    }
+}
+
+/// The tets of each tile, with a margin around them.
+fn buckets(tiling: &Tiling, tets: &[[u32; 4]], places: &[Point3<f64>], margin: f64) -> Buckets {
+    Buckets::new(tets.len(), tiling, |tet| tiles_of(tiling, &tets[tet], places, margin))
+}
+
+/// The tiles that a tet touches, with a margin around it.
+#[inline(always)]
+fn tiles_of(tiling: &Tiling, corners: &[u32; 4], places: &[Point3<f64>], margin: f64) -> TileBox {
+    let [a, b, c, d] = corners.map(|v| places[v as usize]);
+    let (low, high) = (a.inf(&b).inf(&c.inf(&d)), a.sup(&b).sup(&c.sup(&d)));
+    tiling.touched(low.coords.add_scalar(-margin).into(), high.coords.add_scalar(margin).into())
+}
+
+/// The output of a row of tiles.
+struct Block<'a> {
+    /// Place of the tiles along the second and the third axis.
+    tile: [usize; 2],
+    /// Number of the first tile.
+    first: usize,
+    /// For each slice the rows of the tiles, with all columns of the output.
+    slices: Vec<&'a mut [i16]>,
+    reports: &'a mut [ResampleReport],
+}
+
+/// Divides the output into rows of tiles.
+fn blocks<'a>(tiling: &Tiling, values: &'a mut [i16], reports: &'a mut [ResampleReport]) -> Vec<Block<'a>> {
+    let [columns, rows, _] = tiling.shape;
+    let mut blocks: Vec<Block<'a>> = reports
+        .chunks_mut(tiling.counts[0])
+        .enumerate()
+        .map(|(n, reports)| Block {
+            tile: [n % tiling.counts[1], n / tiling.counts[1]],
+            first: n * tiling.counts[0],
+            slices: Vec::with_capacity(TILE[2]),
+            reports,
+        })
+        .collect();
+    for (k, slice) in values.chunks_mut(columns * rows).enumerate() {
+        let layer = &mut blocks[k / TILE[2] * tiling.counts[1]..];
+        for (block, rows) in layer.iter_mut().zip(slice.chunks_mut(columns * TILE[1])) {
+            block.slices.push(rows);
+        }
+    }
+    blocks
+}
+
+/// Memory for one tile after another.
+struct Scratch {
+    tile: Tile,
+    /// The tets that touch the tile now, in ascending order.
+    tets: Vec<u32>,
+    /// The tets that it holds at rest and that moved or were removed.
+    left: Vec<[u32; 4]>,
+}
+
+impl Scratch {
+    fn new() -> Self {
+        Self { tile: Tile::new(), tets: Vec::new(), left: Vec::new() }
+    }
+
+    /// Lists the tets of a tile.
+    fn list(
+        &mut self,
+        source: &Source<'_>,
+        still: &Buckets,
+        moved: &Buckets,
+        removed: &Buckets,
+        tile: usize,
+    ) {
+        self.tets.clear();
+        self.left.clear();
+        for tet in still.tile(tile) {
+            if source.moved[tet as usize] {
+                self.left.push(source.warp.tets[tet as usize]);
+            } else {
+                self.tets.push(tet);
+            }
+        }
+        self.left.extend(removed.tile(tile).map(|tet| source.warp.removed[tet as usize]));
+        let unmoved = self.tets.len();
+        self.tets.extend(moved.tile(tile));
+        if unmoved > 0 && unmoved < self.tets.len() {
+            // Two ascending runs, which the stable sort merges.
+            self.tets.sort();
+        }
+    }
+}
+
+/// Resamples a tile.
+struct TileTask<'a> {
+    scratch: &'a mut Scratch,
+    source: &'a Source<'a>,
+    region: [Range<usize>; 3],
+}
+
+impl LaneTask<f32> for TileTask<'_> {
+    #[inline(always)]
+    fn run<L: Lanes<f32>>(self) {
+        let Self { scratch: Scratch { tile, tets, left }, source, region } = self;
+        tile.start(source, region);
+        tile.deform(source, tets);
+        if !left.is_empty() && !tile.is_covered() {
+            left.retain(|&tet| tile.may_leave(source, tet));
+            tile.vacate(source, left);
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Samples of the input at many positions.
+
+use std::ops::Range;
+
+use crate::lanes::{floor, integer};
+use crate::sample::{Sampler, nearest, trilinear};
+use crate::tiling::TILE;
+
+/// Samples that are taken at once. Their numbers fit the first cache of a processor.
+const BLOCK: usize = 128;
+
+/// Voxels of a tile, and their places at rest.
+#[derive(Default)]
+pub struct Samples {
+    /// Place of each voxel in the values of the tile.
+    pub places: Vec<u32>,
+    /// Continuous voxel index at rest, by axis.
+    rest: [Vec<f64>; 3],
+}
+
+impl Samples {
+    pub fn clear(&mut self) {
+        self.places.clear();
+        self.rest.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Adds the voxels of a row of the tile whose bits are set.
+    #[inline(always)]
+    pub fn add(&mut self, row: usize, mut bits: u64) {
+        let start = (row * TILE[0]) as u32;
+        while bits != 0 {
+            self.places.push(start + bits.trailing_zeros());
+            bits &= bits - 1;
+        }
+    }
+
+    /// Computes the places at rest of the voxels from number `first` on, by the map of their tet.
+    #[inline(always)]
+    pub fn locate(
+        &mut self,
+        (linear, offset): &([[f64; 3]; 3], [f64; 3]),
+        first: usize,
+        region: &[Range<usize>; 3],
+    ) {
+        let start = [0, 1, 2].map(|axis| region[axis].start as u32);
+        for &place in &self.places[first..] {
+            let (column, row) = (place % TILE[0] as u32, place / TILE[0] as u32);
+            let x = f64::from(start[0] + column);
+            let y = f64::from(start[1] + row % TILE[1] as u32);
+            let z = f64::from(start[2] + row / TILE[1] as u32);
+            for axis in 0..3 {
+                let [by_x, by_y, by_z] = linear[axis];
+                self.rest[axis].push(((by_x * x + by_y * y) + by_z * z) + offset[axis]);
+            }
+        }
+    }
+
+    /// Writes the values that [`trilinear`] has at all places.
+    #[inline(always)]
+    pub fn write(&self, sampler: &Sampler<'_>, values: &mut [i16]) {
+        let mut first = 0;
+        while first < self.places.len() {
+            let end = self.places.len().min(first + BLOCK);
+            let [x, y, z] = [0, 1, 2].map(|axis| &self.rest[axis][first..end]);
+            write_block(sampler, [x, y, z], &self.places[first..end], values);
+            first = end;
+        }
+    }
+}
+
+/// Writes the values of at most [`BLOCK`] samples.
+#[inline(always)]
+fn write_block(sampler: &Sampler<'_>, rest: [&[f64]; 3], places: &[u32], values: &mut [i16]) {
+    let [columns, rows, _] = sampler.shape;
+    let strides = [1, columns as u64, (columns * rows) as u64];
+    let count = places.len();
+    let mut fractions = [[0.0; BLOCK]; 3];
+    let (mut bases, mut at_end) = ([0_u64; BLOCK], 0);
+    for axis in 0..3 {
+        let (rest, fractions, bases) =
+            (&rest[axis][..count], &mut fractions[axis][..count], &mut bases[..count]);
+        let last = (sampler.shape[axis] - 1) as f64;
+        let stride = strides[axis];
+        for n in 0..count {
+            let at = rest[n];
+            let at = if at < 0.0 { 0.0 } else { at };
+            let at = if at > last { last } else { at };
+            let low = floor(at);
+            fractions[n] = at - low;
+            bases[n] = bases[n].wrapping_add(integer(low).wrapping_mul(stride));
+            at_end |= u64::from(low >= last);
+        }
+    }
+    // The voxels at and next to each position along the first axis, in four rows. All slices have
+    // the same length, so that one comparison serves for all of them.
+    let (row, slice) = (columns, columns * rows);
+    let length = sampler.voxels.len().saturating_sub(slice + row + 1);
+    let mut pairs = [[0_u32; BLOCK]; 4];
+    let mut padding = 0;
+    if at_end == 0 && length > 0 {
+        let starts = [0, row, slice, slice + row];
+        let next = starts.map(|start| &sampler.voxels[start + 1..][..length]);
+        let here = starts.map(|start| &sampler.voxels[start..][..length]);
+        for n in 0..count {
+            let base = bases[n] as usize;
+            if base >= length {
+                at_end = 1;
+                break;
+            }
+            for of in 0..4 {
+                pairs[of][n] = u32::from(here[of][base] as u16) | u32::from(next[of][base] as u16) << 16;
+            }
+        }
+        if sampler.has_padding {
+            let [lowest, highest] = sampler.scanned.map(i32::from);
+            for pairs in &pairs {
+                for &pair in &pairs[..count] {
+                    let [a, b] = halves(pair);
+                    padding |= (a - lowest) | (b - lowest) | (highest - a) | (highest - b);
+                }
+            }
+        }
+    }
+    if at_end != 0 || length == 0 || padding < 0 {
+        for (n, &place) in places.iter().enumerate() {
+            let rest = [0, 1, 2].map(|axis| rest[axis][n]);
+            values[place as usize] = trilinear(sampler.voxels, sampler.shape, sampler.scanned, rest);
+        }
+        return;
+    }
+    let mut found = [0_i16; BLOCK];
+    let found = &mut found[..count];
+    let [fx, fy, fz] = [0, 1, 2].map(|axis| &fractions[axis][..count]);
+    let [a, b, c, d] = [0, 1, 2, 3].map(|of| &pairs[of][..count]);
+    for n in 0..count {
+        let along_x = |pair: u32| {
+            let [a, b] = halves(pair).map(f64::from);
+            a + fx[n] * (b - a)
+        };
+        let (a, b, c, d) = (along_x(a[n]), along_x(b[n]), along_x(c[n]), along_x(d[n]));
+        let (a, b) = (a + fy[n] * (b - a), c + fy[n] * (d - c));
+        found[n] = nearest(a + fz[n] * (b - a));
+    }
+    for (&place, &value) in places.iter().zip(&*found) {
+        values[place as usize] = value;
+    }
+}
+
+/// The two stored values of a pair.
+#[inline(always)]
+fn halves(pair: u32) -> [i32; 2] {
+    [(pair << 16) as i32 >> 16, pair as i32 >> 16]
+}

@@ -1,0 +1,117 @@
+//! The tiles of the output: boxes of voxels that are resampled one at a time.
+
+use std::ops::Range;
+
+/// Voxels of a tile along each axis. A row of a tile has one bit per column in a `u64`. The result
+/// does not depend on it. Smaller tiles follow what moved more closely, but put more tets into
+/// several tiles.
+pub const TILE: [usize; 3] = [u64::BITS as usize, 32, 16];
+
+/// The tiles of a grid.
+#[derive(Clone, Copy, Debug)]
+pub struct Tiling {
+    /// Voxels along each axis.
+    pub shape: [usize; 3],
+    /// Tiles along each axis.
+    pub counts: [usize; 3],
+}
+
+/// A box of tiles: the first tile and the end along each axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TileBox {
+    first: [u16; 3],
+    end: [u16; 3],
+}
+
+impl Tiling {
+    /// Divides a grid with this shape.
+    pub fn new(shape: [usize; 3]) -> Self {
+        Self { shape, counts: std::array::from_fn(|axis| shape[axis].div_ceil(TILE[axis])) }
+    }
+
+    /// Number of tiles.
+    pub fn len(&self) -> usize {
+        self.counts.iter().product()
+    }
+
+    /// Number of a tile.
+    pub fn number(&self, [i, j, k]: [usize; 3]) -> usize {
+        i + self.counts[0] * (j + self.counts[1] * k)
+    }
+
+    /// The voxels of a tile along each axis.
+    pub fn region(&self, tile: [usize; 3]) -> [Range<usize>; 3] {
+        std::array::from_fn(|axis| {
+            let first = tile[axis] * TILE[axis];
+            first..self.shape[axis].min(first + TILE[axis])
+        })
+    }
+
+    /// The tiles that hold voxel centers in a box of continuous indices.
+    #[inline(always)]
+    pub fn touched(&self, low: [f64; 3], high: [f64; 3]) -> TileBox {
+        let mut tiles = TileBox::default();
+        for axis in 0..3 {
+            let last = self.shape[axis] as f64 - 1.0;
+            if high[axis] < 0.0 || low[axis] > last {
+                return TileBox::default();
+            }
+            let tile = |at: f64| (at.clamp(0.0, last) as u32 / TILE[axis] as u32) as u16;
+            tiles.first[axis] = tile(low[axis]);
+            tiles.end[axis] = tile(high[axis]) + 1;
+        }
+        tiles
+    }
+
+    /// Calls `visit` with the number of each tile of a box.
+    #[inline(always)]
+    pub fn each(&self, tiles: &TileBox, mut visit: impl FnMut(usize)) {
+        let [columns, rows, slices] = [0, 1, 2].map(|a| tiles.first[a] as usize..tiles.end[a] as usize);
+        for k in slices {
+            for j in rows.clone() {
+                for i in columns.clone() {
+                    visit(self.number([i, j, k]));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three tiles along the first and the third axis, and one along the second.
+    fn tiling() -> Tiling {
+        Tiling::new([2 * TILE[0] + 2, TILE[1], 2 * TILE[2] + 1])
+    }
+
+    #[test]
+    fn tiles_cover_each_voxel_once() {
+        let tiling = tiling();
+        assert_eq!(tiling.counts, [3, 1, 3]);
+        let mut count = 0;
+        for number in 0..tiling.len() {
+            let tile = [number % 3, number / 3 % tiling.counts[1], number / 3 / tiling.counts[1]];
+            assert_eq!(tiling.number(tile), number);
+            count += tiling.region(tile).iter().map(ExactSizeIterator::len).product::<usize>();
+        }
+        assert_eq!(count, tiling.shape.iter().product());
+    }
+
+    #[test]
+    fn a_box_touches_the_tiles_of_its_voxels() {
+        let tiling = tiling();
+        let [x, y, z] = TILE.map(|length| length as f64);
+        let touched = |low, high| {
+            let mut found = Vec::new();
+            tiling.each(&tiling.touched(low, high), |tile| found.push(tile));
+            found
+        };
+        assert_eq!(touched([-3.0, 2.0, 2.0], [x - 0.1, y + 8.0, 2.0]), [0]);
+        assert_eq!(touched([x - 0.1, 2.0, z - 1.0], [x, 3.0, z]), [0, 1, 3, 4]);
+        assert_eq!(touched([2.0 * x, y - 1.0, 2.0 * z], [900.0, 99.0, 99.0]), [8]);
+        assert!(touched([2.0 * x + 1.1, 0.0, 0.0], [900.0, 1.0, 1.0]).is_empty());
+        assert!(touched([0.0, -2.0, 0.0], [1.0, -0.1, 1.0]).is_empty());
+    }
+}
