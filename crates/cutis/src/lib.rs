@@ -53,7 +53,7 @@ pub use body::{SkinRequest, find_skin};
 pub use cost::{CostPart, CostReport, Plan, check};
 pub use ct::{Inspection, inspect};
 pub use error::Error;
-pub use model::{ScanTension, SceneSystem, build_system};
+pub use model::{ScanTension, SceneCt, SceneSystem, build_system, build_system_and_ct};
 pub use output::{ResampleRequest, report, resample_run};
 pub use progress::{Progress, Silent};
 pub use run::files::RunFolder;

@@ -26,7 +26,7 @@ pub(crate) use choice::{build, fill_defaults, validate};
 pub use constraints::kinds::ScanTension;
 pub(crate) use costs::ModelCosts;
 pub(crate) use scene_system::needs_system;
-pub use scene_system::{SceneSystem, build_system};
+pub use scene_system::{SceneCt, SceneSystem, build_system, build_system_and_ct};
 
 /// The inputs from which a model is built and run.
 #[derive(Clone, Copy)]

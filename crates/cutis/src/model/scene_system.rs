@@ -2,13 +2,17 @@
 //! themselves.
 
 use cutis_mesh::{Frame, Gape};
+use cutis_resample::{ResampleReport, Resampler};
 use cutis_solver::{Settings, System};
+use cutis_volume::Volume;
+use nalgebra::Point3;
 
 use super::constraints::ConstraintModel;
 use super::{ModelChoice, ModelInput};
 use crate::Error;
 use crate::body::{Body, BodySections};
 use crate::ct::source;
+use crate::output::warp_mesh::WarpMesh;
 use crate::scene::LoadedScene;
 
 /// The system that a run of a scene steps, before the first frame.
@@ -44,6 +48,53 @@ pub struct SceneSystem {
 /// The errors that a run of the scene returns before its first frame; [`Error::SceneKey`] for a
 /// model without a system.
 pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
+    Ok(build(loaded)?.0)
+}
+
+/// Does the same as [`build_system`], and also returns the CT, to deform it with the body.
+///
+/// # Errors
+/// The errors of [`build_system`].
+pub fn build_system_and_ct(loaded: &LoadedScene) -> Result<(SceneSystem, SceneCt), Error> {
+    let (system, body, volume) = build(loaded)?;
+    Ok((system, SceneCt { mesh: WarpMesh::new(&body, f64::INFINITY)?, volume }))
+}
+
+/// The CT of a scene, and the mesh through which it is deformed.
+pub struct SceneCt {
+    /// The CT.
+    pub volume: Volume,
+    mesh: WarpMesh,
+}
+
+impl SceneCt {
+    /// A resampler of the CT, for many states of the body.
+    ///
+    /// # Errors
+    /// The errors of [`Resampler::new`].
+    pub fn resampler(&self) -> Result<Resampler<'_>, Error> {
+        Ok(Resampler::new(&self.volume, &self.mesh.warp(&self.mesh.rest))?)
+    }
+
+    /// The positions that the resampler needs, from those of the system: the shell of air around
+    /// the body follows it.
+    ///
+    /// # Panics
+    /// If there are fewer positions than the system has.
+    pub fn follow(&self, positions: &[Point3<f32>]) -> Vec<Point3<f32>> {
+        [positions, &self.mesh.further(positions)].concat()
+    }
+
+    /// Resamples the whole CT once through positions that [`SceneCt::follow`] returned.
+    ///
+    /// # Errors
+    /// The errors of [`cutis_resample::resample`].
+    pub fn resample(&self, deformed: &[Point3<f32>]) -> Result<(Volume, ResampleReport), Error> {
+        Ok(cutis_resample::resample(&self.volume, &self.mesh.warp(deformed), &|_done, _total| {})?)
+    }
+}
+
+fn build(loaded: &LoadedScene) -> Result<(SceneSystem, Body, Volume), Error> {
     needs_system(loaded)?;
     let source = source::load(loaded)?;
     // The system is that of the finished cuts.
@@ -51,7 +102,8 @@ pub fn build_system(loaded: &LoadedScene) -> Result<SceneSystem, Error> {
     let body = Body::build(&sections, &source.volume)?;
     let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body: &body };
     let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?.unchanging()?;
-    Ok(SceneSystem { system, settings, gapes: body.cut.gapes, frame: body.mesh.frame })
+    let (gapes, frame) = (body.cut.gapes.clone(), body.mesh.frame);
+    Ok((SceneSystem { system, settings, gapes, frame }, body, source.volume))
 }
 
 /// Refuses a model that has no system of constraints.

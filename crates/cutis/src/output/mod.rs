@@ -9,6 +9,7 @@ mod skin_lines;
 pub mod step_report;
 pub mod suture_report;
 mod warp;
+pub(crate) mod warp_mesh;
 
 use std::path::Path;
 

@@ -40,7 +40,7 @@ const LINES: Rgb = [20, 50, 120];
 /// The errors of the resampler and the renderer.
 pub(super) fn draw(
     deformed: &DeformedBody<'_>,
-    warp: &BodyWarp<'_>,
+    warp: &BodyWarp,
     after: &Volume,
     stages: &mut Stages,
     progress: &dyn Progress,
@@ -159,7 +159,7 @@ fn depths(
     ct: &Volume,
     air_below_hu: f32,
     [low, high]: [Point3<f64>; 2],
-    warp: &BodyWarp<'_>,
+    warp: &BodyWarp,
     stages: &mut Stages,
     progress: &dyn Progress,
 ) -> Result<(Volume, Volume), Error> {
