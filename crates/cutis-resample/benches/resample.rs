@@ -1,10 +1,11 @@
 //! A volume of 256³ voxels through a lattice of 1.5 million tets on one thread: with all tets
-//! moving, with a ball of moving tets, and with none moving.
+//! moving, with a ball of 100 mm of moving tets, and with none moving. A new output each time, and
+//! updates of a kept output between two states.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use cutis_resample::{Warp, resample};
+use cutis_resample::{Resampler, Warp, resample};
 use cutis_test_kit::{Kuhn, Random};
 use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::{Point3, Vector3};
@@ -40,6 +41,21 @@ fn bench(criterion: &mut Criterion) {
             Warp { origin_mm, rest: &rest, deformed, tets: &tets, body_tets: tets.len(), removed: &[] };
         group.bench_function(*name, |b| {
             b.iter(|| pool.install(|| black_box(resample(&volume, &warp, &|_, _| {}).expect("valid warp"))));
+        });
+    }
+    for (name, deformed) in &cases {
+        let warp =
+            Warp { origin_mm, rest: &rest, deformed, tets: &tets, body_tets: tets.len(), removed: &[] };
+        // The second state is halfway to the first one.
+        let half = rest.iter().zip(deformed).map(|(rest, deformed)| nalgebra::center(rest, deformed));
+        let states = [deformed.clone(), half.collect()];
+        let mut resampler = Resampler::new(&volume, &warp).expect("valid warp");
+        let mut frame = 0;
+        group.bench_function(format!("update, {name}"), |b| {
+            b.iter(|| {
+                frame += 1;
+                pool.install(|| black_box(resampler.update(&states[frame % 2]).expect("valid positions")))
+            });
         });
     }
     group.finish();
