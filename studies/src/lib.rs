@@ -14,6 +14,7 @@ pub mod main_job;
 pub mod mutations;
 pub mod parity;
 pub mod patch;
+pub mod peers;
 pub mod region;
 pub mod sheet;
 pub mod speed;
@@ -37,6 +38,7 @@ mod tests {
             ("main-job", &crate::main_job::TABLES),
             ("parity", &crate::parity::TABLES),
             (crate::patch::PAGE, &crate::patch::TABLES),
+            ("peers", &crate::peers::TABLES),
             ("region", &crate::region::TABLES),
             ("stability", &crate::stability::TABLES),
             ("tuning", &crate::tuning::TABLES),

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
-    accuracy, at_rest, cantilever, chainmail, closing, main_job, mutations, parity, patch, region, speed,
-    stability, tuning, wound,
+    accuracy, at_rest, cantilever, chainmail, closing, main_job, mutations, parity, patch, peers, region,
+    speed, stability, tuning, wound,
 };
 
 /// A study and its options.
@@ -23,6 +23,7 @@ enum Study {
     Mutations(mutations::Options),
     Parity(parity::Options),
     Patch(patch::Options),
+    Peers(peers::Options),
     Region(region::Options),
     Speed(speed::Options),
     Stability(stability::Options),
@@ -42,6 +43,7 @@ impl Study {
             Self::Mutations(options) => mutations::run(options, out),
             Self::Parity(options) => parity::run(options, out),
             Self::Patch(options) => patch::run(options, out),
+            Self::Peers(options) => peers::run(options, out),
             Self::Region(options) => region::run(options, out),
             Self::Speed(options) => speed::run(options, out),
             Self::Stability(options) => stability::run(options, out),

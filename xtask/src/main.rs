@@ -49,6 +49,7 @@ usage: cargo xtask COMMAND
       main-job        the main job on the phantom and on real scans, with and without skin tension
       region          cost and error of a region of interest and of a graded lattice
       tuning          `cutis tune` on the demo, compared with a full run
+      peers           the speed of other programs on the same beam; needs PyPI the first time
       wound           frames of the demo without a cut, with one, and while it grows
       mutations       deliberate faults that a test must see
   accuracy, stability, parity, cantilever, chainmail [OPTIONS]
@@ -92,6 +93,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
     if let Some((name, options)) = study(words) {
         return match (name, &options[..]) {
             ("cantilever", []) => steps::cantilever(&workspace).map(|()| ExitCode::SUCCESS),
+            ("peers", options) => steps::peers(&workspace, options),
             _ => workspace::exit_code(&mut steps::study_command(&workspace, name, &options)),
         };
     }

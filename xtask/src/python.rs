@@ -1,5 +1,5 @@
 //! `cargo xtask python`: runs the checks of `tests/python`, in an environment with pinned packages
-//! in the target folder.
+//! in the target folder. The study `peers` has an environment of its own.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,10 +22,16 @@ pub fn run(workspace: &Workspace) -> Result<()> {
 /// The command of one check in the environment, which is created again only if its requirements
 /// changed.
 pub fn check(workspace: &Workspace, script: &Path) -> Result<Command> {
-    let python = environment(workspace, &workspace.target_dir()?.join("venv"))?;
+    let python = environment(workspace, "venv", "tests/python/requirements.txt", all_or_nothing)?;
     let mut command = workspace.command(&python);
     command.arg(script).env("PYTHONDONTWRITEBYTECODE", "1");
     Ok(command)
+}
+
+/// The interpreter with the programs of the study `peers`. A program that cannot be installed is
+/// reported here, and the study lists it as missing.
+pub fn peers(workspace: &Workspace) -> Result<PathBuf> {
+    environment(workspace, "venv-peers", "studies/python/requirements.txt", one_by_one)
 }
 
 /// The checks: every `*.py` in order of name. They share the `_*.py`, which are not checks.
@@ -45,10 +51,14 @@ fn scripts(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(scripts)
 }
 
-/// The interpreter of the environment in `folder`, which is created if it is missing or out of
-/// date.
-fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
-    let requirements = workspace.root.join("tests/python/requirements.txt");
+/// Installs the packages of a file. Returns whether all of them are installed.
+type Install = fn(&Workspace, python: &Path, requirements: &Path) -> Result<bool>;
+
+/// The interpreter of an environment in the target folder, which is created if it is missing or out
+/// of date.
+fn environment(workspace: &Workspace, name: &str, requirements: &str, install: Install) -> Result<PathBuf> {
+    let folder = workspace.target_dir()?.join(name);
+    let requirements = workspace.root.join(requirements);
     let wanted =
         std::fs::read_to_string(&requirements).with_context(|| requirements.display().to_string())?;
     let version = require(workspace)?;
@@ -59,26 +69,42 @@ fn environment(workspace: &Workspace, folder: &Path) -> Result<PathBuf> {
     if std::fs::read_to_string(&stamp).is_ok_and(|found| found == wanted_stamp) && python.exists() {
         return Ok(python);
     }
-    execute(workspace.command(PYTHON).args(["-m", "venv", "--clear"]).arg(folder))
+    execute(workspace.command(PYTHON).args(["-m", "venv", "--clear"]).arg(&folder))
         .context("cannot create a Python environment; on Debian: apt-get install -y python3-venv")?;
-    execute(
-        workspace
-            .command(&python)
-            .args([
-                "-m",
-                "pip",
-                "install",
-                "--quiet",
-                "--disable-pip-version-check",
-                "--only-binary",
-                ":all:",
-                "-r",
-            ])
-            .arg(&requirements),
-    )
-    .context("cannot install the packages of tests/python/requirements.txt (is PyPI reachable?)")?;
-    std::fs::write(&stamp, wanted_stamp).with_context(|| stamp.display().to_string())?;
+    if install(workspace, &python, &requirements)? {
+        std::fs::write(&stamp, wanted_stamp).with_context(|| stamp.display().to_string())?;
+    }
     Ok(python)
+}
+
+fn pip(workspace: &Workspace, python: &Path) -> Command {
+    let mut command = workspace.command(python);
+    command.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+    command.args(["--only-binary", ":all:"]);
+    command
+}
+
+fn all_or_nothing(workspace: &Workspace, python: &Path, requirements: &Path) -> Result<bool> {
+    execute(pip(workspace, python).arg("-r").arg(requirements)).with_context(|| {
+        format!("cannot install the packages of {} (is PyPI reachable?)", requirements.display())
+    })?;
+    Ok(true)
+}
+
+fn one_by_one(workspace: &Workspace, python: &Path, requirements: &Path) -> Result<bool> {
+    let mut complete = true;
+    for package in packages(&std::fs::read_to_string(requirements)?) {
+        if let Err(error) = execute(pip(workspace, python).arg(package)) {
+            eprintln!("warning: {package} is not installed: {error:#}");
+            complete = false;
+        }
+    }
+    Ok(complete)
+}
+
+/// The lines of a file of requirements without comments.
+fn packages(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'))
 }
 
 /// The name of the interpreter.
@@ -114,6 +140,14 @@ mod tests {
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
         assert_eq!(names, ["awkward.py", "cantilever.py", "outputs.py"]);
+    }
+
+    #[test]
+    fn every_package_of_the_peers_has_a_pinned_version() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../studies/python/requirements.txt");
+        let text = std::fs::read_to_string(file).unwrap();
+        assert!(packages(&text).count() > 4 && packages(&text).all(|package| package.contains("==")));
+        assert_eq!(packages("# a\n\n b==1 \n").collect::<Vec<_>>(), ["b==1"]);
     }
 
     #[test]

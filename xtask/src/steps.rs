@@ -1,11 +1,11 @@
 //! The steps of `cargo xtask test`, in order and timed. The first failure ends the run.
 
-use std::process::Command;
+use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use crate::workspace::{Workspace, execute};
+use crate::workspace::{Workspace, execute, exit_code};
 use crate::{default_features, examples, lanes, miri, publish, python, tidy, tools, vulkan};
 
 struct Step {
@@ -213,6 +213,17 @@ pub fn cantilever(workspace: &Workspace) -> Result<()> {
     command.env("CUTIS_STUDY", &study).arg("--json").arg(&compared);
     execute(vulkan::for_gpu_tests(&mut command))?;
     execute(workspace.command(study).args(["cantilever", "--compared"]).arg(&compared))
+}
+
+/// The study `peers`, with the other programs in an environment of their own.
+pub fn peers(workspace: &Workspace, options: &[&str]) -> Result<ExitCode> {
+    build_studies(workspace, &["--release"])?;
+    let mut command = workspace.command(workspace.study("release")?);
+    command.arg("peers");
+    if !options.contains(&"--help") && !options.contains(&"--python") {
+        command.arg("--python").arg(python::peers(workspace)?);
+    }
+    exit_code(command.args(options))
 }
 
 #[cfg(test)]

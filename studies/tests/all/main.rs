@@ -18,6 +18,7 @@ fn every_study_explains_its_options() {
         "mutations",
         "parity",
         "patch",
+        "peers",
         "region",
         "stability",
         "tuning",
@@ -34,6 +35,7 @@ fn a_wrong_option_ends_with_2_and_a_failed_study_with_1() {
         assert_eq!(study(wrong).status.code(), Some(2), "{wrong:?}");
     }
     assert_eq!(study(&["cantilever"]).status.code(), Some(1));
+    assert_eq!(study(&["peers"]).status.code(), Some(1));
     assert_eq!(study(&["parity", "--quick", "--adapter", "no such adapter"]).status.code(), Some(1));
 }
 
