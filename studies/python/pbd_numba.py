@@ -11,11 +11,14 @@ from _turns import beam_of, parser, take_turns
 OPTIONS = parser(__doc__).parse_args()
 os.environ["NUMBA_NUM_THREADS"] = str(OPTIONS.threads)
 
+# Without this variable, compiled code would lie next to the script.
+CACHE = "NUMBA_CACHE_DIR" in os.environ
+
 import numba  # noqa: E402, because it reads the number of threads when it is imported
 from numba import njit, prange  # noqa: E402
 
 
-@njit
+@njit(cache=CACHE)
 def first_fit(tuples, count):
     """The lowest color for each tuple that no earlier tuple with a common vertex has."""
     taken = np.zeros(count, dtype=np.uint64)
@@ -43,7 +46,7 @@ def grouped(tuples, colors, count):
     return np.ascontiguousarray(tuples[order].astype(np.int32)), starts
 
 
-@njit(parallel=True, fastmath=True)
+@njit(parallel=True, fastmath=True, cache=CACHE)
 def frame(x, old, v, edges, edge_starts, lengths, tets, tet_starts, volumes, iterations, dt, gravity, s):
     """One frame. `x` holds positions and inverse masses, `v` velocities."""
     for i in prange(len(x)):

@@ -45,10 +45,50 @@ pub fn compare(rows: &[Row], agreements: &[Agreement], wrong: &str, wrong_m: f64
     }
 }
 
+/// Largest ratio of the second shortest turn to the shortest.
+const STEADY: f64 = 1.25;
+
+/// Checks that two turns of each program have about the same shortest frame. On a busy machine they
+/// do not: programs whose threads wait for each other then take many times as long, and the ratios
+/// would say nothing.
+pub fn steady(rows: &[Row], checks: &mut Checks) {
+    for row in rows {
+        let Some(found) = row.found() else { continue };
+        let mut turns = found.turns_ms.clone();
+        turns.sort_by(f64::total_cmp);
+        if let [shortest, second, ..] = turns[..] {
+            let spread = second / shortest;
+            checks.add(
+                format!(
+                    "{} ({}), {} vertices: the second shortest turn is {spread:.2} times the shortest, \
+                     at most {STEADY}",
+                    row.name,
+                    row.order.name(),
+                    found.about.vertices,
+                ),
+                spread <= STEADY,
+            );
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::turns::{About, Found};
     use super::*;
+
+    #[test]
+    fn a_single_short_turn_is_not_steady() {
+        let passes = |turns_ms: [f64; 3]| {
+            let mut row = row("other", 1.0);
+            row.found.as_mut().unwrap().turns_ms = turns_ms.into();
+            let mut checks = Checks::default();
+            steady(&[row], &mut checks);
+            checks.pass()
+        };
+        assert!(passes([5.0, 1.2, 1.0]));
+        assert!(!passes([1.3, 1.0, 1.3]) && !passes([f64::NAN, 1.0, f64::NAN]));
+    }
 
     fn row(name: &'static str, sag_m: f64) -> Row {
         let (version, precision) = (String::new(), String::new());

@@ -104,6 +104,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     checks::compare(&rows, &AGREE, "of stiffness 0.8", wrong_m, &mut checks);
     let mut projections = vec![(small, rows)];
     if options.quick {
+        checks::steady(&projections[0].1, &mut checks);
         writeln!(out, "{}", tables::projections(&projections).markdown())?;
         checks.print(out)?;
         return Ok(checks.pass());
@@ -122,6 +123,8 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let [edges, tets] = [Kinds::Edges, Kinds::Tets].map(|kinds| run.projections(Job { kinds, ..large }));
     let large = Job::descent(LARGE, descent_frames);
     descents.push((large, run.descents(large)));
+    let parts = projections.iter().chain(&descents).map(|(_, rows)| rows);
+    parts.chain([&edges, &tets]).for_each(|rows| checks::steady(rows, &mut checks));
 
     let tables = [
         ("pbd", tables::projections(&projections)),

@@ -35,8 +35,11 @@ impl Script {
         let mut command = command(python);
         command.arg(root().join("studies/python").join(name).with_extension("py"));
         command.args(arguments).arg("--wait").env("PYTHONDONTWRITEBYTECODE", "1");
+        for (variable, name) in [("WARP_CACHE_PATH", "warp"), ("NUMBA_CACHE_DIR", "numba")] {
+            command.env(variable, folder.join(name));
+        }
         // MuJoCo writes its warnings into a file in the current folder.
-        command.env("WARP_CACHE_PATH", folder.join("warp")).current_dir(folder);
+        command.current_dir(folder);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(File::create(&errors)?);
         let mut child = command.spawn().with_context(|| format!("cannot start {}", python.display()))?;
         let (input, output) = (child.stdin.take().context("no input")?, child.stdout.take());
