@@ -22,7 +22,8 @@ pub type Corners = [[Each; 3]; 4];
 pub struct Rasters {
     constant: [Each; 4],
     gradient: [[Each; 3]; 4],
-    /// Where rows cross the faces. Row `(j, k)` crosses a face at column `at + by_j · j + by_k · k`.
+    /// Where rows cross the faces. Row `(j, k)` crosses a face at column `at + by_j · j + by_k ·
+    /// k`.
     pub at: [Each; 4],
     pub by_j: [Each; 4],
     pub by_k: [Each; 4],

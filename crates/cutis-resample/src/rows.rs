@@ -1,5 +1,5 @@
-//! The rows of voxel centers that a tet holds. All rows of a tet are intersected with it at once, in
-//! loops that vectorize.
+//! The rows of voxel centers that a tet holds. All rows of a tet are intersected with it at once,
+//! in loops that vectorize.
 
 use std::ops::Range;
 
