@@ -5,7 +5,6 @@ use std::path::Path;
 
 use anyhow::Context;
 use clap::Parser;
-use serde_json::Value;
 
 use crate::kit::{Checks, Failure, Page, Program, Provenance, Table, number_at, results, scene, target_dir};
 

@@ -79,10 +79,13 @@ impl Row {
     }
 }
 
+/// A program that runs, with its result so far.
+type Started = (Box<dyn Program>, Found);
+
 /// Starts all programs and lets them run `turns` times, one after the other. A program whose beam
 /// has other sizes than that of the first program has failed.
 pub fn take(entries: &[Entry<'_>], turns: usize) -> Vec<Row> {
-    let mut programs: Vec<Result<(Box<dyn Program>, Found), String>> =
+    let mut programs: Vec<Result<Started, String>> =
         entries.iter().map(|entry| start(entry).map_err(|error| format!("{error:#}"))).collect();
     let sizes = |about: &About| [about.vertices, about.edges, about.tets];
     let expected = programs.iter().flatten().map(|(_, found)| sizes(&found.about)).next();
@@ -116,7 +119,7 @@ pub fn take(entries: &[Entry<'_>], turns: usize) -> Vec<Row> {
     .collect()
 }
 
-fn start(entry: &Entry<'_>) -> Result<(Box<dyn Program>, Found), Failure> {
+fn start(entry: &Entry<'_>) -> Result<Started, Failure> {
     eprintln!("start: {} ({})", entry.name, entry.order.name());
     let mut program = (entry.start)()?;
     let about = program.about()?;
