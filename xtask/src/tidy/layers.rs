@@ -55,13 +55,7 @@ const LAYERS: &[Layer] = &[
     Layer {
         name: "cutis-resample",
         level: 3,
-        may_use: These(&[
-            "cutis-constraints",
-            "cutis-volume",
-            "cutis-mesh",
-            "cutis-gpu",
-            "cutis-shaders",
-        ]),
+        may_use: These(&["cutis-constraints", "cutis-volume", "cutis-mesh", "cutis-gpu", "cutis-shaders"]),
     },
     Layer {
         name: "cutis-render",
