@@ -36,7 +36,9 @@ fn a_kind_needs_only_its_own_bytes() {
     ];
     assert!(whole.sizes.skin_triangles > 1000);
     for (kind, expected) in kinds {
-        assert_eq!(bytes(&whole, kind), Some(expected), "{kind}");
+        // Up to nine runs of a color take 8 bytes each.
+        let found = bytes(&whole, kind).unwrap();
+        assert!((expected..=expected + 72 * whole.colors[kind]).contains(&found), "{kind}: {found}");
         assert!(!says(&whole.left_out, kind), "{kind} is there: {:?}", whole.left_out);
 
         let mut without = full.clone();

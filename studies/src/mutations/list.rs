@@ -301,10 +301,10 @@ pub const MUTATIONS: &[Mutation] = &[
     ),
     mutation(
         Solver,
-        "projection, Rust, in lanes: every lane has the stiffness of the first",
+        "projection, Rust, in lanes: all groups of lanes have the stiffness of the first one",
         "crates/cutis-solver/src/batch/project.rs",
-        "L::from_lanes(|lane| values[lane])",
-        "L::from_lanes(|_| values[0])",
+        "L::from_slice(&each[first..])",
+        "L::from_slice(each)",
     ),
     mutation(
         Solver,
