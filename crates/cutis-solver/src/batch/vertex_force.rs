@@ -137,8 +137,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
 /// As many numbers as there are lanes, from place `first` on.
 #[inline(always)]
 fn load<L: Lanes<T>, T: Scalar>(numbers: &[T; TEAM], first: usize) -> L {
-    let numbers = &numbers[first..first + L::LANES];
-    L::from_quads(|quad| [0, 1, 2, 3].map(|n| numbers[4 * quad + n]))
+    L::from_slice(&numbers[first..first + L::LANES])
 }
 
 /// Forces on the vertices of a team, number by number.
@@ -165,10 +164,7 @@ impl<T: Scalar> TeamForces<T> {
     fn set_lanes<L: Lanes<T>>(&mut self, first: usize, sum: &VertexForce<L>) {
         let parts = [&sum.force, &sum.diagonal, &sum.mixed];
         for (row, numbers) in self.0.iter_mut().enumerate() {
-            let lanes = parts[row / 3][row % 3];
-            for lane in 0..L::LANES {
-                numbers[first + lane] = lanes.extract(lane);
-            }
+            parts[row / 3][row % 3].write_to(&mut numbers[first..first + L::LANES]);
         }
     }
 }
