@@ -9,6 +9,7 @@ pub mod at_rest;
 pub mod cantilever;
 pub mod chainmail;
 pub mod closing;
+pub mod instructions;
 pub mod kit;
 pub mod main_job;
 pub mod mutations;

@@ -46,6 +46,7 @@ usage: cargo xtask COMMAND
       cantilever      a bent beam and scikit-fem; always writes its page
       chainmail       ChainMail on scans, and position-based dynamics
       closing         what opens a cut, and the force of sutures that close an excision
+      instructions    instructions of the inner loops per constraint, with limits; needs Valgrind
       main-job        the main job on the phantom and on real scans, with and without skin tension
       region          cost and error of a region of interest and of a graded lattice
       tuning          `cutis tune` on the demo, compared with a full run
