@@ -9,8 +9,6 @@ use crate::parity::bench::Failure;
 const MAGIC: &[u8] = b"CUTISCP3";
 /// Length of magic, fingerprint, frame, and number of vertices.
 const HEADER: usize = 8 + 32 + 4 + 8;
-/// Length of the checksum after the state.
-const SEAL: usize = 32;
 
 /// Positions in local meters and velocities in m/s, x, y, z of each vertex in turn.
 pub struct State {
@@ -25,11 +23,14 @@ impl State {
     /// The file does not exist or has another layout.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = std::fs::read(path)?;
-        let numbers = bytes.len().checked_sub(HEADER + SEAL).filter(|n| n % 24 == 0);
-        let (Some(length), true) = (numbers, bytes.starts_with(MAGIC)) else {
+        let count = bytes.get(HEADER - 8..HEADER).and_then(|count| count.try_into().ok());
+        let numbers = count.and_then(|count| usize::try_from(u64::from_le_bytes(count)).ok());
+        // Threads and hooks store further words after the velocities.
+        let length = numbers.and_then(|count| count.checked_mul(24));
+        let state = length.and_then(|length| bytes.get(HEADER..)?.get(..length));
+        let (Some(state), true) = (state, bytes.starts_with(MAGIC)) else {
             bail!("{} is not a checkpoint of the known layout", path.display());
         };
-        let state = &bytes[HEADER..HEADER + length];
         let mut values: Vec<f32> =
             state.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         let velocities = values.split_off(values.len() / 2);
