@@ -301,10 +301,10 @@ pub const MUTATIONS: &[Mutation] = &[
     ),
     mutation(
         Solver,
-        "projection, Rust, in lanes: all groups of lanes have the stiffness of the first one",
+        "projection, Rust, in lanes: every lane has the stiffness of the first",
         "crates/cutis-solver/src/batch/project.rs",
         "L::from_slice(&each[first..])",
-        "L::from_slice(each)",
+        "L::splat(each[first])",
     ),
     mutation(
         Solver,
