@@ -27,7 +27,7 @@ const SCENE: &str = "fixtures/scenes/demo.toml";
 /// Largest relative difference of time and opening from the prediction.
 const TOLERANCE: f64 = 0.2;
 /// Tables of the page.
-pub const TABLES: [&str; 5] = ["provenance", "prediction", "settings", "omissions", "checks"];
+pub const TABLES: [&str; 6] = ["provenance", "prediction", "settings", "regions", "omissions", "checks"];
 
 /// Tunes, runs and compares. Returns whether all checks hold.
 ///
@@ -47,9 +47,11 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     })?;
     let tuning: Value = serde_json::from_slice(&document).context("the calibration is not JSON")?;
     let picked = &tuning["picked"];
+    let region = tuning["regions"].as_array().into_iter().flatten().find(|region| region["picked"] == true);
+    let measured = region.unwrap_or(picked);
     let predicted = TunedRun {
-        ms: number_at(picked, "/ms_per_frame")?,
-        growth_mm: number_at(picked, "/wounds/0/growth_mm")?,
+        ms: number_at(measured, "/ms_per_frame")?,
+        growth_mm: number_at(measured, "/wounds/0/growth_mm")?,
     };
     let found = TunedRun::of_run(&program, &copy, &folder.join("run"), &[])?;
     let one_substep = ["solver.substeps=1".to_owned()];
@@ -59,7 +61,11 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let within = percent(TOLERANCE);
     checks.add(format!("time and opening of the run are within {within}"), found.is_near(&predicted));
     checks.control(format!("one substep is not within {within}"), !control.is_near(&predicted));
-    let mut prediction = Table::new([setting(picked).as_str(), "ms/frame", "growth of the opening, mm"]);
+    let head = match region {
+        None => setting(picked),
+        Some(region) => format!("{}, region of {}", setting(picked), size(region)),
+    };
+    let mut prediction = Table::new([head.as_str(), "ms/frame", "growth of the opening, mm"]);
     for (name, TunedRun { ms, growth_mm }) in
         [("predicted", &predicted), ("full run", &found), ("control: one substep", &control)]
     {
@@ -71,6 +77,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         page.set("provenance", &provenance.markdown())?;
         page.set("prediction", &prediction.markdown())?;
         page.set("settings", &settings(&tuning))?;
+        page.set("regions", &regions(&tuning).markdown())?;
         page.set("omissions", &omissions(&tuning).markdown())?;
         page.set("checks", &checks.summary())?;
         page.save(&results())?;
@@ -126,6 +133,39 @@ fn settings(tuning: &Value) -> String {
         finest.unwrap_or_default(),
         optional(reference["error"].as_f64(), percent),
     )
+}
+
+/// The regions that were tried.
+fn regions(tuning: &Value) -> Table {
+    let mut table = Table::new([
+        "region",
+        "ms/frame",
+        "share of the time",
+        "saved MB",
+        "error of the opening",
+        "growth of the opening, mm",
+        "note",
+    ]);
+    for region in tuning["regions"].as_array().into_iter().flatten() {
+        let note = if region["picked"] == true { "picked" } else { "" };
+        table.add([
+            size(region),
+            optional(region["ms_per_frame"].as_f64(), number),
+            optional(region["time_share"].as_f64(), percent),
+            optional(region["saved_bytes"].as_f64(), |bytes| format!("{:.1}", bytes / 1e6)),
+            optional(region["error"].as_f64(), percent),
+            optional(region["wounds"][0]["growth_mm"].as_f64(), number),
+            region["skipped"].as_str().unwrap_or(note).into(),
+        ]);
+    }
+    table
+}
+
+/// Size of a region, and of its fine zone if its lattice is graded.
+fn size(region: &Value) -> String {
+    let graded = region["grading_mm"].as_f64();
+    let graded = graded.map_or_else(String::new, |mm| format!(", graded from {mm} mm"));
+    format!("{} mm{graded}", region["around_mm"])
 }
 
 /// Cost and effect of each part of the scene.

@@ -25,7 +25,7 @@ fn scene(set: &[(&str, &str)]) -> LoadedScene {
 }
 
 fn options(out: PathBuf, demand: Demand) -> TuneOptions {
-    TuneOptions { demand, out, overwrite: false, minutes: 0.3, omissions: false }
+    TuneOptions { demand, out, overwrite: false, minutes: 0.3, region: false, omissions: false }
 }
 
 /// Options without a time limit.
@@ -193,12 +193,57 @@ fn the_ablation_measures_every_optional_part() {
     let (fine, coarse) = (find("1.25 x"), find("2 x"));
     assert!(0 < fine.saved_bytes && fine.saved_bytes < coarse.saved_bytes);
     assert!(fine.change.unwrap() < 1.0, "the same body moves much alike on another lattice: {fine:?}");
-    let region = find("mm from the action");
-    assert!(region.saved_bytes > 0 && region.change.is_some(), "{region:?}");
     let files: Vec<&str> = tuning.omissions.iter().filter_map(|o| o.what.strip_prefix("output.")).collect();
     assert_eq!(files, ["surface", "volume"]);
     assert!(find("output.volume").saved_bytes > 0 && find("output.volume").saved_ms > Some(0.0));
     assert_eq!(scenes::names(folder.path()), ["tuned.toml"], "outputs that were timed are not kept");
+}
+
+/// The picked region has the opening of the whole body, a run of the tuned scene has the opening of
+/// the trial, and a smaller region opens less.
+#[test]
+fn the_picked_region_opens_as_far_as_the_whole_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let loaded = scene(&[]);
+    let most = 0.25;
+    let out = folder.path().join("tuned.toml");
+    let options = TuneOptions { region: true, minutes: 30.0, ..options(out.clone(), Demand::Error(most)) };
+    let tuning = cutis::tune(&loaded, &options, &Silent).unwrap();
+    let region = tuning.region().expect("a region");
+    assert!(region.error <= Some(most) && region.time_share < Some(1.0), "{region:?}");
+    assert!(region.saved_bytes > 0 && region.tets_share < Some(0.8), "{region:?}");
+    let smaller: Vec<f64> = tuning
+        .regions
+        .iter()
+        .filter(|trial| trial.grading_mm == region.grading_mm && trial.around_mm < region.around_mm)
+        .filter_map(|trial| trial.error)
+        .collect();
+    assert!(smaller.iter().all(|error| *error > most), "{:?}", tuning.regions);
+
+    let tuned = Scene::load(&out, &[]).unwrap();
+    let zone = tuned.scene.lattice.region.as_ref().and_then(|region| region.around_mm);
+    assert_eq!(zone, Some(region.around_mm));
+    let growth = |loaded: &LoadedScene| {
+        let wound = run_in(folder.path(), loaded, false).unwrap().wound.unwrap();
+        wound.final_mm - wound.initial_mm
+    };
+    let opening = growth(&tuned);
+    assert!((opening - region.wounds[0].growth_mm).abs() < 1e-6, "{opening} {region:?}");
+    let mut whole = tuned.clone();
+    whole.scene.lattice = loaded.scene.lattice.clone();
+    let error = (opening / growth(&whole) - 1.0).abs();
+    assert!((error - region.error.unwrap()).abs() < 1e-6, "{error} {region:?}");
+    // Negative control: half of the region does not pass.
+    let mut half = tuned.clone();
+    half.scene.lattice.region.as_mut().unwrap().around_mm = Some(0.4 * region.around_mm);
+    assert!((growth(&half) / growth(&whole) - 1.0).abs() > error);
+
+    // A scene with a region keeps it.
+    let own = scene(&[("lattice.region.around_mm", "70"), ("run.frames", "2")]);
+    let options = TuneOptions { overwrite: true, ..options };
+    let tuning = cutis::tune(&own, &TuneOptions { demand: Demand::Error(0.9), ..options }, &Silent).unwrap();
+    assert_eq!(tuning.regions, []);
+    assert_eq!(Scene::load(&out, &[]).unwrap().scene.lattice, own.scene.lattice);
 }
 
 #[test]

@@ -200,10 +200,13 @@ pub(crate) struct TuneArgs {
     /// Overwrite the copy if it exists
     #[arg(long)]
     pub(crate) force: bool,
+    /// Keep the whole body: do not pick a region around incisions and handles
+    #[arg(long)]
+    pub(crate) whole_body: bool,
     /// Skip the ablation: do not measure the scene without each of its parts
     #[arg(long)]
     pub(crate) settings_only: bool,
-    /// Time limit for picking a setting, minutes; the ablation may take as long again
+    /// Time limit for picking a setting, minutes; region and ablation may each take as long again
     #[arg(long, default_value_t = 5.0)]
     pub(crate) minutes: f64,
 }

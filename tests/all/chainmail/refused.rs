@@ -146,6 +146,7 @@ fn a_chain_has_no_system_to_build_or_to_tune() {
         out: out.path().join("tuned.toml"),
         overwrite: false,
         minutes: 0.1,
+        region: false,
         omissions: false,
     };
     let errors = [cutis::build_system(&loaded).err(), cutis::tune(&loaded, &options, &Silent).err()];

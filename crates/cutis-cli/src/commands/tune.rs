@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cutis::tune::{Candidate, Demand, Omission, WoundError};
+use cutis::tune::{Candidate, Demand, Omission, RegionTrial, WoundError};
 use cutis::{Error, Scene, TuneOptions, Tuning};
 
 use super::pretty;
@@ -22,6 +22,7 @@ pub(super) fn tune(scene: &Path, change: &Change, args: &TuneArgs, json: bool) -
         out,
         overwrite: args.force,
         minutes: args.minutes,
+        region: !args.whole_body,
         omissions: !args.settings_only,
     };
     let tuning = cutis::tune(&loaded, &options, &Terminal::new())?;
@@ -66,6 +67,19 @@ fn tables(tuning: &Tuning) -> String {
         "  > picked, * on the Pareto front (no cheaper setting is as accurate), = the scene's own".into(),
     );
     lines.extend(abandoned(tuning));
+    if !tuning.regions.is_empty() {
+        lines.push("regions around the action, compared with the whole body".into());
+        lines.push(region_row(
+            "",
+            "region",
+            "ms/frame",
+            "time",
+            "MB saved",
+            "error",
+            "difference of the opening",
+        ));
+        lines.extend(tuning.regions.iter().map(region));
+    }
     if !tuning.omissions.is_empty() {
         lines.push("ablation: what the scene saves, and how its result changes, without".into());
         lines.push(omission_row("", "ms/frame", "ms once", "MB", "change", "difference of the opening"));
@@ -116,6 +130,29 @@ fn candidate_row(candidate: &Candidate, tuning: &Tuning) -> String {
 fn difference(wound: &WoundError) -> String {
     let percent = wound.difference_percent.map_or("-".into(), |percent| format!("{percent:+.1} %"));
     format!("{:+.3} mm ({percent})", wound.difference_mm)
+}
+
+fn region(trial: &RegionTrial) -> String {
+    let graded = trial.grading_mm.map_or(String::new(), |mm| format!(", graded from {mm} mm"));
+    let what = format!("{} mm{graded}", trial.around_mm);
+    if let Some(why) = &trial.skipped {
+        return format!("     {what:26} not measured: {why}");
+    }
+    let percent =
+        |share: Option<f64>| share.map(|share| format!("{:.1} %", 100.0 * share)).unwrap_or_default();
+    region_row(
+        if trial.picked { ">" } else { "" },
+        &what,
+        &trial.ms_per_frame.map(|ms| format!("{ms:.2}")).unwrap_or_default(),
+        &percent(trial.time_share),
+        &format!("{:.1}", trial.saved_bytes as f64 / 1e6),
+        &percent(trial.error),
+        &trial.wounds.iter().map(difference).collect::<Vec<_>>().join(", "),
+    )
+}
+
+fn region_row(mark: &str, what: &str, ms: &str, time: &str, saved: &str, error: &str, wound: &str) -> String {
+    format!("{mark:4} {what:26} {ms:>9} {time:>8} {saved:>9} {error:>8}  {wound}").trim_end().to_owned()
 }
 
 fn omission(omission: &Omission) -> String {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::{Desk, SCENE};
 
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 22] = [
     "schema",
     "cutis_version",
     "machine",
@@ -25,6 +25,7 @@ const KEYS: [&str; 21] = [
     "picked.error",
     "scene_file",
     "ledger.parts",
+    "regions",
     "omissions",
 ];
 
@@ -60,9 +61,14 @@ fn tune_prints_its_result_and_writes_a_copy_with_comments() {
     tune(&desk, "--error 40").expect_error(2, &["scene-tuned.toml", "--force", "-o"]);
     tune(&desk, "-o scene.toml --force").expect_error(2, &["scene.toml", "the scene itself"]);
     let done = tune(&desk, "--error 40 --force --settings-only").expect_success();
-    for words in ["reference", "target", "ms/frame", "opening", "> picked", "written:"] {
+    let regions = "regions around the action";
+    for words in ["reference", "target", "ms/frame", "opening", "> picked", regions, "written:"] {
         assert!(done.stdout.contains(words), "no {words:?} in {}", done.stdout);
     }
+    let done = tune(&desk, "--error 40 --force --settings-only --whole-body").expect_success();
+    assert!(!done.stdout.contains(regions), "{}", done.stdout);
+    let copy = std::fs::read_to_string(desk.path("scene-tuned.toml")).unwrap();
+    assert!(!copy.contains("around_mm"), "{copy}");
 }
 
 #[test]

@@ -1,38 +1,28 @@
 //! Ablation: runs the scene without each of its parts and compares the result with the full scene.
 //!
-//! The parts are the constraint kinds, the outputs, the resolution of the lattice, and the tissue
-//! far from incisions and handles. All runs use the picked setting.
+//! The parts are the constraint kinds, the outputs, and the resolution of the lattice. All runs use
+//! the picked setting and the whole body.
 
 use std::path::PathBuf;
 use std::time::Instant;
 
 use cutis_mesh::Lattice;
-use cutis_volume::Volume;
-use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::bench::{Bench, Run};
-use super::field::Field;
-use super::sample::Sampler;
+use super::WoundError;
+use super::baseline::{Baseline, Comparison, Reuse};
 use super::scratch::Scratch;
-use super::{Setting, WoundError};
 use crate::backend::Stages;
-use crate::body::{Body, BodySections, even_shape};
-
-use crate::ct::source::Source;
-use crate::model::ModelInput;
-use crate::model::constraints::ConstraintModel;
+use crate::body::even_shape;
 use crate::output::{self, DeformedBody};
 use crate::report::{KindResidual, Stage};
 use crate::run::clock::Clock;
-use crate::scene::{LatticeSection, LoadedScene, RegionSection, Scene};
+use crate::scene::{LatticeSection, Scene};
 use crate::{Error, Progress};
 
 /// Factors by which coarser lattices are tried.
 const COARSER: [f64; 3] = [1.25, 1.5, 2.0];
-/// Sizes of the region of interest around the action, over the length of the longest incision.
-const AROUND: [f64; 2] = [1.0, 0.5];
 
 /// Savings and changes when one part of the scene is removed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -59,26 +49,15 @@ pub struct Omission {
     pub skipped: Option<String>,
 }
 
-/// The full scene, its body and its run: the baseline of the ablation.
-pub(super) struct Baseline<'a> {
-    pub(super) loaded: &'a LoadedScene,
-    pub(super) source: &'a Source,
-    pub(super) body: &'a Body,
-    pub(super) bench: &'a Bench<'a>,
-    pub(super) setting: Setting,
-    pub(super) run: Run,
-}
-
 impl Baseline<'_> {
     /// Measures all parts, constraint kinds first, within about `limit_s` seconds.
     pub(super) fn omissions(&self, limit_s: f64, clock: &mut Clock<'_>) -> Vec<Omission> {
         let mut list = Vec::new();
         let mut left_s = limit_s;
         for variant in self.variants() {
-            let whole_s = 1e-3 * self.run.ms_per_frame * f64::from(self.bench.frames);
             let named =
                 Omission { what: variant.what.clone(), how: variant.how.clone(), ..Omission::default() };
-            if whole_s * variant.body.share() > left_s {
+            if self.seconds(variant.body) > left_s {
                 list.push(Omission { skipped: Some("no time left; increase --minutes".into()), ..named });
                 continue;
             }
@@ -120,72 +99,20 @@ impl Baseline<'_> {
             let what = format!("lattice resolution ({factor} x coarser)");
             add(what, how, Reuse::Another { share: factor.powi(-3) }, &|s| s.lattice = lattice.clone());
         }
-        if let (None, Some(length)) = (&scene.lattice.region, self.reach_mm()) {
-            for share in AROUND {
-                let around = (share * length).ceil();
-                let region = RegionSection { around_mm: Some(around), min_mm: None, max_mm: None };
-                let what = format!("tissue more than {around} mm from the action");
-                let how = format!("--set lattice.region.around_mm={around}");
-                let body = Reuse::Another { share: self.body.share_around(&scene.handle, around) };
-                add(what, how, body, &|s| s.lattice.region = Some(region.clone()));
-            }
-        }
         list
-    }
-
-    /// Largest distance between points of an incision, or twice the radius of the largest handle,
-    /// mm.
-    fn reach_mm(&self) -> Option<f64> {
-        let scene = &self.loaded.scene;
-        let extent = |path: Vec<[f64; 3]>| {
-            let points = || path.iter().copied().map(Point3::from);
-            points().flat_map(|a| points().map(move |b| nalgebra::distance(&a, &b))).fold(0.0, f64::max)
-        };
-        let incisions = scene.incision.iter().map(|incision| extent(incision.path()));
-        let handles = scene.handle.iter().map(|handle| 2.0 * handle.radius_mm);
-        let excisions = scene.excision.iter().map(|excision| extent(excision.path_mm.clone()));
-        incisions.chain(excisions).chain(handles).reduce(f64::max)
     }
 
     /// Runs a variant.
     fn measure(&self, variant: &Variant, progress: &dyn Progress) -> Result<Omission, Error> {
-        let loaded = LoadedScene { scene: variant.scene.clone(), ..self.loaded.clone() };
-        let other = match variant.body {
-            Reuse::Same => None,
-            Reuse::Another { .. } => Some(Body::build(&BodySections::of(&loaded), self.volume())?),
-        };
-        let body = other.as_ref().unwrap_or(self.body);
-        let input = ModelInput { file: loaded.file(), scene: &loaded.scene, body };
-        let ConstraintModel { system, settings, .. } = ConstraintModel::build(&input)?.unchanging()?;
-        let bench = Bench::new(&system, settings, &body.cut.gapes, self.bench.backend, self.bench.frames);
-        let run = bench.run(self.setting, progress, |_| std::ops::ControlFlow::Continue(()))?;
-        let field = match &other {
-            None => run.at_end().clone(),
-            Some(other) => self.resampled(other, &run.positions),
-        };
-        let whole = self.run.at_end();
-        let rounding_mm = 1e3 * self.bench.movable.rounding();
-        let wound = |(&growth_mm, &with): (&f64, &f64)| WoundError::of(growth_mm, with, rounding_mm);
+        let Comparison { run, change, wounds, .. } = self.compare(&variant.scene, variant.body, progress)?;
         Ok(Omission {
             saved_ms_per_frame: Some(self.run.ms_per_frame - run.ms_per_frame),
             saved_bytes: self.run.bytes as i64 - run.bytes as i64,
-            change: Some(field.rms_to(whole) / whole.rms()),
-            wounds: run.growths_mm.iter().zip(&self.run.growths_mm).map(wound).collect(),
+            change: Some(change),
+            wounds,
             residuals: run.residuals.iter().map(KindResidual::from).collect(),
             ..Omission::default()
         })
-    }
-
-    fn volume(&self) -> &Volume {
-        &self.source.volume
-    }
-
-    /// Displacements of another body at the movable vertices of this one.
-    fn resampled(&self, other: &Body, deformed: &[Point3<f32>]) -> Field {
-        let sampler = Sampler::new(&other.mesh, deformed);
-        let here = &self.body.mesh;
-        let at = |&v: &u32| sampler.displacement(here.frame.to_mm(here.positions[v as usize]));
-        Field(self.bench.movable.vertices().iter().map(at).collect())
     }
 
     /// Cost of each output, from writing all of them once.
@@ -199,7 +126,7 @@ impl Baseline<'_> {
             body: self.body,
             positions: &self.run.positions,
             on_device: None,
-            ct: self.volume(),
+            ct: &self.source.volume,
             scene: &self.loaded.scene,
             frames: self.loaded.scene.run.frames,
         };
@@ -249,25 +176,6 @@ struct Variant {
     scene: Scene,
 }
 
-/// Whether a variant uses the baseline's body.
-#[derive(Clone, Copy)]
-enum Reuse {
-    Same,
-    /// A new body has to be built. Its run is expected to take this share of the baseline's time.
-    Another {
-        share: f64,
-    },
-}
-
-impl Reuse {
-    fn share(self) -> f64 {
-        match self {
-            Self::Same => 1.0,
-            Self::Another { share } => share,
-        }
-    }
-}
-
 /// A lattice with steps longer by `factor`, and the command-line option for it. `built` is the
 /// lattice of `section`.
 fn coarser(section: &LatticeSection, built: &Lattice, factor: f64) -> (LatticeSection, String) {
@@ -292,7 +200,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::body::lattice;
+    use crate::body::{BodySections, lattice};
     use crate::ct::source;
     use crate::scene::Override;
 

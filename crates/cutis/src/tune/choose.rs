@@ -53,6 +53,11 @@ impl Demand {
         0.1 * self.error().unwrap_or(DEFAULT_ERROR)
     }
 
+    /// The error that a region may add to that of the setting.
+    pub(super) fn region_error(self) -> f64 {
+        self.error().unwrap_or(DEFAULT_ERROR)
+    }
+
     /// Index of the picked setting. `own` is the index of the scene's own setting. A setting passes
     /// only if its error plus the reference's uncertainty is below the target. The default target
     /// picks nothing if the reference is hardly finer than the scene.

@@ -40,12 +40,13 @@ impl<'a> SceneCopy<'a> {
         Ok(copy)
     }
 
-    /// Writes a comment, then the scene's text, edited so that it describes `scene`.
+    /// Writes lines of comment, then the scene's text, edited so that it describes `scene`.
     ///
     /// # Errors
     /// [`Error::File`] if the file cannot be written.
-    pub(super) fn write(&self, scene: &Scene, comment: &str) -> Result<(), Error> {
-        files::write(self.path, format!("# {comment}\n{}", self.text(scene)?).as_bytes())
+    pub(super) fn write(&self, scene: &Scene, comment: &[String]) -> Result<(), Error> {
+        let comment: String = comment.iter().map(|line| format!("# {line}\n")).collect();
+        files::write(self.path, (comment + &self.text(scene)?).as_bytes())
     }
 
     fn text(&self, scene: &Scene) -> Result<String, Error> {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Demand, Omission, ReferenceReport, Setting};
+use super::{Demand, Omission, ReferenceReport, RegionTrial, Setting};
 use crate::report::{Backend, Machine, Stage};
 use crate::{CostReport, Error};
 
@@ -40,6 +40,9 @@ pub struct Tuning {
     /// Bytes and time of the picked setting by part; no parts if none was picked.
     #[serde(rename = "ledger")]
     pub costs: CostReport,
+    /// Regions of interest that were tried; empty if none was.
+    #[serde(default)]
+    pub regions: Vec<RegionTrial>,
     /// The ablation: the scene without each of its parts; empty if it was not measured.
     pub omissions: Vec<Omission>,
     /// Warnings for the user.
@@ -110,6 +113,11 @@ impl WoundError {
 }
 
 impl Tuning {
+    /// The region in the tuned scene; none if it has the whole body, or the scene's own region.
+    pub fn region(&self) -> Option<&RegionTrial> {
+        self.regions.iter().find(|trial| trial.picked)
+    }
+
     /// One line that states the error and time of the picked setting.
     pub(super) fn promise(&self, picked: &Candidate) -> String {
         let percent = |share: Option<f64>| 100.0 * share.unwrap_or(f64::NAN);

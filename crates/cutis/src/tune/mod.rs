@@ -8,18 +8,22 @@
 //!    with the reference (`trials`). A candidate is abandoned after a quarter or half of its frames
 //!    if a cheaper one of the same formulation is much more accurate at that point, or if it is
 //!    over budget;
-//! 3. the scene without each of its parts, with the picked setting (`ablation`).
+//! 3. regions of interest around the action, with the picked setting, until one has the opening of
+//!    the whole body (`region`);
+//! 4. the scene without each of its parts, with the picked setting (`ablation`).
 //!
-//! The error and the time of the picked setting come from a complete run. A run of the tuned scene
-//! has the same displacements bit for bit. Its time differs if the machine is busier.
+//! The error and the time of the picked setting and region come from complete runs. A run of the
+//! tuned scene has the same displacements bit for bit. Its time differs if the machine is busier.
 
 mod ablation;
+mod baseline;
 mod bench;
 mod choose;
 mod copy;
 mod document;
 mod field;
 mod reference;
+mod region;
 mod sample;
 mod scratch;
 mod setting;
@@ -40,14 +44,15 @@ use crate::run::prepare::{Prepared, prepare};
 use crate::scene::LoadedScene;
 use crate::{CostReport, Error, Progress};
 
-use ablation::Baseline;
 pub use ablation::Omission;
+use baseline::Baseline;
 use bench::Bench;
 pub use choose::Demand;
 use copy::SceneCopy;
 pub use document::{Candidate, SCHEMA, Tuning, WoundError};
 use reference::Reference;
 pub use reference::ReferenceReport;
+pub use region::RegionTrial;
 pub use setting::Setting;
 use trials::Trials;
 
@@ -67,9 +72,11 @@ pub struct TuneOptions {
     pub out: PathBuf,
     /// Overwrite an existing file.
     pub overwrite: bool,
-    /// Time limit for picking a setting, and again for the ablation, minutes. A run that has
-    /// started is finished, so the total can be longer.
+    /// Time limit for picking a setting, again for the regions, and again for the ablation,
+    /// minutes. A run that has started is finished, so the total can be longer.
     pub minutes: f64,
+    /// Pick a region of interest.
+    pub region: bool,
     /// Measure the scene without each of its parts.
     pub omissions: bool,
 }
@@ -123,6 +130,7 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         picked,
         scene_file: None,
         costs: CostReport { time: "no setting was picked".into(), ..CostReport::default() },
+        regions: Vec::new(),
         omissions: Vec::new(),
         stages: Vec::new(),
     };
@@ -134,17 +142,33 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         let times = clock.stage("parts of a frame", 0, |_| bench.profile(picked.setting))?;
         let how = "one frame of the picked setting, each part timed separately";
         tuning.costs = bench.bytes(picked.setting)?.with_times(&times, 1.0, how);
-        let mut scene = loaded.scene.clone();
-        scene.solver = picked.setting.applied_to(&scene.solver);
-        clock.stage("write the scene", 0, |_| copy.write(&scene, &tuning.promise(picked)))?;
-        tuning.scene_file = Some(options.out.clone());
-        if options.omissions {
-            let run = clock.stage(&format!("{} again", picked.setting), bench.frames.into(), |progress| {
-                bench.run(picked.setting, progress, |_| ControlFlow::Continue(()))
+        let setting = picked.setting;
+        let baseline = if options.region || options.omissions {
+            let run = clock.stage(&format!("{setting} again"), bench.frames.into(), |progress| {
+                bench.run(setting, progress, |_| ControlFlow::Continue(()))
             })?;
             tuning.warnings.extend(unsteady(picked, run.ms_per_frame));
-            let setting = picked.setting;
-            let baseline = Baseline { loaded, source: &source, body: &body, bench: &bench, setting, run };
+            Some(Baseline { loaded, source: &source, body: &body, bench: &bench, setting, run })
+        } else {
+            None
+        };
+        let most = options.demand.region_error();
+        if let Some(baseline) = baseline.as_ref().filter(|_| options.region) {
+            tuning.regions = baseline.regions(most, limit_s, &mut clock);
+        }
+        let mut scene = loaded.scene.clone();
+        scene.solver = setting.applied_to(&scene.solver);
+        let mut promises = vec![tuning.promise(picked)];
+        if let Some(region) = tuning.region() {
+            scene.lattice = region.applied_to(&scene.lattice);
+            promises.push(region.promise());
+        } else if !tuning.regions.is_empty() {
+            let note = format!("no region has an opening within {} % of the whole body", 100.0 * most);
+            tuning.warnings.push(note);
+        }
+        clock.stage("write the scene", 0, |_| copy.write(&scene, &promises))?;
+        tuning.scene_file = Some(options.out.clone());
+        if let Some(baseline) = baseline.filter(|_| options.omissions) {
             tuning.omissions = baseline.omissions(limit_s, &mut clock);
         }
     }

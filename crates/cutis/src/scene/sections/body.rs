@@ -100,6 +100,17 @@ pub struct GradingSection {
 }
 
 impl GradingSection {
+    /// A fine zone within this distance of the action, mm, with the default growth.
+    pub(crate) fn around(mm: f64) -> Self {
+        Self {
+            around_mm: Some(mm),
+            min_mm: None,
+            max_mm: None,
+            growth: Self::default_growth(),
+            coarsest: Self::default_coarsest(),
+        }
+    }
+
     fn default_growth() -> f64 {
         1.5
     }
