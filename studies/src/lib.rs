@@ -16,6 +16,7 @@ pub mod mutations;
 pub mod parity;
 pub mod patch;
 pub mod peers;
+pub mod pictures;
 pub mod region;
 pub mod sheet;
 pub mod speed;

@@ -7,7 +7,7 @@ use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
     accuracy, at_rest, cantilever, chainmail, closing, instructions, main_job, mutations, parity, patch,
-    peers, region, speed, stability, tuning, wound,
+    peers, pictures, region, speed, stability, tuning, wound,
 };
 
 /// A study and its options.
@@ -25,6 +25,7 @@ enum Study {
     Parity(parity::Options),
     Patch(patch::Options),
     Peers(peers::Options),
+    Pictures(pictures::Options),
     Region(region::Options),
     Speed(speed::Options),
     Stability(stability::Options),
@@ -46,6 +47,7 @@ impl Study {
             Self::Parity(options) => parity::run(options, out),
             Self::Patch(options) => patch::run(options, out),
             Self::Peers(options) => peers::run(options, out),
+            Self::Pictures(options) => pictures::run(options, out),
             Self::Region(options) => region::run(options, out),
             Self::Speed(options) => speed::run(options, out),
             Self::Stability(options) => stability::run(options, out),

@@ -51,6 +51,7 @@ usage: cargo xtask COMMAND
       region          cost and error of a region of interest and of a graded lattice
       tuning          `cutis tune` on the demo, compared with a full run
       peers           the speed of other programs on the same beam; needs PyPI the first time
+      pictures        the main job on real scans with the paper's skin tension and with the membrane
       wound           frames of the demo without a cut, with one, and while it grows
       mutations       deliberate faults that a test must see
   accuracy, stability, parity, cantilever, chainmail [OPTIONS]
