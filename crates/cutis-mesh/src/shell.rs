@@ -102,6 +102,7 @@ impl Shell {
         let positions: Vec<Point3<f32>> =
             points.iter().map(|&point| mesh.frame.to_local(lattice.mm(grid.point(point as usize)))).collect();
         let blades = severed.map(|severed| severed.blades.as_slice()).unwrap_or_default();
+        let virtual_nodes = severed.map(|severed| severed.virtual_nodes.as_slice()).unwrap_or_default();
         let reach = longest_edge(lattice);
         let separates = |a: Point3<f32>, b: Point3<f32>| {
             let ends = [a.cast(), b.cast()];
@@ -130,7 +131,7 @@ impl Shell {
         let (enclosed, tets): (Vec<[u32; 4]>, Vec<_>) =
             tets.into_iter().partition(|tet| tet.iter().all(|&v| taken_by(v).is_some()));
         let DividedShell { whole, followers, pieces, mut taken_out } =
-            divide_shell(tets, count, &position, blades, reach);
+            divide_shell(tets, mesh, virtual_nodes, count, &position, blades, reach);
         for tet in enclosed {
             if let Some(blade) = taken_by(tet[0]) {
                 taken_out[blade].push(tet);

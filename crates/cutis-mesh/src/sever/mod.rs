@@ -24,6 +24,7 @@ mod ribbon;
 mod section;
 mod severing;
 mod shell;
+mod shell_nodes;
 mod stations;
 mod surface;
 mod tet_index;

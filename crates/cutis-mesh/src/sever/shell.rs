@@ -5,12 +5,14 @@ use nalgebra::Point3;
 use super::blade::Blade;
 use super::components::{count, parts_of};
 use super::pieces::{Builder, Pieces, unit};
+use super::shell_nodes::{DividedTet, Surroundings, shell_nodes};
 use super::walls::Walls;
+use crate::TetMesh;
 
 /// A vertex that follows others, at the place of a corner on the other side of a cut.
 pub(crate) struct Follower {
     pub rest: Point3<f32>,
-    /// The corners of its tet on its side of the cut.
+    /// The corners on its side of the cut of the tets that share it.
     pub own_side: Vec<u32>,
 }
 
@@ -25,58 +27,64 @@ pub(crate) struct DividedShell {
     pub taken_out: Vec<Vec<[u32; 4]>>,
 }
 
+/// A part of a divided tet.
+struct Part {
+    number: u8,
+    parts: [u8; 4],
+    distances: Vec<[f32; 4]>,
+    /// The blade that takes it out.
+    taken: Option<usize>,
+}
+
 /// Divides the tets of a shell along blades. `vertices` is the number of vertices of mesh and
 /// shell, `position` their rest positions in local meters, and `reach` the longest lattice edge in
-/// m.
+/// m. `virtual_nodes` are those of the divided mesh.
 ///
-/// The part of a tet on one side of a blade moves with its own corners: the other corners are
-/// replaced by followers.
+/// The part of a tet on one side of a blade moves with its own corners. The other corners are
+/// replaced by nodes that it shares with its neighbors on its side: virtual nodes of the mesh, or
+/// followers.
 pub(crate) fn divide_shell(
     tets: Vec<[u32; 4]>,
+    mesh: &TetMesh,
+    virtual_nodes: &[u32],
     vertices: usize,
     position: &dyn Fn(u32) -> Point3<f32>,
     blades: &[Blade],
     reach: f64,
 ) -> DividedShell {
-    let (mut whole, mut followers) = (Vec::new(), Vec::new());
-    let mut copies = Vec::new();
-    for tet in tets {
-        let corners = tet.map(|v| position(v).cast::<f64>());
+    let (mut whole, mut divided, mut copies) = (Vec::new(), Vec::new(), Vec::new());
+    for corners in tets {
+        let places = corners.map(|v| position(v).cast::<f64>());
         let (mut distances, mut severed) = (Vec::new(), 0);
-        for (row, mask) in blades.iter().filter_map(|blade| blade.across(&corners, reach)).take(Walls::MOST) {
+        for (row, mask) in blades.iter().filter_map(|blade| blade.across(&places, reach)).take(Walls::MOST) {
             distances.push(row);
             severed |= mask;
         }
         let parts = parts_of(severed);
         if count(&parts) == 1 {
-            whole.push(tet);
+            whole.push(corners);
             continue;
         }
-        for part in 0..count(&parts) {
-            let own_side: Vec<u32> = (0..4).filter(|&n| parts[n] == part).map(|n| tet[n]).collect();
-            let nodes: [u32; 4] = std::array::from_fn(|n| {
-                if parts[n] == part {
-                    return tet[n];
-                }
-                followers.push(Follower { rest: position(tet[n]), own_side: own_side.clone() });
-                (vertices + followers.len() - 1) as u32
-            });
-            let own = (0..4).find(|&n| parts[n] == part);
-            let taken = own.and_then(|n| blades.iter().position(|blade| blade.encloses(corners[n])));
-            copies.push((nodes, part, parts, distances.clone(), taken));
+        divided.push(DividedTet { corners, parts, first_copy: copies.len() });
+        for number in 0..count(&parts) {
+            let own = (0..4).find(|&n| parts[n] == number);
+            let taken = own.and_then(|n| blades.iter().position(|blade| blade.encloses(places[n])));
+            copies.push(Part { number, parts, distances: distances.clone(), taken });
         }
     }
-    let mut builder = Builder::new(vertices + followers.len());
-    let mut taken = Vec::with_capacity(copies.len());
-    for (number, (nodes, own, parts, distances, gone)) in copies.into_iter().enumerate() {
-        taken.push(gone);
-        let walls = Walls { distances: &distances, parts, kept: u8::MAX };
-        walls.pieces([0, 1, 2, 3].map(unit), |part, piece| {
-            if part == own {
-                builder.push(number, piece, nodes);
+    let around = Surroundings { mesh, virtual_nodes, vertices };
+    let nodes = shell_nodes(&divided, &around);
+    let mut builder = Builder::new(vertices + nodes.followers.len());
+    for (copy, (part, nodes)) in copies.iter().zip(&nodes.copies).enumerate() {
+        let walls = Walls { distances: &part.distances, parts: part.parts, kept: u8::MAX };
+        walls.pieces([0, 1, 2, 3].map(unit), |number, piece| {
+            if number == part.number {
+                builder.push(copy, piece, *nodes);
             }
         });
     }
-    let (pieces, taken_out) = builder.pieces.apart(blades.len(), |copy| taken[copy as usize]);
+    let (pieces, taken_out) = builder.pieces.apart(blades.len(), |copy| copies[copy as usize].taken);
+    let follower = |(vertex, own_side)| Follower { rest: position(vertex), own_side };
+    let followers = nodes.followers.into_iter().map(follower).collect();
     DividedShell { whole, followers, pieces, taken_out }
 }
