@@ -21,6 +21,8 @@ pub struct Options {
 /// Tables of the page.
 pub const TABLES: [&str; 4] = ["provenance", "cuts", "excisions", "checks"];
 
+/// Step of the lattice of the excisions, mm.
+const SPACING_MM: f64 = 4.0;
 /// Half axes of the excised ellipse, mm.
 const HALF_AXES_MM: [f64; 2] = [30.0, 8.0];
 /// Depth of the excision, and of the undermining next to it, mm.
@@ -160,7 +162,9 @@ fn excise(runs: &Runs, half_axes: [f64; 2], undermined_mm: f64, sewn: bool) -> R
     }
     let set = [
         format!("step=[{}]", steps.join(", ")),
-        "lattice.region={ around_mm = 60.0 }".to_owned(),
+        format!(
+            "lattice={{ spacing_mm = {SPACING_MM:.1}, split = 'five', region = {{ around_mm = 60.0 }} }}"
+        ),
         "output={report=true}".to_owned(),
     ];
     let report = runs.program.scene(&scene("excision"), &set, &["--frames", "150"], &runs.folder)?;
