@@ -27,6 +27,7 @@ const STEPS: &[Step] = &[
     Step { name: "no-default-features", quick: false, run: default_features::run },
     Step { name: "third-party", quick: false, run: third_party },
     Step { name: "parity", quick: false, run: parity },
+    Step { name: "instructions", quick: false, run: instructions },
     Step { name: "miri", quick: false, run: miri::run },
     Step { name: "documentation", quick: false, run: documentation },
     Step { name: "python", quick: false, run: python::run },
@@ -186,6 +187,19 @@ fn parity(workspace: &Workspace) -> Result<()> {
         execute(vulkan::for_gpu_tests(command.arg("parity").args(arguments)))?;
     }
     Ok(())
+}
+
+/// Counts the instructions of the inner loops with the program that the step `tests` has built. In
+/// CI Valgrind must be there.
+fn instructions(workspace: &Workspace) -> Result<()> {
+    if !tools::has_valgrind(workspace) {
+        if workspace.ci {
+            bail!("valgrind is missing; on Debian, `apt-get install -y valgrind`");
+        }
+        println!("not counted: valgrind is missing (on Debian, `apt-get install -y valgrind`)");
+        return Ok(());
+    }
+    execute(workspace.command(workspace.study("debug")?).arg("instructions"))
 }
 
 /// Only libraries, because the program `cutis` and the crate `cutis` would write the same page.

@@ -25,6 +25,12 @@ pub fn require_cargo_deny(workspace: &Workspace) -> Result<()> {
     require_subcommand(workspace, "deny", "cargo install --locked cargo-deny")
 }
 
+/// Whether Valgrind is installed.
+pub fn has_valgrind(workspace: &Workspace) -> bool {
+    let found = workspace.command("valgrind").arg("--version").output();
+    found.is_ok_and(|output| output.status.success())
+}
+
 fn require_subcommand(workspace: &Workspace, name: &str, install: &str) -> Result<()> {
     // Not `Workspace::cargo`, whose `--locked` an external subcommand may not accept here.
     let found = workspace.command(Workspace::cargo_program()).args([name, "--version"]).output();
