@@ -1,11 +1,12 @@
-//! `cutis tune` on the demo, and a full run of the tuned scene. The study fails if the run differs
-//! from the prediction.
+//! `cutis tune` on the demo, and full runs of the tuned scene and of the demo with the picked
+//! setting. The study fails if the runs differ from the prediction. The load of the machine
+//! changes, so that the two scenes run in turns, and the ratio of their times counts.
 
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Parser;
 use serde_json::Value;
 
@@ -24,8 +25,10 @@ pub struct Options {
 }
 
 const SCENE: &str = "fixtures/scenes/demo.toml";
-/// Largest relative difference of time and opening from the prediction.
+/// Largest relative difference of the ratio of times and of the openings from the prediction.
 const TOLERANCE: f64 = 0.2;
+/// Runs of each scene, in turns. The shortest mean time of a frame counts.
+const TURNS: usize = 3;
 /// Tables of the page.
 pub const TABLES: [&str; 6] = ["provenance", "prediction", "settings", "regions", "omissions", "checks"];
 
@@ -49,26 +52,44 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let picked = &tuning["picked"];
     let region = tuning["regions"].as_array().into_iter().flatten().find(|region| region["picked"] == true);
     let measured = region.unwrap_or(picked);
-    let predicted = TunedRun {
-        ms: number_at(measured, "/ms_per_frame")?,
-        growth_mm: number_at(measured, "/wounds/0/growth_mm")?,
+    let run_of = |value: &Value| -> Result<TunedRun, Failure> {
+        let growth_mm = number_at(value, "/wounds/0/growth_mm")?;
+        Ok(TunedRun { ms: number_at(value, "/ms_per_frame")?, growth_mm })
     };
-    let found = TunedRun::of_run(&program, &copy, &folder.join("run"), &[])?;
+    let (predicted, predicted_whole) = (run_of(measured)?, run_of(picked)?);
+    let set = solver(picked)?;
     let one_substep = ["solver.substeps=1".to_owned()];
-    let control = TunedRun::of_run(&program, &copy, &folder.join("control"), &one_substep)?;
+    let whole_scene = root().join(SCENE);
+    let jobs: [(&Path, &[String]); 3] = [(&whole_scene, &set), (&copy, &[]), (&copy, &one_substep)];
+    let mut runs: [Option<TunedRun>; 3] = [None, None, None];
+    for _ in 0..TURNS {
+        for (run, (scene, set)) in runs.iter_mut().zip(jobs) {
+            let again = TunedRun::of_run(&program, scene, &folder.join("run"), set)?;
+            *run = Some(run.take().filter(|first| first.ms <= again.ms).unwrap_or(again));
+        }
+    }
+    let [Some(whole), Some(found), Some(control)] = runs else { bail!("no turns") };
 
     let mut checks = Checks::default();
     let within = percent(TOLERANCE);
-    checks.add(format!("time and opening of the run are within {within}"), found.is_near(&predicted));
-    checks.control(format!("one substep is not within {within}"), !control.is_near(&predicted));
+    let share = predicted.ms / predicted_whole.ms;
+    let agrees = |run: &TunedRun| near(run.growth_mm, predicted.growth_mm) && near(run.ms / whole.ms, share);
+    checks.add(format!("share of the time and opening of the run are within {within}"), agrees(&found));
+    let opening = near(whole.growth_mm, predicted_whole.growth_mm);
+    checks.add(format!("the opening of the whole body is within {within}"), opening);
+    checks.control(format!("one substep is not within {within}"), !agrees(&control));
     let head = match region {
         None => setting(picked),
         Some(region) => format!("{}, region of {}", setting(picked), size(region)),
     };
     let mut prediction = Table::new([head.as_str(), "ms/frame", "growth of the opening, mm"]);
-    for (name, TunedRun { ms, growth_mm }) in
-        [("predicted", &predicted), ("full run", &found), ("control: one substep", &control)]
-    {
+    for (name, TunedRun { ms, growth_mm }) in [
+        ("whole body, predicted", &predicted_whole),
+        ("whole body, full run", &whole),
+        ("tuned scene, predicted", &predicted),
+        ("tuned scene, full run", &found),
+        ("control: one substep", &control),
+    ] {
         prediction.add([name.to_owned(), format!("{ms:.1}"), format!("{growth_mm:.4}")]);
     }
     writeln!(out, "{}", prediction.markdown())?;
@@ -98,11 +119,19 @@ impl TunedRun {
         let growth_mm = number_at(&report, "/wound/final_mm")? - number_at(&report, "/wound/initial_mm")?;
         Ok(Self { ms: number_at(&report, "/frames/ms_mean")?, growth_mm })
     }
+}
 
-    fn is_near(&self, other: &Self) -> bool {
-        let near = |a: f64, b: f64| (a / b - 1.0).abs() <= TOLERANCE;
-        near(self.ms, other.ms) && near(self.growth_mm, other.growth_mm)
-    }
+fn near(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() <= TOLERANCE
+}
+
+/// Values for `--set` of a measured setting.
+fn solver(candidate: &Value) -> Result<[String; 4], Failure> {
+    let setting = &candidate["setting"];
+    let formulation = setting["formulation"].as_str().context("no formulation")?;
+    let number = |key: &str| format!("solver.{key}={}", setting[key]);
+    let formulation = format!("solver.formulation={formulation}");
+    Ok([formulation, number("substeps"), number("iterations"), number("relaxation")])
 }
 
 /// The measured settings, the reference, and the number of settings that were not finished.
