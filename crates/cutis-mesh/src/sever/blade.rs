@@ -7,9 +7,11 @@ use nalgebra::{Point3, Vector3};
 
 use super::bowl::Bowl;
 use super::components::EDGES;
+use super::divide::LEAST_CUT;
 use super::pocket::PocketFloor;
 use super::ribbon::Ribbon;
-use super::section::Border;
+use super::section::{Border, Section};
+use super::severing::around_section;
 
 /// A place on the skin that a blade passes, in local meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +58,18 @@ pub struct Blade {
     begins: bool,
 }
 
+/// How a blade cuts a tet.
+pub(super) struct Across {
+    /// Distances of the corners in m.
+    pub distances: [f32; 4],
+    /// The edges between both sides, as a mask.
+    pub apart: u8,
+    /// The edges that the blade severs, as a mask.
+    pub severed: u8,
+    /// Share of the section that is cut.
+    pub cut: f64,
+}
+
 impl Blade {
     /// A blade through stations along a path on the skin, from above the skin to `depth` below it.
     /// Its positive side is on the right of the path, as seen from outside the body: in the
@@ -87,18 +101,28 @@ impl Blade {
         Self { bounds: bowl.bounds(), shape: Arc::new(bowl), length, depth: f64::INFINITY, begins: false }
     }
 
-    /// The distances of four corners in m, if the blade has corners on both sides, and the mask of
-    /// the edges between them that it severs ([`EDGES`]).
-    pub(crate) fn across(&self, corners: &[Point3<f64>; 4], reach: f64) -> Option<([f32; 4], u8)> {
+    /// How the whole blade cuts a tet with these corners. `border` is that of the cut. None if all
+    /// corners are on one side, or if the blade passes beyond its border.
+    pub(super) fn across(&self, corners: &[Point3<f64>; 4], border: &Border, reach: f64) -> Option<Across> {
         let mut distances = [0.0; 4];
         for (distance, &corner) in distances.iter_mut().zip(corners) {
             *distance = signed(self.distance(corner, reach)?);
         }
-        let severed = EDGES.iter().enumerate().fold(0, |mask, (n, &(a, b))| {
-            let crosses = self.crosses([corners[a], corners[b]], [distances[a], distances[b]], reach);
-            mask | u8::from(crosses.is_some()) << n
+        let place = |(a, b): (usize, usize)| {
+            let (d, e) = (f64::from(distances[a]), f64::from(distances[b]));
+            self.place(corners[a] + (corners[b] - corners[a]) * (d / (d - e)), reach)
+        };
+        let places: Option<Vec<[f64; 2]>> = around_section(&distances).into_iter().map(place).collect();
+        let section = Section::new(&places.filter(|places| places.len() > 2)?);
+        let cut = section.cut(border, self.length);
+        let mask = |is_set: &dyn Fn(usize, usize) -> bool| {
+            EDGES.iter().enumerate().fold(0, |mask, (n, &(a, b))| mask | u8::from(is_set(a, b)) << n)
+        };
+        let apart = mask(&|a, b| (distances[a] >= 0.0) != (distances[b] >= 0.0));
+        let severed = mask(&|a, b| {
+            self.crosses([corners[a], corners[b]], [distances[a], distances[b]], reach).is_some()
         });
-        (severed != 0).then_some((distances, severed))
+        (cut >= LEAST_CUT).then_some(Across { distances, apart, severed, cut })
     }
 
     /// Length along the path at which an edge with these distances of its ends is severed. None if

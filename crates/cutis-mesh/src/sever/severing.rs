@@ -220,7 +220,7 @@ pub(super) fn around_section(distances: &[f32; 4]) -> Vec<(usize, usize)> {
 }
 
 /// Smallest step of the lattice in m.
-fn finest_step(mesh: &TetMesh) -> f64 {
+pub(super) fn finest_step(mesh: &TetMesh) -> f64 {
     mesh.lattice.grid().affine.spacing_mm().into_iter().fold(f64::INFINITY, f64::min) / 1000.0
 }
 

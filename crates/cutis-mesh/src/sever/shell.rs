@@ -2,9 +2,11 @@
 
 use nalgebra::Point3;
 
-use super::blade::Blade;
+use super::blade::{Across, Blade};
 use super::components::{count, parts_of};
 use super::pieces::{Builder, Pieces, unit};
+use super::section::Border;
+use super::severing::finest_step;
 use super::shell_nodes::{DividedTet, Surroundings, shell_nodes};
 use super::walls::Walls;
 use crate::TetMesh;
@@ -52,18 +54,23 @@ pub(crate) fn divide_shell(
     blades: &[Blade],
     reach: f64,
 ) -> DividedShell {
+    let borders: Vec<Border> = blades.iter().map(|blade| blade.border(finest_step(mesh))).collect();
     let (mut whole, mut divided, mut copies) = (Vec::new(), Vec::new(), Vec::new());
     for corners in tets {
         let places = corners.map(|v| position(v).cast::<f64>());
-        let (mut distances, mut severed) = (Vec::new(), 0);
-        for (row, mask) in blades.iter().filter_map(|blade| blade.across(&places, reach)).take(Walls::MOST) {
-            distances.push(row);
-            severed |= mask;
-        }
-        let parts = parts_of(severed);
-        if count(&parts) == 1 {
+        let across = blades.iter().zip(&borders);
+        let across = across.filter_map(|(blade, border)| blade.across(&places, border, reach));
+        let across: Vec<Across> = across.take(Walls::MOST).collect();
+        let Some(deepest) = across.iter().max_by(|a, b| a.cut.total_cmp(&b.cut)) else {
             whole.push(corners);
             continue;
+        };
+        // As in the body: one blade divides a tet by the sides of its corners, several divide it by
+        // the edges that they sever.
+        let mut parts = parts_of(across.iter().fold(0, |severed, one| severed | one.severed));
+        let mut distances: Vec<[f32; 4]> = across.iter().map(|one| one.distances).collect();
+        if across.len() == 1 || count(&parts) == 1 {
+            (parts, distances) = (parts_of(deepest.apart), vec![deepest.distances]);
         }
         divided.push(DividedTet { corners, parts, first_copy: copies.len() });
         for number in 0..count(&parts) {
@@ -72,7 +79,7 @@ pub(crate) fn divide_shell(
             copies.push(Part { number, parts, distances: distances.clone(), taken });
         }
     }
-    let around = Surroundings { mesh, virtual_nodes, vertices };
+    let around = Surroundings { whole: &whole, mesh, virtual_nodes, vertices };
     let nodes = shell_nodes(&divided, &around);
     let mut builder = Builder::new(vertices + nodes.followers.len());
     for (copy, (part, nodes)) in copies.iter().zip(&nodes.copies).enumerate() {

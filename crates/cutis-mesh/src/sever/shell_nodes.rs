@@ -3,8 +3,8 @@
 //! As in the body, two parts on both sides of a face share its three corners where tissue passes
 //! through the face. So the shell stays in one piece on each side of a cut, and stays on the body.
 //!
-//! At the end of a cut this is not exact. There the blade divides tets of the body in part, and
-//! those of the shell as a whole or not at all.
+//! Tets that share only an edge are joined through those around it. Where the ring around an edge
+//! is open because its other tets are air, they may come apart at the end of a cut.
 
 use std::collections::HashMap;
 
@@ -31,8 +31,10 @@ pub(super) struct ShellNodes {
     pub followers: Vec<(u32, Vec<u32>)>,
 }
 
-/// The body around the shell.
+/// The tets around the divided ones.
 pub(super) struct Surroundings<'a> {
+    /// The shell tets that no blade divides.
+    pub whole: &'a [[u32; 4]],
     /// The divided mesh of the body.
     pub mesh: &'a TetMesh,
     /// The vertex at the place of each virtual node of the mesh.
@@ -56,7 +58,18 @@ pub(super) fn shell_nodes(divided: &[DividedTet], around: &Surroundings<'_>) -> 
             joined.join_divided(&divided[one], &divided[other]);
         }
     }
-    let copies = &around.mesh.tets[around.mesh.whole_tets()..];
+    let mut near = vec![false; around.vertices];
+    divided.iter().flat_map(|tet| tet.corners).for_each(|v| near[v as usize] = true);
+    let (whole, copies) = around.mesh.tets.split_at(around.mesh.whole_tets());
+    for tet in around.whole.iter().chain(whole) {
+        // At least three corners must be those of divided tets.
+        if tet.iter().filter(|&&v| near[v as usize]).count() < 3 {
+            continue;
+        }
+        for face in faces_of(tet) {
+            faces.get(&face).into_iter().flatten().for_each(|&n| joined.join_whole(&divided[n], face));
+        }
+    }
     let mut of_body: HashMap<[u32; 3], Vec<[u32; 4]>> = HashMap::new();
     for copy in copies {
         for face in faces_of(&copy.map(|node| around.vertex_at(node))) {
@@ -150,6 +163,17 @@ impl Joined {
                 let slot = self.slot(one.copy_at(named), place);
                 let across = self.slot(other.copy_at(across), there);
                 self.classes.join(slot, across);
+            }
+        }
+    }
+
+    /// Joins a divided tet to one with the same face that is not divided.
+    fn join_whole(&mut self, tet: &DividedTet, face: [u32; 3]) {
+        for named in face.into_iter().filter_map(|vertex| tet.place(vertex)) {
+            for vertex in face {
+                if let Some(place) = tet.place(vertex) {
+                    self.join_real(tet.copy_at(named), place, vertex);
+                }
             }
         }
     }
