@@ -1,6 +1,6 @@
 //! `cutis tune` on the demo, and full runs of the tuned scene and of the demo with the picked
 //! setting. The study fails if the runs differ from the prediction. The load of the machine
-//! changes, so that the two scenes run in turns, and the ratio of their times counts.
+//! changes, so that the two scenes run in turns, and the ratio of their times counts too.
 
 use std::fs;
 use std::io::Write;
@@ -75,6 +75,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let share = predicted.ms / predicted_whole.ms;
     let agrees = |run: &TunedRun| near(run.growth_mm, predicted.growth_mm) && near(run.ms / whole.ms, share);
     checks.add(format!("share of the time and opening of the run are within {within}"), agrees(&found));
+    checks.add(format!("time of the run is within {within}"), near(found.ms, predicted.ms));
     let opening = near(whole.growth_mm, predicted_whole.growth_mm);
     checks.add(format!("the opening of the whole body is within {within}"), opening);
     checks.control(format!("one substep is not within {within}"), !agrees(&control));
