@@ -134,8 +134,8 @@ fn the_shell_stays_in_one_piece_on_each_side_of_a_cut() {
                 let mm = mesh.frame.to_mm(at(&rest, v));
                 // At the bottom of the cut tets of the body are divided in part.
                 let inner = mm.z > top.z - 1.9;
-                // Around an edge in the air the shell has no closed ring of tets. With `Five` a
-                // point at the end of a cut can then differ between tets that share only this edge.
+                // With `Five` a few points of the shell alone differ at the ends of a cut. There it
+                // is checked near the surface only.
                 let in_tissue = (mm - (top - Vector3::new(0.0, 0.0, 11.0))).norm() <= 11.0;
                 if inner || (of_shell && in_tissue && split == Split::Kuhn6) {
                     let place = [mm.x, mm.y, mm.z].map(|x| (x * 1e3).round() as i64);
