@@ -112,7 +112,7 @@ impl Cut {
             return Err(MeshError::Undermining { undermining, why });
         }
         if let Some((excision, why)) =
-            pieces.iter().enumerate().find_map(|(n, piece)| Some((n, beyond(&piece.blade)?)))
+            pieces.iter().enumerate().find_map(|(n, piece)| Some((n, piece.blades.iter().find_map(beyond)?)))
         {
             return Err(MeshError::Excision { excision, why });
         }

@@ -7,6 +7,10 @@ use crate::MeshError;
 /// Largest angle in degrees by which a path may turn at a point.
 const SHARPEST_DEG: f64 = 150.0;
 
+/// Least distance of two sides of an outline over the path between them. At an end with the sharpest
+/// possible angle it is 0.259.
+const POINTED: f64 = 0.25;
+
 /// Largest number of points of a path. It limits the time of the checks.
 const MOST_POINTS: usize = 1000;
 
@@ -18,7 +22,7 @@ pub(crate) fn check_path(incision: usize, path_mm: &[[f64; 3]], step_mm: f64) ->
 }
 
 /// Checks that an outline, whose last point is the first one again, does not turn back or cross
-/// itself. Returns what is wrong.
+/// itself. Its two sides may come closer than a step next to a pointed end. Returns what is wrong.
 pub(crate) fn check_outline(path_mm: &[[f64; 3]], step_mm: f64) -> Result<(), String> {
     check(path_mm, step_mm, true, "round it off or make it larger")
 }
@@ -59,7 +63,9 @@ fn check(path_mm: &[[f64; 3]], step_mm: f64, closed: bool, remedy: &str) -> Resu
         };
         for b in (a + 2..segments).filter(|&b| between(b) >= 2.0 * step_mm) {
             let apart = distance([points[a], points[a + 1]], [points[b], points[b + 1]]);
-            if apart < step_mm {
+            // Both sides of a piece may meet at a pointed end.
+            let least = if closed { step_mm.min(POINTED * between(b)) } else { step_mm };
+            if apart < least {
                 return refuse(format!(
                     "segments {a} and {b} come within {apart:.1} mm of each other, less than a lattice step of \
                      {step_mm:.1} mm; {remedy}"
@@ -118,6 +124,23 @@ mod tests {
         // Control: the same shape with its parts farther apart.
         let open = [[0.0; 3], [40.0, 0.0, 0.0], [40.0, 40.0, 0.0], [20.0, 40.0, 0.0], [20.0, 10.0, 0.0]];
         assert!(check_path(0, &open, 4.0).is_ok());
+    }
+
+    /// Controls: a path with the same points, and an outline with a narrow middle.
+    #[test]
+    fn the_sides_of_an_outline_may_meet_at_a_pointed_end() {
+        let lens = |middle: f64| {
+            let side = |sign: f64| {
+                [0.0, 6.0, 12.0, 18.0, 24.0, 30.0, 36.0].map(move |x: f64| {
+                    let half = 0.28 * x.min(36.0 - x);
+                    [x, sign * if x == 18.0 { middle } else { half }, 0.0]
+                })
+            };
+            side(-1.0).into_iter().chain(side(1.0).into_iter().rev().skip(1)).collect::<Vec<[f64; 3]>>()
+        };
+        assert_eq!(check_outline(&lens(5.0), 4.0), Ok(()));
+        assert!(check_path(0, &lens(5.0), 4.0).is_err());
+        assert!(check_outline(&lens(1.0), 4.0).unwrap_err().contains("of each other"));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::incision::Incision;
 use crate::path::check_outline;
-use crate::sever::{Blade, Bowl, longest_edge, stations};
+use crate::sever::{Blade, Bowl, Station, longest_edge, stations};
 use crate::skin_surface::{Facet, SkinSurface};
 use crate::slit::Slit;
 use crate::{Lattice, MeshError};
@@ -23,8 +23,8 @@ pub struct Excision {
 /// An excision placed on the skin at rest.
 #[derive(Clone, Debug)]
 pub struct Piece {
-    /// What cuts.
-    pub(crate) blade: Blade,
+    /// What cuts: the two blades of [`Blade::around`].
+    pub(crate) blades: [Blade; 2],
     /// Segments of the outline.
     pub(crate) outline: Vec<Slit>,
     /// The straight line between the two points of the outline that are farthest apart. The wound
@@ -88,9 +88,13 @@ impl Piece {
         let near = |facet: &&Facet| (facet.center - middle).norm() <= far && facet.faces_out(&axis.inward());
         let facets = surface.facets.iter().filter(near).copied().collect();
         let sizes = [depth_mm / 1000.0, above, margin];
-        let bowl = stations.and_then(|stations| Bowl::new(&stations, facets, sizes, surface.step));
-        let (bowl, length) = bowl.ok_or_else(|| refuse("its outline encloses nothing".to_owned()))?;
-        Ok(Self { blade: Blade::around(bowl, length), outline, axis })
+        let bowl = stations.and_then(|stations| {
+            let ends = [0.0, axis.length()].map(|along| closest(&stations, axis.skin_at(along)));
+            let ends = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+            Bowl::new(&stations, ends, facets, sizes, surface.step)
+        });
+        let bowl = bowl.ok_or_else(|| refuse("its outline encloses nothing".to_owned()))?;
+        Ok(Self { blades: Blade::around(bowl), outline, axis })
     }
 
     /// The straight line between the two points of the outline that are farthest apart.
@@ -100,10 +104,16 @@ impl Piece {
 
     /// Distance in m from a rest position to the walls of the piece, and zero inside it.
     pub fn distance(&self, position: Point3<f32>) -> f64 {
-        let inside = self.blade.encloses(position.cast());
+        let inside = self.blades[0].encloses(position.cast());
         let walls = self.outline.iter().map(|slit| slit.distance(position)).fold(f64::INFINITY, f64::min);
         if inside { 0.0 } else { walls }
     }
+}
+
+/// Number of the station that is closest to a point, of several the first one.
+fn closest(stations: &[Station], to: Point3<f64>) -> usize {
+    let far = |n: &usize| (stations[*n].skin - to).norm_squared();
+    (0..stations.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or_default()
 }
 
 /// The two points that are farthest apart.

@@ -5,13 +5,17 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 
-use super::bowl::Bowl;
+use super::bowl::{Bowl, BowlSide};
 use super::components::EDGES;
 use super::divide::LEAST_CUT;
 use super::pocket::PocketFloor;
 use super::ribbon::Ribbon;
 use super::section::{Border, Section};
 use super::severing::around_section;
+
+/// Width in lattice steps of the border of a blade around a piece. All tissue of the piece comes out,
+/// so the border is sharp.
+const SHARP: f64 = 0.05;
 
 /// A place on the skin that a blade passes, in local meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,8 +58,12 @@ pub struct Blade {
     length: f64,
     /// Depth of the cut in m. Infinite if only the length ends the cut.
     depth: f64,
+    /// Width of the border of the cut in lattice steps.
+    blur: f64,
     /// True if the cut has a border where it begins.
     begins: bool,
+    /// True if this blade and the next one cut a piece out: what is negative for both.
+    pub(super) with_next: bool,
 }
 
 /// How a blade cuts a tet.
@@ -82,7 +90,15 @@ impl Blade {
     /// None if the stations are not a path: fewer than two, or two equal neighbors.
     pub fn along(stations: &[Station], depth: f64, above: f64, margin: f64) -> Option<Self> {
         let (ribbon, length) = Ribbon::along(stations, depth, above, margin)?;
-        Some(Self { bounds: ribbon.bounds(), shape: Arc::new(ribbon), length, depth, begins: true })
+        Some(Self {
+            bounds: ribbon.bounds(),
+            shape: Arc::new(ribbon),
+            length,
+            depth,
+            blur: 1.0,
+            begins: true,
+            with_next: false,
+        })
     }
 
     /// A blade parallel to the skin that cuts from a path outwards, up to `distance` in m.
@@ -92,13 +108,26 @@ impl Blade {
             shape: Arc::new(floor),
             length: distance,
             depth: f64::INFINITY,
+            blur: 1.0,
             begins: false,
+            with_next: false,
         }
     }
 
-    /// A blade around a piece, which it cuts out at once. `length` is that of the outline in m.
-    pub(crate) fn around(bowl: Bowl, length: f64) -> Self {
-        Self { bounds: bowl.bounds(), shape: Arc::new(bowl), length, depth: f64::INFINITY, begins: false }
+    /// The two blades around a piece, which they cut out at once.
+    pub(crate) fn around(bowl: Bowl) -> [Self; 2] {
+        let length = bowl.length();
+        let blade = |(side, with_next): (BowlSide, bool)| Self {
+            bounds: side.bounds(),
+            shape: Arc::new(side),
+            length,
+            depth: f64::INFINITY,
+            blur: SHARP,
+            begins: false,
+            with_next,
+        };
+        let [first, second] = bowl.sides();
+        [(first, true), (second, false)].map(blade)
     }
 
     /// How the whole blade cuts a tet with these corners. `border` is that of the cut. None if all
@@ -183,7 +212,7 @@ impl Blade {
 
     /// The border of the whole cut on a lattice with this step in m.
     pub(super) fn border(&self, step: f64) -> Border {
-        let border = Border::new(self.length, self.depth, step);
+        let border = Border::new(self.length, self.depth, self.blur * step);
         if self.begins { border } else { border.without_start() }
     }
 }

@@ -76,7 +76,9 @@ impl Severing {
             wound.blades.extend(&tet.blades);
             let Divided { tet: number, parts, kept, cut, .. } = *tet;
             let first_copy = wound.copies.len() as u32;
-            wound.split.push(SplitTet { tet: number, parts, kept, first_copy, cut, walls });
+            let around = |pair: &[u32]| pair[1] == pair[0] + 1 && self.blades[pair[0] as usize].with_next;
+            let piece = tet.blades.windows(2).position(around).map(|row| row as u8);
+            wound.split.push(SplitTet { tet: number, parts, kept, first_copy, cut, walls, piece });
             let copy = |of_tet: u8, nodes, share: f64, whole, gone: Option<u32>| TetCopy {
                 tet: number,
                 number: of_tet,
@@ -195,7 +197,7 @@ impl Severing {
             parts = parts_of(EDGES.iter().enumerate().map(apart).fold(0, |mask, bit| mask | bit));
         }
         let distances = distances(&blades);
-        let all = Walls { distances: &distances, parts, kept: 15 };
+        let all = Walls { distances: &distances, parts, kept: 15, piece: None };
         let shares = all.volumes();
         let kept = (0..4).fold(0, |kept, n| kept | u8::from(shares[n] >= LEAST_SHARE) << n);
         let mut volumes = Walls { kept, ..all }.volumes();

@@ -29,8 +29,8 @@ pub struct Severed {
     /// The shapes of the parts of divided tets. They fill the divided tets, but for those that are
     /// taken out.
     pub tet_pieces: Pieces<4>,
-    /// For each piece of the cut: the shapes of the parts of tets that are taken out with it, with
-    /// the corners of `tet_pieces`.
+    /// For each blade: the shapes of the parts of tets that it takes out with a piece, with the
+    /// corners of `tet_pieces`.
     pub taken_out: Vec<Vec<[u32; 4]>>,
     /// The shapes of the copies of skin triangles. Their field `copies` is a number in `copies`.
     pub skin_pieces: Pieces<3>,
@@ -124,11 +124,11 @@ impl Cut {
         }
         let first_piece = blades.len();
         for (number, piece) in self.pieces.iter().enumerate() {
-            if severing.add(mesh, &piece.blade).1 == 0 {
+            if piece.blades.iter().map(|blade| severing.add(mesh, blade).1).sum::<usize>() == 0 {
                 let why = format!("it crosses no edge of the lattice, whose step is {step_mm:.1} mm");
                 return Err(MeshError::Excision { excision: number, why });
             }
-            blades.push(piece.blade.clone());
+            blades.extend(piece.blades.clone());
         }
         let (wound, growth) =
             cut(&mut severing, mesh, triangles).map_err(|error| MeshError::TooManyCuts {
@@ -145,7 +145,8 @@ impl Cut {
         }
         gapes.into_iter().for_each(|(incision, gape)| self.gapes.insert(incision, gape));
         for (number, piece) in self.pieces.iter().enumerate() {
-            let lips = wound.lips(mesh, triangles, &copies, first_piece + number);
+            let of_blade = |side| wound.lips(mesh, triangles, &copies, first_piece + 2 * number + side);
+            let lips = [of_blade(0), of_blade(1)].concat();
             let gape =
                 Gape::of_outline(&rest, &piece.axis, &lips, step).map_err(|_| MeshError::Excision {
                     excision: number,
@@ -153,8 +154,7 @@ impl Cut {
                 })?;
             self.gapes.push(gape);
         }
-        let piece_of = |copy: u32| wound.copies[copy as usize].gone.map(|blade| blade as usize - first_piece);
-        let (tet_pieces, taken_out) = wound.tet_pieces(mesh).apart(self.pieces.len(), piece_of);
+        let (tet_pieces, taken_out) = wound.tet_pieces(mesh, blades.len());
         let replaced: Vec<u32> =
             wound.areas(mesh, triangles).into_iter().map(|triangle| triangle.triangle).collect();
         mesh.divide(&wound);

@@ -36,6 +36,8 @@ pub(super) struct LipSite {
     vertices: [u32; 4],
     /// The edges that whole tets have too, as a mask. Only for tets with a part without a copy.
     firm: u8,
+    /// The edges that pass through a piece which is taken out, as a mask.
+    through: u8,
     walls: Vec<Wall>,
 }
 
@@ -99,6 +101,10 @@ impl Severing {
         let firm = |edge: &(usize, usize)| is_thin && self.whole_volume(mesh, wound, ends(*edge)) > 0.0;
         let firm = (0..).zip(&EDGES).fold(0, |mask, (n, edge)| mask | u8::from(firm(edge)) << n);
         let rows = wound.walls_of(split);
+        let through = split.piece.map_or(0, |row| {
+            let [(_, first), (_, second)] = [0, 1].map(|n| &rows[usize::from(row) + n]);
+            (0..).zip(&EDGES).fold(0, |mask, (n, &edge)| mask | u8::from(passes(first, second, edge)) << n)
+        });
         let alone = rows.len() == 1;
         let wall = |(blade, distances): (u32, [f32; 4])| {
             let severed = (0..).zip(&EDGES).filter_map(|(n, edge)| {
@@ -110,7 +116,7 @@ impl Severing {
             let (normal, area) = section(&corners, &distances)?;
             Some(Wall { blade, distances, normal, area, severed })
         };
-        LipSite { vertices, firm, walls: rows.into_iter().filter_map(wall).collect() }
+        LipSite { vertices, firm, through, walls: rows.into_iter().filter_map(wall).collect() }
     }
 }
 
@@ -189,7 +195,7 @@ impl LipSite {
         for (n, &(a, b)) in (0..).zip(&EDGES) {
             let [low, high] = if self.vertices[a] < self.vertices[b] { [a, b] } else { [b, a] };
             let (wall, [own, other], part) = match (held[a], held[b]) {
-                (Some(own), Some(other)) if own != other => {
+                (Some(own), Some(other)) if own != other && self.through >> n & 1 == 0 => {
                     let Some(wall) = self.wall(n, (a, b), reached) else { continue };
                     let (d, e) = (f64::from(wall.distances[low]), f64::from(wall.distances[high]));
                     (wall, [own, other], (d / (d - e)) as f32)
@@ -227,6 +233,17 @@ impl LipSite {
         let begun = |wall: &&Wall| reached[wall.blade as usize] > 0.0;
         dividing.clone().find(passed).or_else(|| dividing.find(begun))
     }
+}
+
+/// Whether an edge is negative in its middle part for both of two blades, and not at its ends.
+fn passes(first: &[f32; 4], second: &[f32; 4], (a, b): (usize, usize)) -> bool {
+    let differ = |distances: &[f32; 4]| (distances[a] >= 0.0) != (distances[b] >= 0.0);
+    let inside = |n: usize| first[n] < 0.0 && second[n] < 0.0;
+    let at_zero = || {
+        let part = f64::from(first[a]) / (f64::from(first[a]) - f64::from(first[b]));
+        f64::from(second[a]) + part * (f64::from(second[b]) - f64::from(second[a]))
+    };
+    differ(first) && differ(second) && !inside(a) && !inside(b) && at_zero() < 0.0
 }
 
 /// Unit normal and area in m² of the section on which the linear interpolation of distances is

@@ -79,18 +79,30 @@ impl Wound {
         mesh.positions.len() + self.virtual_nodes.len()
     }
 
-    /// The parts of all divided tets as tets.
-    pub fn tet_pieces(&self, mesh: &TetMesh) -> Pieces<4> {
+    /// The parts of all divided tets as tets, and for each of `blades` blades those that it takes
+    /// out of the body.
+    pub(super) fn tet_pieces(&self, mesh: &TetMesh, blades: usize) -> (Pieces<4>, Vec<Vec<[u32; 4]>>) {
         let mut builder = Builder::new(self.nodes(mesh));
+        // What is taken out and has no copy has the number of its blade, after all copies.
+        let all = self.copies.len();
         for split in &self.split {
             let corners = [0, 1, 2, 3].map(unit);
+            let out = split.piece.map(|row| self.blades[split.walls.0 as usize + usize::from(row)]);
             self.walls(split).pieces(corners, |part, piece| {
-                if let Some(copy) = self.copy_of(split, part) {
-                    builder.push(copy, piece, self.copies[copy].nodes);
+                let copy = part.and_then(|part| self.copy_of(split, part));
+                match (copy, out) {
+                    (Some(copy), _) => builder.push(copy, piece, self.copies[copy].nodes),
+                    (None, Some(blade)) if part.is_none() => {
+                        builder.push(all + blade as usize, piece, mesh.tets[split.tet as usize]);
+                    }
+                    _ => {}
                 }
             });
         }
-        builder.pieces
+        builder.pieces.apart(blades, |copy| match self.copies.get(copy as usize) {
+            Some(copy) => copy.gone.map(|blade| blade as usize),
+            None => Some(copy as usize - all),
+        })
     }
 
     /// The parts of the skin triangles that `copies` ([`Wound::skin`]) name, as triangles.
@@ -104,7 +116,7 @@ impl Wound {
                 unit(corners.iter().position(|&corner| corner == v).expect("the face is one of the tet"))
             });
             self.walls(split).pieces(triangle, |part, piece| {
-                if Some(part) == own.part
+                if let Some(part) = part.filter(|_| part == own.part)
                     && let Some(copy) = self.copy_of(split, part)
                 {
                     builder.push(number, piece, self.copies[copy].nodes);

@@ -33,6 +33,8 @@ pub(super) struct Sides {
     pub sections: Vec<TetSection>,
     /// Vertices in the piece that the blade cuts out, in ascending order.
     pub inside: Vec<u32>,
+    /// True if this blade and the next one cut a piece out: what is negative for both.
+    pub with_next: bool,
     /// Length of the blade's path in m.
     pub length: f64,
     /// The border of the whole cut.
@@ -110,7 +112,9 @@ impl Severing {
         };
         let inside = mesh.positions.par_iter().enumerate().filter_map(inside).collect();
         let (crossings, sections) = (Vec::new(), Vec::new());
-        let mut sides = Sides { near, crossings, sections, inside, length, border, reached: 0.0, cut: 0 };
+        let with_next = blade.with_next;
+        let mut sides =
+            Sides { near, crossings, sections, inside, with_next, length, border, reached: 0.0, cut: 0 };
         let of_vertex =
             |&(vertex, distance): &(u32, f32)| self.crossings(mesh, blade, &sides, vertex, distance, reach);
         let mut crossings: Vec<Crossing> = sides.near.par_iter().flat_map_iter(of_vertex).collect();

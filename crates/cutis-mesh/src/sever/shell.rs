@@ -36,6 +36,8 @@ struct Part {
     distances: Vec<[f32; 4]>,
     /// The blade that takes it out.
     taken: Option<usize>,
+    /// The first of two rows of distances around a piece, and its blade.
+    piece: Option<(u8, usize)>,
 }
 
 /// Divides the tets of a shell along blades. `vertices` is the number of vertices of mesh and
@@ -58,9 +60,10 @@ pub(crate) fn divide_shell(
     let (mut whole, mut divided, mut copies) = (Vec::new(), Vec::new(), Vec::new());
     for corners in tets {
         let places = corners.map(|v| position(v).cast::<f64>());
-        let across = blades.iter().zip(&borders);
-        let across = across.filter_map(|(blade, border)| blade.across(&places, border, reach));
-        let across: Vec<Across> = across.take(Walls::MOST).collect();
+        let across = blades.iter().zip(&borders).enumerate();
+        let across =
+            across.filter_map(|(n, (blade, border))| Some((n, blade.across(&places, border, reach)?)));
+        let (numbers, across): (Vec<usize>, Vec<Across>) = across.take(Walls::MOST).unzip();
         let Some(deepest) = across.iter().max_by(|a, b| a.cut.total_cmp(&b.cut)) else {
             whole.push(corners);
             continue;
@@ -69,28 +72,38 @@ pub(crate) fn divide_shell(
         // the edges that they sever.
         let mut parts = parts_of(across.iter().fold(0, |severed, one| severed | one.severed));
         let mut distances: Vec<[f32; 4]> = across.iter().map(|one| one.distances).collect();
+        let around = |pair: &[usize]| pair[1] == pair[0] + 1 && blades[pair[0]].with_next;
+        let mut piece = numbers.windows(2).position(around).map(|row| (row as u8, numbers[row]));
         if across.len() == 1 || count(&parts) == 1 {
-            (parts, distances) = (parts_of(deepest.apart), vec![deepest.distances]);
+            (parts, distances, piece) = (parts_of(deepest.apart), vec![deepest.distances], None);
         }
         divided.push(DividedTet { corners, parts, first_copy: copies.len() });
         for number in 0..count(&parts) {
             let own = (0..4).find(|&n| parts[n] == number);
             let taken = own.and_then(|n| blades.iter().position(|blade| blade.encloses(places[n])));
-            copies.push(Part { number, parts, distances: distances.clone(), taken });
+            copies.push(Part { number, parts, distances: distances.clone(), taken, piece });
         }
     }
     let around = Surroundings { whole: &whole, mesh, virtual_nodes, vertices };
     let nodes = shell_nodes(&divided, &around);
     let mut builder = Builder::new(vertices + nodes.followers.len());
     for (copy, (part, nodes)) in copies.iter().zip(&nodes.copies).enumerate() {
-        let walls = Walls { distances: &part.distances, parts: part.parts, kept: u8::MAX };
-        walls.pieces([0, 1, 2, 3].map(unit), |number, piece| {
-            if number == part.number {
-                builder.push(copy, piece, *nodes);
+        let first_row = part.piece.map(|(row, _)| row);
+        let walls = Walls { distances: &part.distances, parts: part.parts, kept: u8::MAX, piece: first_row };
+        walls.pieces([0, 1, 2, 3].map(unit), |number, piece| match (number, part.piece) {
+            (Some(number), _) if number == part.number => builder.push(copy, piece, *nodes),
+            // What is taken out and has no corner goes with the first part.
+            (None, Some((_, blade))) if part.number == 0 => {
+                builder.push(copies.len() + blade, piece, *nodes);
             }
+            _ => {}
         });
     }
-    let (pieces, taken_out) = builder.pieces.apart(blades.len(), |copy| copies[copy as usize].taken);
+    let taken = |copy: u32| match copies.get(copy as usize) {
+        Some(part) => part.taken,
+        None => Some(copy as usize - copies.len()),
+    };
+    let (pieces, taken_out) = builder.pieces.apart(blades.len(), taken);
     let follower = |(vertex, own_side)| Follower { rest: position(vertex), own_side };
     let followers = nodes.followers.into_iter().map(follower).collect();
     DividedShell { whole, followers, pieces, taken_out }

@@ -19,6 +19,9 @@ pub struct Walls<'a> {
     pub parts: [u8; 4],
     /// One bit for each part that has a copy.
     pub kept: u8,
+    /// The first of two rows of distances around a piece that is taken out: the piece is where both
+    /// are negative.
+    pub piece: Option<u8>,
 }
 
 /// The side of each blade on which a point is, one bit per blade. Zero is on the positive side.
@@ -45,7 +48,20 @@ impl Walls<'_> {
         usable.max_by(better).map_or(0, |n| self.parts[n])
     }
 
-    /// Share of the tet's volume that each part has. The shares of the kept parts sum to 1.
+    /// As [`Walls::owner`], but None where the piece that is taken out lies between two walls in the
+    /// tet and none of the corners is in it. There the piece is thinner than the tet.
+    pub fn holder(&self, point: &Barycentric) -> Option<u8> {
+        let out = |row: u8| {
+            let is_inside = |sides: Sides| sides >> row & 0b11 == 0;
+            let at_corner = |n: usize| self.sides(|distances| f64::from(distances[n]));
+            is_inside(self.sides(|distances| weighted(distances, point)))
+                && !(0..4).any(|n| is_inside(at_corner(n)))
+        };
+        (!self.piece.is_some_and(out)).then(|| self.owner(point))
+    }
+
+    /// Share of the tet's volume that each part has. What lies between two walls and has no corner
+    /// counts with a part next to it. The shares of the kept parts sum to 1.
     pub fn volumes(&self) -> [f64; 4] {
         let unit = |n: usize| std::array::from_fn(|axis| f64::from(u8::from(axis == n)));
         let corners: [Barycentric; 4] = [unit(0), unit(1), unit(2), unit(3)];
@@ -69,15 +85,25 @@ impl Walls<'_> {
         size: impl Fn(&[Barycentric; N]) -> f64,
     ) -> [f64; 4] {
         let mut shares = [0.0; 4];
-        self.pieces(simplex, |part, piece| shares[usize::from(part)] += size(piece));
+        self.divided(simplex, |middle, piece| shares[usize::from(self.owner(middle))] += size(piece));
         shares
     }
 
-    /// Divides a simplex along the walls and calls `visit(part, piece)` for each piece.
+    /// Divides a simplex along the walls and calls `visit(part, piece)` for each piece. The part is
+    /// that of [`Walls::holder`].
     pub fn pieces<const N: usize>(
         &self,
         simplex: [Barycentric; N],
-        mut visit: impl FnMut(u8, &[Barycentric; N]),
+        mut visit: impl FnMut(Option<u8>, &[Barycentric; N]),
+    ) {
+        self.divided(simplex, |middle, piece| visit(self.holder(middle), piece));
+    }
+
+    /// Divides a simplex along the walls and calls `visit(middle, piece)` for each piece.
+    fn divided<const N: usize>(
+        &self,
+        simplex: [Barycentric; N],
+        mut visit: impl FnMut(&Barycentric, &[Barycentric; N]),
     ) {
         let mut stack = vec![(simplex, 0)];
         while let Some((piece, blade)) = stack.pop() {
@@ -87,7 +113,7 @@ impl Walls<'_> {
                     let middle = std::array::from_fn(|axis| {
                         piece.iter().map(|corner| corner[axis]).sum::<f64>() / N as f64
                     });
-                    visit(self.owner(&middle), &piece);
+                    visit(&middle, &piece);
                 }
             }
         }
@@ -163,7 +189,7 @@ mod tests {
     use crate::sever::components::parts_of;
 
     fn walls<'a>(distances: &'a [[f32; 4]], severed: u8) -> Walls<'a> {
-        Walls { distances, parts: parts_of(severed), kept: 15 }
+        Walls { distances, parts: parts_of(severed), kept: 15, piece: None }
     }
 
     #[test]

@@ -52,6 +52,8 @@ pub struct SplitTet {
     pub cut: f64,
     /// Blades: first row of the distances, and number of rows.
     pub(super) walls: (u32, u8),
+    /// The first of two of these rows around a piece, as in [`Walls::piece`].
+    pub(super) piece: Option<u8>,
 }
 
 /// A copy of a tet.
@@ -125,7 +127,8 @@ impl Wound {
     /// The walls in a divided tet.
     pub fn walls(&self, split: &SplitTet) -> Walls<'_> {
         let (first, count) = (split.walls.0 as usize, usize::from(split.walls.1));
-        Walls { distances: &self.distances[first..first + count], parts: split.parts, kept: split.kept }
+        let SplitTet { parts, kept, piece, .. } = *split;
+        Walls { distances: &self.distances[first..first + count], parts, kept, piece }
     }
 
     /// The blades in a divided tet, with the distances of its corners.

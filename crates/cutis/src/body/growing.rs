@@ -35,7 +35,8 @@ impl Timing {
         let incisions = scene.incision.iter().filter(|section| section.width_mm.is_none());
         let incisions = incisions.map(|section| timing(section.at_s, section.speed_mm_s));
         let underminings = scene.undermining.iter().map(|section| timing(section.at_s, section.speed_mm_s));
-        let excisions = scene.excision.iter().map(|section| timing(section.at_s, None));
+        // Two blades cut a piece out.
+        let excisions = scene.excision.iter().flat_map(|section| [timing(section.at_s, None); 2]);
         incisions.chain(underminings).chain(excisions).collect()
     }
 

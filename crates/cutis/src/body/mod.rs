@@ -156,8 +156,8 @@ impl Body {
     /// taken out later is in its place. If a piece is out from the start, none is in its place.
     pub(crate) fn skin_at_start(&self) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
         let finished = self.finished_cuts(0.0);
-        // The blades of pieces come last.
-        let pieces = &finished[finished.len() - self.cut.pieces.len()..];
+        // The blades of pieces come last, two for each.
+        let pieces = &finished[finished.len() - 2 * self.cut.pieces.len()..];
         if pieces.is_empty() || pieces.contains(&true) {
             return self.whole_skin(&self.mesh.positions);
         }

@@ -48,11 +48,10 @@ impl WarpMesh {
         // Pieces are out when their blades have cut to their ends.
         let [at_start, at_end] = [0.0, time_s].map(|time_s| body.finished_cuts(time_s));
         let (at_start, at_end) = (at_start.as_slice(), at_end.as_slice());
-        let pieces = body.severed.as_ref().map_or(&[][..], |severed| &severed.taken_out);
-        let first_piece = shell.taken_out.len() - pieces.len();
+        let in_body = body.severed.as_ref().map_or(&[][..], |severed| &severed.taken_out);
         let tets_of = |blade: usize| {
-            let piece = blade.checked_sub(first_piece).map_or(&[][..], |piece| &pieces[piece]);
-            (piece.iter().map(behind), shell.taken_out[blade].iter().map(in_shell))
+            let in_body = in_body.get(blade).map_or(&[][..], |tets| tets);
+            (in_body.iter().map(behind), shell.taken_out[blade].iter().map(in_shell))
         };
         let blades = || 0..shell.taken_out.len();
         let kept = || blades().filter(|&blade| !at_end[blade]).map(tets_of);
