@@ -180,6 +180,10 @@ fn sutures_that_are_not_possible_are_refused() {
     refused(CUT, &own(", bite_mm = -1"), ["suture[0].bite_mm", "-1"]);
     refused(CUT, &own(", tighten_to = 1.5"), ["suture[0].tighten_to", "at most 1"]);
     refused(CUT, &own(", at_s = 1.0, release_s = 0.5"), ["suture[0].release_s", "after at_s"]);
+    refused(CUT, &own(", depth_mm = -1"), ["suture[0].depth_mm", "-1"]);
+    refused(CUT, &own(", depth_mm = 50"), ["suture[0].depth_mm", "less than the depth of the wound"]);
+    let pairs = "[{ wound = 0, pairs_mm = [[[0, 102, -5], [0, 102, 5]]], depth_mm = 3 }]";
+    refused(CUT, pairs, ["suture[0].depth_mm", "next to pairs_mm"]);
     // No skin lies half a meter from the incision.
     refused(CUT, &own(", bite_mm = 500.0"), ["suture[0]", "has no skin"]);
 }

@@ -49,7 +49,7 @@ pub use select::HalfSpace;
 pub use shell::Shell;
 pub use skin::{Skin, SkinMode, SkinOptions, SkinReport};
 pub use slit::Slit;
-pub use stitch::Stitch;
+pub use stitch::{Stitch, Stitching};
 pub use surface::Topology;
 pub use tissue_mask::{InactiveSkin, InactiveTissue, TissueMask};
 

@@ -1,4 +1,4 @@
-//! Stitches across a wound: pairs of points of the skin.
+//! Stitches across a wound: pairs of points of the skin, or of tissue below it.
 
 use nalgebra::{Point3, Vector3, distance};
 
@@ -11,10 +11,22 @@ use crate::{Cut, MeshError, TetMesh};
 /// Largest number of stitches of a wound.
 const MOST_STITCHES: f64 = 1000.0;
 
-/// A stitch: a point of the skin on the left side of a wound, and one on its right side.
+/// Where stitches along a wound are. All lengths are in m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stitching {
+    /// Distance from one stitch to the next.
+    pub every: f64,
+    /// Distance of the ends of a stitch from the edge of the wound.
+    pub bite: f64,
+    /// Depth of the ends below the skin. 0: on the skin.
+    pub depth: f64,
+}
+
+/// A stitch: a point on the left side of a wound, and one on its right side. They lie on the skin,
+/// or below it on faces of tets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stitch {
-    /// The triangles of the two points, in mesh vertices. They share no vertex.
+    /// The triangles on which the two points lie, in mesh vertices. They share no vertex.
     pub triangles: [[u32; 3]; 2],
     /// Weights of the second and third corner of each triangle.
     pub weights: [[f64; 2]; 2],
@@ -32,22 +44,22 @@ impl Stitch {
     }
 }
 
-/// A point of the skin that is close to a wanted one.
+/// A point that is close to a wanted one.
 struct End {
     triangle: [u32; 3],
     weights: [f64; 3],
     point: Point3<f64>,
 }
 
-/// The skin on which stitches end.
-struct Skin<'a> {
+/// The triangles on which stitches end: the skin, or faces of tets.
+struct Tissue<'a> {
     mesh: &'a TetMesh,
-    triangles: Vec<&'a [u32; 3]>,
+    triangles: Vec<[u32; 3]>,
     /// Largest distance of an end from its wanted place, in m.
     reach: f64,
 }
 
-impl Skin<'_> {
+impl Tissue<'_> {
     fn corners(&self, triangle: &[u32; 3]) -> [Point3<f32>; 3] {
         triangle.map(|v| self.mesh.positions[v as usize])
     }
@@ -68,7 +80,7 @@ impl Skin<'_> {
                 .iter()
                 .zip(weights)
                 .fold(Vector3::zeros(), |sum, (corner, w)| sum + corner.coords * w);
-            End { triangle: **triangle, weights, point: Point3::from(sum) }
+            End { triangle: *triangle, weights, point: Point3::from(sum) }
         });
         let far = |end: &End| distance(&end.point, &wanted);
         let near = ends.filter(|end| far(end) <= self.reach && fits(end.point));
@@ -93,25 +105,31 @@ fn count(length: f64, every: f64) -> Result<usize, f64> {
 }
 
 impl Cut {
-    fn skin_near<'a>(
+    /// The skin near a wound, or the faces of whole tets near it if the stitches lie below the skin.
+    fn tissue_near<'a>(
         mesh: &'a TetMesh,
-        skin: &'a [[u32; 3]],
+        skin: &[[u32; 3]],
         bite: f64,
+        depth: f64,
         near: impl Fn(Point3<f32>, f64) -> bool,
-    ) -> Skin<'a> {
+    ) -> Tissue<'a> {
         // The skin may be bent, and its triangles are those of the lattice.
         let reach = 2.0 * mesh.lattice.longest_step_mm() / 1000.0 + 0.25 * bite;
-        let corner = |triangle: &[u32; 3]| mesh.positions[triangle[0] as usize];
-        let triangles = skin.iter().filter(|triangle| near(corner(triangle), bite + 2.0 * reach)).collect();
-        Skin { mesh, triangles, reach }
+        let is_near = |vertex: u32| near(mesh.positions[vertex as usize], bite + depth + 2.0 * reach);
+        let triangles = if depth > 0.0 {
+            let tets = mesh.tets[..mesh.whole_tets()].iter().filter(|tet| is_near(tet[0]));
+            tets.flat_map(|&[a, b, c, d]| [[a, b, c], [a, b, d], [a, c, d], [b, c, d]]).collect()
+        } else {
+            skin.iter().filter(|triangle| is_near(triangle[0])).copied().collect()
+        };
+        Tissue { mesh, triangles, reach }
     }
 
     /// Stitches along an incision at equal distances of about `every`. Their ends are about `bite`
-    /// from the incision, both in m. `skin` holds triangles of the mesh, none of them divided by a
-    /// cut.
+    /// from the incision. `skin` holds triangles of the mesh, none of them divided by a cut.
     ///
     /// # Errors
-    /// [`MeshError::StitchOffSkin`] if a stitch has no skin near one of its ends, or if no cut is
+    /// [`MeshError::StitchOffSkin`] if a stitch has no tissue near one of its ends, or if no cut is
     /// between them. [`MeshError::TooManyStitches`] for more than 1000.
     ///
     /// # Panics
@@ -121,9 +139,9 @@ impl Cut {
         incision: usize,
         mesh: &TetMesh,
         skin: &[[u32; 3]],
-        every: f64,
-        bite: f64,
+        at: &Stitching,
     ) -> Result<Vec<Stitch>, MeshError> {
+        let Stitching { every, bite, depth } = *at;
         let slits = self.incisions().nth(incision).expect("the incision exists");
         let length: f64 = slits.iter().map(Slit::length).sum();
         let count = count(length, every).map_err(|least| MeshError::TooManyStitches {
@@ -131,21 +149,21 @@ impl Cut {
             every_mm: every * 1000.0,
             least_mm: least * 1000.0,
         })?;
-        let skin =
-            Self::skin_near(mesh, skin, bite, |p, margin| slits.iter().any(|slit| slit.near(p, margin)));
+        let near = |p: Point3<f32>, margin: f64| slits.iter().any(|slit| slit.near(p, margin));
+        let tissue = Self::tissue_near(mesh, skin, bite, depth, near);
         let off_skin = |at: Point3<f64>| MeshError::StitchOffSkin {
             incision,
             at_mm: mesh.frame.to_mm(at.cast()).into(),
-            reach_mm: skin.reach * 1000.0,
+            reach_mm: tissue.reach * 1000.0,
         };
         let stitch = |number: usize| {
             let (slit, along) = at_length(slits, length * (number as f64 + 0.5) / count as f64);
             let middle = slit.skin_at(along);
             let end = |side: f64| {
-                let wanted = middle + slit.lateral() * (side * bite);
-                let faces = |area: &Vector3<f64>| area.dot(&slit.inward()) < 0.0;
+                let wanted = middle + slit.lateral() * (side * bite) + slit.inward() * depth;
+                let faces = |area: &Vector3<f64>| depth > 0.0 || area.dot(&slit.inward()) < 0.0;
                 let on_side = |point: Point3<f64>| side * slit.coordinates(point).lateral > 0.2 * bite;
-                skin.end(wanted, &faces, &on_side).ok_or_else(|| off_skin(wanted))
+                tissue.end(wanted, &faces, &on_side).ok_or_else(|| off_skin(wanted))
             };
             join(&end(-1.0)?, &end(1.0)?, |rest| rest).ok_or_else(|| off_skin(middle))
         };
@@ -157,7 +175,7 @@ impl Cut {
     /// [`Cut::stitches`].
     ///
     /// # Errors
-    /// [`MeshError::Excision`] if a stitch has no skin near one of its ends, or for more than 1000
+    /// [`MeshError::Excision`] if a stitch has no tissue near one of its ends, or for more than 1000
     /// stitches.
     ///
     /// # Panics
@@ -167,9 +185,9 @@ impl Cut {
         excision: usize,
         mesh: &TetMesh,
         skin: &[[u32; 3]],
-        every: f64,
-        bite: f64,
+        at: &Stitching,
     ) -> Result<Vec<Stitch>, MeshError> {
+        let Stitching { every, bite, depth } = *at;
         let piece = &self.pieces[excision];
         let axis = &piece.axis;
         let refuse = |why: String| MeshError::Excision { excision, why };
@@ -178,22 +196,24 @@ impl Cut {
             refuse(format!("stitches every {every_mm} mm are too many; give at least {least_mm:.3} mm"))
         })?;
         let near = |p: Point3<f32>, margin: f64| piece.outline.iter().any(|slit| slit.near(p, margin));
-        let skin = Self::skin_near(mesh, skin, bite, near);
+        let tissue = Self::tissue_near(mesh, skin, bite, depth, near);
         let off_skin = |at: Point3<f64>| {
             let at_mm: [f64; 3] = mesh.frame.to_mm(at.cast()).into();
-            let reach_mm = skin.reach * 1000.0;
-            refuse(format!("a stitch has no skin within {reach_mm:.1} mm of {at_mm:.1?} mm; change bite_mm"))
+            let reach_mm = tissue.reach * 1000.0;
+            refuse(format!(
+                "a stitch has no tissue within {reach_mm:.1} mm of {at_mm:.1?} mm; change bite_mm"
+            ))
         };
         let stitch = |number: usize| {
             let along = axis.length() * (number as f64 + 0.5) / count as f64;
             let [left, right] = sides(piece, along);
             let middle = axis.skin_at(along);
             let end = |side: f64, edge: f64| {
-                let wanted = middle + axis.lateral() * (edge + side * bite);
-                let faces = |area: &Vector3<f64>| area.dot(&axis.inward()) < 0.0;
+                let wanted = middle + axis.lateral() * (edge + side * bite) + axis.inward() * depth;
+                let faces = |area: &Vector3<f64>| depth > 0.0 || area.dot(&axis.inward()) < 0.0;
                 let beyond =
                     |point: Point3<f64>| side * (axis.coordinates(point).lateral - edge) > 0.2 * bite;
-                skin.end(wanted, &faces, &beyond).ok_or_else(|| off_skin(wanted))
+                tissue.end(wanted, &faces, &beyond).ok_or_else(|| off_skin(wanted))
             };
             let closed = |rest: f64| (rest - (right - left)).max(0.0);
             join(&end(-1.0, left)?, &end(1.0, right)?, closed).ok_or_else(|| off_skin(middle))
@@ -214,7 +234,7 @@ impl Cut {
         skin: &[[u32; 3]],
         closed: f64,
     ) -> Result<Vec<Stitch>, MeshError> {
-        let skin = Self::skin_near(mesh, skin, 0.0, |_, _| true);
+        let skin = Self::tissue_near(mesh, skin, 0.0, 0.0, |_, _| true);
         let stitch = |(pair, ends): (usize, &[[f64; 3]; 2])| {
             let refuse = |why: String| MeshError::StitchPair { pair, why };
             let end = |mm: [f64; 3]| {

@@ -16,3 +16,4 @@ mod region;
 mod sever;
 mod shell;
 mod skin;
+mod stitches;

@@ -1,6 +1,6 @@
 //! The stitches of the sutures of a scene.
 
-use cutis_mesh::{Cut, Stitch, TetMesh};
+use cutis_mesh::{Cut, Stitch, Stitching, TetMesh};
 
 use super::BodySections;
 use crate::Error;
@@ -9,7 +9,7 @@ use crate::scene::SutureSection;
 /// The stitches of each suture of the scene.
 ///
 /// # Errors
-/// [`Error`] for a suture that has no skin at one of its ends.
+/// [`Error`] for a suture that has no tissue at one of its ends.
 pub(super) fn stitches(
     sections: &BodySections<'_>,
     mesh: &TetMesh,
@@ -17,11 +17,12 @@ pub(super) fn stitches(
     skin: &[[u32; 3]],
 ) -> Result<Vec<Vec<Stitch>>, Error> {
     let place = |(n, (suture, &wound)): (usize, (&SutureSection, &usize))| {
-        let bite = suture.bite_mm / 1000.0;
+        let (bite, depth) = (suture.bite_mm / 1000.0, suture.depth_mm / 1000.0);
+        let along = |every_mm: f64| Stitching { every: every_mm / 1000.0, bite, depth };
         let placed = match (suture.every_mm, wound.checked_sub(sections.incisions.len())) {
             (None, _) => cut.stitches_between(&suture.pairs_mm, mesh, skin, 2.0 * bite),
-            (Some(every), None) => cut.stitches(wound, mesh, skin, every / 1000.0, bite),
-            (Some(every), Some(excision)) => cut.stitches_across(excision, mesh, skin, every / 1000.0, bite),
+            (Some(every), None) => cut.stitches(wound, mesh, skin, &along(every)),
+            (Some(every), Some(excision)) => cut.stitches_across(excision, mesh, skin, &along(every)),
         };
         placed.map_err(sections.file.blame(&format!("suture[{n}]")))
     };

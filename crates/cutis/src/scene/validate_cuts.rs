@@ -187,6 +187,15 @@ impl Scene {
             "must be given, or pairs_mm in its place, and not both",
         )?;
         every_mm.map_or(Ok(()), |every| check.positive(&key("every_mm"), every))?;
-        Ok(())
+        let (key, depth_mm) = (key("depth_mm"), suture.depth_mm);
+        check.not_negative(&key, depth_mm)?;
+        let why = "must be 0 next to pairs_mm, whose points are on the skin";
+        check.require(depth_mm == 0.0 || pairs_mm.is_empty(), &key, depth_mm, why)?;
+        let wound = self.wound(&suture.wound).unwrap_or_default();
+        let incision = self.incision.get(wound).map(|incision| incision.depth_mm);
+        let excision = || Some(self.excision.get(wound.checked_sub(self.incision.len())?)?.depth_mm);
+        let wound_mm = incision.or_else(excision).unwrap_or(f64::INFINITY);
+        let why = format!("must be less than the depth of the wound, {wound_mm} mm");
+        check.require(depth_mm < wound_mm, &key, depth_mm, &why)
     }
 }

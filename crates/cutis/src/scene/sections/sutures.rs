@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::WoundRef;
 
 /// Stitches that close a wound without a width (model `pbd`). Each stitch is a thread between two
-/// points of the skin. It pulls and does not push.
+/// points of the skin, or of tissue below it. It pulls and does not push. A second suture with a
+/// `depth_mm` closes the space below the skin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SutureSection {
@@ -23,6 +24,10 @@ pub struct SutureSection {
     /// Distance of the ends of a stitch from the edge of the wound, mm.
     #[serde(default = "SutureSection::default_bite_mm")]
     pub bite_mm: f64,
+    /// Depth of the ends of a stitch below the skin, mm: less than that of the wound, and of an
+    /// undermining around it. 0: on the skin, as with `pairs_mm`.
+    #[serde(default)]
+    pub depth_mm: f64,
     /// Stiffness of a thread, N/m (`xpbd`, `vbd`).
     #[serde(default = "SutureSection::default_thread_n_per_m")]
     pub thread_n_per_m: f64,
