@@ -7,8 +7,8 @@ use crate::MeshError;
 /// Largest angle in degrees by which a path may turn at a point.
 const SHARPEST_DEG: f64 = 150.0;
 
-/// Least distance of two sides of an outline over the path between them. At an end with the sharpest
-/// possible angle it is 0.259.
+/// Least distance of two sides of an outline over the path between them. At an end with the
+/// sharpest possible angle it is 0.259.
 const POINTED: f64 = 0.25;
 
 /// Largest number of points of a path. It limits the time of the checks.

@@ -105,7 +105,8 @@ fn count(length: f64, every: f64) -> Result<usize, f64> {
 }
 
 impl Cut {
-    /// The skin near a wound, or the faces of whole tets near it if the stitches lie below the skin.
+    /// The skin near a wound, or the faces of whole tets near it if the stitches lie below the
+    /// skin.
     fn tissue_near<'a>(
         mesh: &'a TetMesh,
         skin: &[[u32; 3]],
@@ -175,8 +176,8 @@ impl Cut {
     /// [`Cut::stitches`].
     ///
     /// # Errors
-    /// [`MeshError::Excision`] if a stitch has no tissue near one of its ends, or for more than 1000
-    /// stitches.
+    /// [`MeshError::Excision`] if a stitch has no tissue near one of its ends, or for more than
+    /// 1000 stitches.
     ///
     /// # Panics
     /// If there is no such excision.

@@ -13,8 +13,8 @@ use super::ribbon::Ribbon;
 use super::section::{Border, Section};
 use super::severing::around_section;
 
-/// Width in lattice steps of the border of a blade around a piece. All tissue of the piece comes out,
-/// so the border is sharp.
+/// Width in lattice steps of the border of a blade around a piece. All tissue of the piece comes
+/// out, so the border is sharp.
 const SHARP: f64 = 0.05;
 
 /// A place on the skin that a blade passes, in local meters.

@@ -15,8 +15,8 @@ use super::depth::SkinDepth;
 use super::ribbon::Ribbon;
 use crate::skin_surface::Facet;
 
-/// How far the blades cut beyond the piece, in lattice steps. The edges at its border are then cut
-/// whatever the rounding.
+/// How far the blades cut beyond the piece, in lattice steps, so that rounding leaves no edge at
+/// its border whole.
 const BEYOND_STEPS: f64 = 0.1;
 
 /// The surface around a piece of tissue below a closed outline on the skin, down to a depth. The

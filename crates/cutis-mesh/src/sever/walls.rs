@@ -19,8 +19,8 @@ pub struct Walls<'a> {
     pub parts: [u8; 4],
     /// One bit for each part that has a copy.
     pub kept: u8,
-    /// The first of two rows of distances around a piece that is taken out: the piece is where both
-    /// are negative.
+    /// The first of two rows of distances around a piece that is taken out: the piece is where
+    /// both are negative.
     pub piece: Option<u8>,
 }
 
@@ -48,8 +48,8 @@ impl Walls<'_> {
         usable.max_by(better).map_or(0, |n| self.parts[n])
     }
 
-    /// As [`Walls::owner`], but None where the piece that is taken out lies between two walls in the
-    /// tet and none of the corners is in it. There the piece is thinner than the tet.
+    /// As [`Walls::owner`], but None where the piece that is taken out lies between two walls in
+    /// the tet and none of the corners is in it. There the piece is thinner than the tet.
     pub fn holder(&self, point: &Barycentric) -> Option<u8> {
         let out = |row: u8| {
             let is_inside = |sides: Sides| sides >> row & 0b11 == 0;
