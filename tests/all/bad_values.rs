@@ -61,6 +61,7 @@ const SUTURE: &str = r#"
 [[suture]]
 wound = 0
 every_mm = 1
+depth_mm = 0.5
 "#;
 
 /// The section that replaces the moduli of the constraint kinds.
