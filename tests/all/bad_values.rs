@@ -38,7 +38,7 @@ planes = [{ point_mm = [0, 0, 0], normal = [0, 0, 1] }]
 [[incision]]
 from_mm = [0, 0, 0]
 to_mm = [1, 0, 0]
-depth_mm = 1
+depth_mm = 2
 width_mm = 1
 [[undermining]]
 wound = 1
@@ -47,7 +47,7 @@ depth_mm = 1
 at_s = 2
 [[excision]]
 path_mm = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]
-depth_mm = 1
+depth_mm = 2
 [[handle]]
 at_mm = [0, 0, 0]
 radius_mm = 1
