@@ -143,6 +143,14 @@ fn a_piece_is_taken_out_up_to_its_pointed_ends() {
                 let p = mesh.frame.to_mm(p.cast());
                 (p.x - 40.3) * turned.cos() + (p.y - 29.0) * turned.sin()
             };
+            // Above the floor and up to a lattice step from their ends the walls do not touch: the
+            // tissue between them is gone.
+            let touches = |pair: &&cutis_mesh::sever::LipPair| {
+                let [a, b] = pair.edge.map(|v| mesh.positions[v as usize].cast::<f64>());
+                let at = a + (b - a) * f64::from(pair.part);
+                along(at).abs() < 18.0 && mesh.frame.to_mm(at.cast()).z > 24.5 - depth
+            };
+            assert_eq!(severed.lip_pairs.iter().filter(touches).count(), 0, "{split:?} {turned}");
             let taken = severed.taken_out.concat();
             let at_ends = |tet: &&[u32; 4]| {
                 tet.iter().map(|&corner| along(at(corner)).abs()).sum::<f64>() / 4.0 >= 15.0
