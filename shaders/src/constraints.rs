@@ -8,6 +8,8 @@ pub const VOLUME: &str = include_str!("../wgsl/constraints/volume.wgsl");
 pub const THREAD: &str = include_str!("../wgsl/constraints/thread.wgsl");
 /// Source of `LipContact`, with four vertices.
 pub const LIP_CONTACT: &str = include_str!("../wgsl/constraints/lip_contact.wgsl");
+/// Source of `LipAdhesion`, with four vertices.
+pub const LIP_ADHESION: &str = include_str!("../wgsl/constraints/lip_adhesion.wgsl");
 /// Source of `SkinTension`, with three vertices.
 pub const SKIN_TENSION: &str = concat!(
     include_str!("../wgsl/constraints/triangle.wgsl"),

@@ -30,6 +30,7 @@ modulus_along_n_per_m = 50
 modulus_across_n_per_m = 30
 directions = { along = [0, 0, 1] }
 [constraints.contact]
+[constraints.adhesion]
 [chainmail]
 materials = [{ from_hu = -1024, shortest = 0.5, longest = 1.5, shear = 0.5 }]
 [fixed]
@@ -45,6 +46,7 @@ wound = 1
 distance_mm = 1
 depth_mm = 1
 at_s = 2
+adheres = true
 [[excision]]
 path_mm = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]
 depth_mm = 2

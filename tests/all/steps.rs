@@ -199,13 +199,35 @@ fn a_hook_grabs_tissue_where_it_is() {
     assert!(2 * opened > grabbed.len(), "{opened} of {} vertices opened before", grabbed.len());
 }
 
+/// A hook lifts undermined skin more easily than skin that adheres, which takes its bed along. Both
+/// leave the scan as it is until the hook pulls.
+#[test]
+fn skin_that_adheres_resists_a_hook() {
+    let lift = |adheres: bool| {
+        let lesion = excise(&ellipse(LENGTH, WIDTH), "");
+        let undermine = UNDERMINE.replace(" }", &format!(", adheres = {adheres} }}"));
+        let hook =
+            "{ kind = 'hook', at_mm = [5, 102, 22], radius_mm = 8, move_mm = [0, 8, 0], over_s = 0.2 }";
+        Run::of(&operated(&[&lesion, &undermine, hook], &[])).report
+    };
+    let [free, adhering] = [false, true].map(lift);
+    let force = |report: &cutis::report::Report| report.handles[0].force_n;
+    assert!(force(&adhering) > 1.2 * force(&free), "{} and {}", force(&adhering), force(&free));
+    let gap = |report: &cutis::report::Report| {
+        report.residuals.iter().find(|residual| residual.kind == "adhesion").map(|residual| residual.max)
+    };
+    assert_eq!((gap(&free), free.sizes.lip_pairs), (None, 0));
+    assert!(adhering.sizes.lip_pairs > 100);
+    assert!(gap(&adhering).is_some_and(|gap| gap > 0.0 && gap < 0.05), "{:?}", gap(&adhering));
+}
+
 /// A run that is interrupted between the steps continues with the same bits, on any number of
 /// threads. Control: another time.
 #[test]
 fn a_run_resumes_between_steps() {
     let run = |at_s: &str, frames: &str, threads: &str, folder: &std::path::Path, resume: bool| {
         let lesion = excise(&ellipse(LENGTH, WIDTH), &format!(", at_s = {at_s}"));
-        let undermine = UNDERMINE.replace(" }", ", at_s = 0.03, speed_mm_s = 300.0 }");
+        let undermine = UNDERMINE.replace(" }", ", at_s = 0.03, speed_mm_s = 300.0, adheres = true }");
         let sew = SEW.replace("0.3", "0.1");
         // It grabs tissue next to the piece in frame 2, before the blade of the undermining is
         // there.
@@ -231,14 +253,14 @@ fn a_run_resumes_between_steps() {
     assert!(read(&whole, "skin.vtu") != read(&other, "skin.vtu"));
 }
 
-/// Both backends do the same steps. Control: another depth.
+/// Both backends do the same steps. Controls: another depth, and skin that does not adhere.
 #[test]
 fn a_gpu_does_the_same_steps() {
     on_each_adapter(|gpu| {
         for formulation in ["xpbd", "vbd"] {
-            let scene = |depth: &str| {
+            let scene = |depth: &str, adheres: bool| {
                 let lesion = excise(&ellipse(LENGTH, WIDTH), ", at_s = 0.02").replace("16,", depth);
-                let undermine = UNDERMINE.replace(" }", ", at_s = 0.03 }");
+                let undermine = UNDERMINE.replace(" }", &format!(", at_s = 0.03, adheres = {adheres} }}"));
                 let sew = SEW.replace("0.3", "0.04");
                 let hook = "{ kind = 'hook', at_mm = [5, 102, 22], radius_mm = 10, move_mm = [0, 4, 0], at_s = 0.03, over_s = 0.1 }";
                 let set = [
@@ -251,11 +273,13 @@ fn a_gpu_does_the_same_steps() {
                 operated(&[&lesion, &undermine, hook, &sew], &set)
             };
             let [cpu, on_gpu, control] = [(); 3].map(|()| tempfile::tempdir().unwrap());
-            run_in(cpu.path(), &scene("16,"), false).unwrap();
-            run_on(gpu, on_gpu.path(), &scene("16,"), false).unwrap();
+            run_in(cpu.path(), &scene("16,", true), false).unwrap();
+            run_on(gpu, on_gpu.path(), &scene("16,", true), false).unwrap();
             assert!(agree(gpu, cpu.path(), on_gpu.path()), "{formulation}");
-            run_on(gpu, control.path(), &scene("12,"), false).unwrap();
-            assert!(!agree(gpu, cpu.path(), control.path()), "{formulation}");
+            for (depth, adheres) in [("12,", true), ("16,", false)] {
+                run_on(gpu, control.path(), &scene(depth, adheres), false).unwrap();
+                assert!(!agree(gpu, cpu.path(), control.path()), "{formulation}");
+            }
         }
     });
 }

@@ -14,6 +14,7 @@
 //! | [`SkinStripTurn`] | 3 | turn of the image against a constant load, m | as above |
 //! | [`Thread`] | 6 | distance of two points of triangles beyond a length, m | 1/stiffness, m/N |
 //! | [`LipContact`] | 4 | overlap of the sides of a cut over the length of a severed edge, 1 | [`lip_contact_compliance`], 1/J |
+//! | [`LipAdhesion`] | 4 | gap between the sides of a cut over the length of a severed edge, 1 | as above |
 //!
 //! Each formula is written once and runs as `f32`, as `f64` and in SIMD lanes of both ([`Real`]).
 //! Every lane has the bits of a scalar evaluation, for any width of the registers
@@ -38,6 +39,7 @@
 mod constraint;
 mod distance;
 mod lanes;
+mod lip_adhesion;
 mod lip_contact;
 mod material;
 mod real;
@@ -55,6 +57,7 @@ mod volume;
 pub use constraint::{Constraint, Eval, Params};
 pub use distance::{Distance, DistanceMaterial};
 pub use lanes::{LaneTask, Lanes, SimdLevel};
+pub use lip_adhesion::LipAdhesion;
 pub use lip_contact::{LipContact, LipContactMaterial};
 pub use material::{
     MaterialError, distance_compliance, lip_contact_compliance, skin_compliance, skin_strip_compliance,

@@ -27,7 +27,7 @@ use crate::{Constraint, Eval, Real};
 #[derive(Clone, Copy, Debug)]
 pub struct LipContact;
 
-/// The place and the direction of a [`LipContact`].
+/// The place and the direction of a [`LipContact`] or a [`LipAdhesion`](crate::LipAdhesion).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LipContactMaterial {
     /// Part of the edge before the cut, from 0 to 1.
@@ -43,20 +43,16 @@ impl Constraint<4> for LipContact {
     type Material = LipContactMaterial;
 
     fn from_rest<T: Real>(x: &[Point3<T>; 4], material: &LipContactMaterial) -> [T; 4] {
-        let edge = x[1] - x[0];
-        let length = edge.dot(&edge).simd_sqrt();
-        let [nx, ny, nz] = material.normal.map(|n| T::constant(n) / length);
-        [T::constant(material.part), nx, ny, nz]
+        params_at_rest(x, material)
     }
 
     #[inline(always)]
-    fn eval<T: Real>(x: &[Point3<T>; 4], &[part, nx, ny, nz]: &[T; 4]) -> Eval<T, 4> {
-        let (zero, before) = (T::zero(), T::one() - part);
-        let normal = Vector3::new(nx, ny, nz);
-        let gap = ((x[0] - x[2]) * before + (x[1] - x[3]) * part).dot(&normal);
+    fn eval<T: Real>(x: &[Point3<T>; 4], params: &[T; 4]) -> Eval<T, 4> {
+        let (gap, normal) = gap(x, params);
+        let zero = T::zero();
         let overlaps = gap.simd_lt(zero);
         let normal = normal * T::one().select(overlaps, zero);
-        let (first, second) = (normal * before, normal * part);
+        let (first, second) = (normal * (T::one() - params[0]), normal * params[0]);
         Eval { c: gap.select(overlaps, zero), grad: [first, second, -first, -second] }
     }
 
@@ -64,4 +60,19 @@ impl Constraint<4> for LipContact {
     fn rest_size<T: Real>(_: &[T; 4]) -> T {
         T::one()
     }
+}
+
+/// `[t, n_x/L, n_y/L, n_z/L]` of points at rest.
+pub(crate) fn params_at_rest<T: Real>(x: &[Point3<T>; 4], material: &LipContactMaterial) -> [T; 4] {
+    let edge = x[1] - x[0];
+    let length = edge.dot(&edge).simd_sqrt();
+    let [nx, ny, nz] = material.normal.map(|n| T::constant(n) / length);
+    [T::constant(material.part), nx, ny, nz]
+}
+
+/// The gap `(p⁺ − p⁻)·n/L` between the sides, negative where they overlap, and `n/L`.
+#[inline(always)]
+pub(crate) fn gap<T: Real>(x: &[Point3<T>; 4], &[part, nx, ny, nz]: &[T; 4]) -> (T, Vector3<T>) {
+    let normal = Vector3::new(nx, ny, nz);
+    (((x[0] - x[2]) * (T::one() - part) + (x[1] - x[3]) * part).dot(&normal), normal)
 }

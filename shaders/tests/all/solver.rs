@@ -1,15 +1,15 @@
 //! The passes of the solver, for each constraint.
 
 use cutis_shaders::constraints::{
-    DISTANCE, LIP_CONTACT, SKIN_STRIP, SKIN_STRIP_AT_REST, SKIN_STRIP_TURN, SKIN_TENSION, SKIN_TENSION_PAPER,
-    THREAD, VOLUME,
+    DISTANCE, LIP_ADHESION, LIP_CONTACT, SKIN_STRIP, SKIN_STRIP_AT_REST, SKIN_STRIP_TURN, SKIN_TENSION,
+    SKIN_TENSION_PAPER, THREAD, VOLUME,
 };
 use cutis_shaders::solver::{self, Loads, Multiplier, Rule, Stiffness};
 
 use crate::{assert_baseline, size_of_struct, validated};
 
 /// Name, arity, number of parameters, source.
-const KINDS: [(&str, usize, u32, &str); 9] = [
+const KINDS: [(&str, usize, u32, &str); 10] = [
     ("distance", 2, 1, DISTANCE),
     ("volume", 4, 1, VOLUME),
     ("stc", 3, 2, SKIN_TENSION),
@@ -19,6 +19,7 @@ const KINDS: [(&str, usize, u32, &str); 9] = [
     ("skin_strip_turn", 3, 9, SKIN_STRIP_TURN),
     ("thread", 6, 5, THREAD),
     ("lip_contact", 4, 4, LIP_CONTACT),
+    ("lip_adhesion", 4, 4, LIP_ADHESION),
 ];
 
 #[test]

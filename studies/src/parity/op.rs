@@ -8,9 +8,10 @@
 
 use cutis_conformance::{ConformanceError, Finding, Limit, Report, Subject, device};
 use cutis_constraints::{
-    Constraint, Distance, DistanceMaterial, LipContact, LipContactMaterial, MaterialError, SkinStrip,
-    SkinStripAtRest, SkinStripLaw, SkinStripMaterial, SkinStripTurn, SkinTension, SkinTensionMaterial,
-    SkinTensionPaper, SkinTensionPaperMaterial, Thread, ThreadMaterial, Volume, VolumeMaterial,
+    Constraint, Distance, DistanceMaterial, LipAdhesion, LipContact, LipContactMaterial, MaterialError,
+    SkinStrip, SkinStripAtRest, SkinStripLaw, SkinStripMaterial, SkinStripTurn, SkinTension,
+    SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial, Thread, ThreadMaterial, Volume,
+    VolumeMaterial,
 };
 use cutis_gpu::Gpu;
 
@@ -43,6 +44,7 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
         LipContactMaterial { part: share - 0.5, normal: normal.map(|x| x / length) }
     };
     examine(bench, &Subject::<LipContact, 4>::new(shares().map(contact)).oriented())?;
+    examine(bench, &Subject::<LipAdhesion, 4>::new(shares().map(contact)).oriented())?;
     let strips = || shares().map(strip).collect::<Result<Vec<_>, _>>();
     examine(bench, &Subject::<SkinStrip, 3>::new(strips()?).oriented())?;
     examine(bench, &Subject::<SkinStripAtRest, 3>::new(strips()?).oriented())?;

@@ -2,8 +2,8 @@
 
 use cutis_conformance::{Subject, conformance};
 use cutis_constraints::{
-    Distance, DistanceMaterial, LipContact, LipContactMaterial, SkinStrip, SkinStripAtRest, SkinStripLaw,
-    SkinStripMaterial, SkinStripTurn, SkinTension, SkinTensionMaterial, SkinTensionPaper,
+    Distance, DistanceMaterial, LipAdhesion, LipContact, LipContactMaterial, SkinStrip, SkinStripAtRest,
+    SkinStripLaw, SkinStripMaterial, SkinStripTurn, SkinTension, SkinTensionMaterial, SkinTensionPaper,
     SkinTensionPaperMaterial, Thread, ThreadMaterial, Volume, VolumeMaterial,
 };
 
@@ -33,11 +33,18 @@ conformance!(mod thread: Thread, 6, Subject::new([
     ThreadMaterial { ends: [[0.3, 0.3], [0.1, 0.6]], length_scale: 1.5 },
 ]));
 
-conformance!(mod lip_contact: LipContact, 4, Subject::new([
-    LipContactMaterial { part: 0.3, normal: [0.6, 0.0, 0.8] },
-    LipContactMaterial { part: 0.0, normal: [0.0, -1.0, 0.0] },
-    LipContactMaterial { part: 0.9, normal: [-0.48, 0.6, -0.64] },
-]).oriented());
+conformance!(mod lip_contact: LipContact, 4, Subject::new(lips()).oriented());
+
+conformance!(mod lip_adhesion: LipAdhesion, 4, Subject::new(lips()).oriented());
+
+/// Points at the beginning of an edge, near its end and between them.
+fn lips() -> Vec<LipContactMaterial> {
+    vec![
+        LipContactMaterial { part: 0.3, normal: [0.6, 0.0, 0.8] },
+        LipContactMaterial { part: 0.0, normal: [0.0, -1.0, 0.0] },
+        LipContactMaterial { part: 0.9, normal: [-0.48, 0.6, -0.64] },
+    ]
+}
 
 /// Strips with low to high tension, with and without stiffening and resistance to compression.
 fn strips() -> Vec<SkinStripMaterial> {

@@ -2,8 +2,8 @@
 //! of its energy.
 
 use cutis_constraints::{
-    Constraint, Distance, Eval, LipContact, SkinStrip, SkinStripAtRest, SkinStripTurn, SkinTension,
-    SkinTensionPaper, Volume,
+    Constraint, Distance, Eval, LipAdhesion, LipContact, SkinStrip, SkinStripAtRest, SkinStripTurn,
+    SkinTension, SkinTensionPaper, Volume,
 };
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
@@ -112,6 +112,16 @@ proptest! {
         } else {
             prop_assert!(c == 0.0 && grad == [Vector3::zeros(); 4]);
         }
+    }
+
+    /// Sides that adhere are held along the normal, whether they overlap or are apart.
+    #[test]
+    fn lip_adhesion_gradient(shape in shape::<4>(), part in 0.0..1.0f64, normal in proptest::array::uniform3(-1.0..1.0f64)) {
+        let adhesion = with::<4, LipAdhesion>([part, normal[0], normal[1], normal[2]]);
+        let gap = ((shape.x[0] - shape.x[2]) * (1.0 - part) + (shape.x[1] - shape.x[3]) * part)
+            .dot(&Vector3::from(normal));
+        prop_assert!((adhesion(&shape.x).c - gap).abs() <= 1e-12 * shape.scale);
+        check_forces(&adhesion, &shape);
     }
 
     /// The slope of a triangle along the strip has a direction in space, so its torque is not zero.

@@ -1,8 +1,8 @@
 //! Each SIMD lane has the bits of a scalar evaluation, independent of the other lanes.
 
 use cutis_constraints::{
-    Constraint, Distance, LipContact, Params, Real, Scalar, SkinStrip, SkinStripAtRest, SkinStripTurn,
-    SkinTension, SkinTensionPaper, Volume,
+    Constraint, Distance, LipAdhesion, LipContact, Params, Real, Scalar, SkinStrip, SkinStripAtRest,
+    SkinStripTurn, SkinTension, SkinTensionPaper, Volume,
 };
 use nalgebra::{Point3, SimdValue};
 use simba::simd::{AutoF32x8, WideF32x4, WideF32x8, WideF64x4};
@@ -106,6 +106,7 @@ fn lanes_equal_scalars_bit_for_bit() {
     check_types::<2, Distance>(1, |rest| vec![rest]);
     check_types::<4, Volume>(3, |rest| vec![rest]);
     check_types::<4, LipContact>(0, |part| vec![part, 0.6, -0.5, 0.3]);
+    check_types::<4, LipAdhesion>(0, |part| vec![part, 0.6, -0.5, 0.3]);
     check_types::<3, SkinTension>(2, |rest| vec![rest, 5.0]);
     check_types::<3, SkinTensionPaper>(2, |rest| vec![rest, 5.0, 3.0]);
     let strip =

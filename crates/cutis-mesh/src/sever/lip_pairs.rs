@@ -18,6 +18,8 @@ pub struct LipPair {
     pub edge: [u32; 2],
     /// Number among the pairs of this edge, for colors.
     pub number: u8,
+    /// Number of the blade, as in [`Severed::blades`](super::Severed::blades).
+    pub blade: u32,
     /// The nodes at the ends of the edge: both on the positive side of the blade, then both on the
     /// negative side. All four are different.
     pub nodes: [u32; 4],
@@ -173,12 +175,12 @@ fn pairs(sites: &[LipSite], reached: &[f64], at: impl Fn(usize) -> Option<Divide
     let mut pairs: Vec<LipPair> = Vec::new();
     for same in all.chunk_by(|a, b| (a.edge, a.blade, a.nodes) == (b.edge, b.blade, b.nodes)) {
         let sum: Vector3<f64> = same.iter().map(|one| one.area).sum();
-        let (edge, nodes, part) = (same[0].edge, same[0].nodes, same[0].part);
+        let Contribution { edge, blade, nodes, part, .. } = same[0];
         let Some(normal) = sum.try_normalize(0.0) else { continue };
         let area: f64 = same.iter().map(|one| one.area.norm()).sum();
         let number = pairs.last().filter(|last| last.edge == edge).map_or(0, |last| last.number + 1);
         let normal = normal.map(|n| n as f32).into();
-        pairs.push(LipPair { edge, number, nodes, part, normal, area: area as f32 });
+        pairs.push(LipPair { edge, number, blade, nodes, part, normal, area: area as f32 });
     }
     pairs
 }

@@ -86,6 +86,7 @@ impl Body {
             cut,
             removed,
             severed,
+            adhering_blades: sections.adhering_blades.clone(),
             growing,
             stitches,
             free_pieces_ml,

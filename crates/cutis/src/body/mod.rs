@@ -56,6 +56,8 @@ pub(crate) struct Body {
     pub(crate) removed: Removed,
     /// What cuts of no width changed; none if the scene has none.
     pub(crate) severed: Option<Severed>,
+    /// Numbers of the blades whose sides never come apart.
+    pub(crate) adhering_blades: Vec<u32>,
     /// The cuts that are made while the body moves; none if the scene has none.
     pub(crate) growing: Option<GrowingCuts>,
     /// Volumes of the parts of the body that its cuts separate from the largest one, ml.

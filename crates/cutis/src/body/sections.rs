@@ -26,6 +26,8 @@ pub(crate) struct BodySections<'a> {
     pub(crate) materials: Option<&'a TissueMaterials>,
     pub(crate) incisions: &'a [IncisionSection],
     pub(crate) underminings: Vec<Undermining>,
+    /// The blades whose sides never come apart: of underminings that adhere.
+    pub(crate) adhering_blades: Vec<u32>,
     pub(crate) excisions: &'a [ExcisionSection],
     /// When each cut of no width is made: incisions, underminings, excisions.
     pub(crate) times: Vec<Timing>,
@@ -57,6 +59,7 @@ impl<'a> BodySections<'a> {
                 .iter()
                 .filter_map(|section| undermining(scene, section))
                 .collect(),
+            adhering_blades: adhering_blades(scene),
             excisions: &scene.excision,
             cuts_grow: times.iter().any(|time| scene.model.cuts_while_moving(time.is_later())),
             times,
@@ -91,6 +94,13 @@ pub(crate) fn needs_skin(scene: &Scene) -> bool {
 fn undermining(scene: &Scene, section: &UnderminingSection) -> Option<Undermining> {
     let UnderminingSection { distance_mm, depth_mm, .. } = *section;
     Some(Undermining { wound: scene.wound(&section.wound)?, distance_mm, depth_mm })
+}
+
+/// The blades of underminings that adhere. They follow those of the incisions without a width.
+fn adhering_blades(scene: &Scene) -> Vec<u32> {
+    let incisions = scene.incision.iter().filter(|incision| incision.width_mm.is_none()).count() as u32;
+    let blades = (incisions..).zip(&scene.undermining);
+    blades.filter(|(_, undermining)| undermining.adheres).map(|(blade, _)| blade).collect()
 }
 
 impl From<&ExcisionSection> for Excision {

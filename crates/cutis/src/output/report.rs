@@ -150,8 +150,8 @@ pub struct Sizes {
     pub tets: usize,
     /// Skin triangles.
     pub skin_triangles: usize,
-    /// Pairs of points on both sides of incisions without a width that touch in the end; 0 without
-    /// contact.
+    /// Pairs of points on both sides of cuts without a width that touch or adhere in the end; 0
+    /// without contact and adhesion.
     #[serde(default)]
     pub lip_pairs: usize,
     /// Vertices that the incisions removed from all constraints.

@@ -72,10 +72,11 @@ fn underminings(scene: &Scene) -> impl Iterator<Item = StepReport> + '_ {
     scene.undermining.iter().enumerate().map(|(n, section)| {
         let until = section.at_s + section.speed_mm_s.map_or(0.0, |speed| section.distance_mm / speed);
         let what = format!(
-            "undermine {}, {} mm around it, {} mm deep",
+            "undermine {}, {} mm around it, {} mm deep{}",
             wound_name(&section.wound),
             section.distance_mm,
-            section.depth_mm
+            section.depth_mm,
+            if section.adheres { ", adheres" } else { "" }
         );
         step(format!("undermining[{n}]"), [section.at_s, until], what)
     })

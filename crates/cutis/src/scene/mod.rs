@@ -26,8 +26,8 @@ pub use sections::*;
 pub use crate::model::ModelChoice;
 pub use crate::model::chainmail::section::*;
 pub use crate::model::constraints::kinds::{
-    ConstraintsSection, ContactSection, DistanceSection, MembraneDirections, MembraneSection,
-    NearIncisionSection, StcForm, StcSection, VolumeConstraintSection, constraint_kinds,
+    AdhesionSection, ConstraintsSection, ContactSection, DistanceSection, MembraneDirections,
+    MembraneSection, NearIncisionSection, StcForm, StcSection, VolumeConstraintSection, constraint_kinds,
 };
 
 use schemars::JsonSchema;

@@ -97,7 +97,7 @@ impl ConstraintModel {
         }
         if scene.solver.formulation == Formulation::Vbd {
             let mut colors = body.mesh.vertex_colors();
-            if scene.constraints.contact.as_ref().is_some_and(|contact| contact.acts) {
+            if scene.constraints.joins_lips() {
                 contact::separate(&mut colors, &body.mesh);
             }
             let stitches: Vec<&Stitch> = body.stitches.iter().flatten().collect();

@@ -93,7 +93,7 @@ impl Model for ConstraintModel {
             device_memory: device_memory(&backend, system, settings),
             backend,
             sizes: Sizes {
-                lip_pairs: scene.constraints.contact.as_ref().map_or(0, |contact| contact.pairs(input.body)),
+                lip_pairs: scene.constraints.lip_pairs(input.body),
                 ..sizes(input.body, motionless - input.body.removed_vertices() - followers)
             },
             colors,
@@ -155,6 +155,7 @@ fn left_out(scene: &Scene) -> Vec<String> {
 fn scene_warnings(scene: &Scene) -> Vec<String> {
     let gravity = scene.solver.gravity_m_s2 != [0.0; 3];
     let nothing_fixed = scene.fixed == Default::default();
+    let adheres = scene.undermining.iter().any(|undermining| undermining.adheres);
     lines_that_hold(&[
         (scene.chainmail.is_some(), "chainmail has no effect with model = \"pbd\""),
         (
@@ -175,6 +176,14 @@ fn scene_warnings(scene: &Scene) -> Vec<String> {
                 && scene.undermining.is_empty()
                 && scene.excision.is_empty(),
             "constraints.contact has no effect without an incision without width_mm",
+        ),
+        (
+            scene.constraints.adhesion.is_some() && !adheres,
+            "constraints.adhesion has no effect without an undermining with adheres = true",
+        ),
+        (
+            scene.constraints.adhesion.is_none() && adheres,
+            "undermining.adheres has no effect without constraints.adhesion",
         ),
         (
             scene.materials.is_some() && scene.solver.formulation == Formulation::Pbd,

@@ -184,8 +184,8 @@ impl GrowingWound {
     fn elements(&self, input: &ModelInput<'_>, cuts: &GrowingCuts, stage: &Stage) -> WoundElements {
         let body = input.body;
         let triangles = body.severed.as_ref().map_or(&[][..], |severed| &severed.triangles);
-        let touch = input.scene.constraints.contact.as_ref().is_some_and(|contact| contact.acts);
-        let pairs = if touch { cuts.growth.lip_pairs(&self.reached) } else { Vec::new() };
+        let joined = input.scene.constraints.joins_lips();
+        let pairs = if joined { cuts.growth.lip_pairs(&self.reached) } else { Vec::new() };
         WoundElements::new(&body.mesh, triangles, stage, pairs)
     }
 

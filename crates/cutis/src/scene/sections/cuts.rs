@@ -80,6 +80,10 @@ pub struct UnderminingSection {
     /// Speed at which it grows from the wound outwards, mm/s. Left out: it is made at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_mm_s: Option<f64>,
+    /// Whether the skin slides over the tissue below it without coming off, as wet tissue does
+    /// where no air gets in. `false`: it also comes off. It acts through `constraints.adhesion`.
+    #[serde(default)]
+    pub adheres: bool,
 }
 
 /// A piece of tissue below a closed outline on the skin that is taken out.

@@ -17,8 +17,8 @@ use crate::model::constraints::elements::Elements;
 use crate::scene::Scene;
 use crate::scene::validate::Check;
 
-/// Contact of the lips of incisions without a width. It is as stiff as the springs and the volumes
-/// of the tissue.
+/// Contact of the lips of cuts without a width. It is as stiff as the springs and the volumes of
+/// the tissue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactSection {
@@ -37,15 +37,20 @@ impl Default for ContactSection {
     }
 }
 
-/// Adds the section to a scene with sutures, if springs or volumes give it a modulus.
+/// Adds the section to a scene with sutures, and that of adhesion to one with skin that adheres, if
+/// springs or volumes give it a modulus.
 pub(crate) fn fill_default(scene: &mut Scene) {
+    let adheres = scene.undermining.iter().any(|undermining| undermining.adheres);
     if !scene.suture.is_empty() && has_modulus(scene) {
         scene.constraints.contact.get_or_insert_default();
+    }
+    if adheres && has_modulus(scene) {
+        scene.constraints.adhesion.get_or_insert_default();
     }
 }
 
 /// Whether the stiffness of contacts is known.
-fn has_modulus(scene: &Scene) -> bool {
+pub(crate) fn has_modulus(scene: &Scene) -> bool {
     let constraints = &scene.constraints;
     let kinds = constraints.distance.is_some() || constraints.volume.is_some();
     kinds || scene.solver.formulation == Formulation::Pbd
@@ -56,7 +61,7 @@ impl ContactSection {
         solver_names: &[LipContact::NAME],
         element: "lip",
         needs_skin: false,
-        counts: |body| [body.severed.as_ref().map_or(0, |severed| severed.lip_pairs.len()), 0],
+        counts: |body| [count(body, false), 0],
     };
 
     /// Number of pairs of points of the finished cuts that touch.
@@ -81,24 +86,47 @@ impl ConstraintKind for ContactSection {
         builder: SystemBuilder<f32>,
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
-        let pairs = parts.elements.lip_pairs();
-        // Along growing cuts there may be pairs later.
-        if pairs.is_empty() && !matches!(parts.elements, Elements::Wound(_)) {
-            return Ok((builder, 0));
-        }
-        let nodes: Vec<[u32; 4]> = pairs.iter().map(|pair| pair.nodes).collect();
-        let params: Vec<[f32; 4]> = pairs.iter().map(|pair| params(parts, pair)).collect();
-        let color = |pair: &LipPair| parts.body.mesh.edge_color(pair.edge, pair.number);
-        let groups = Groups::from_colors(&pairs.iter().map(color).collect::<Vec<u16>>())?;
-        let stiffness = if parts.compliant() { compliances(parts, pairs)? } else { Stiffness::pbd(1.0) };
-        Ok((builder.add::<LipContact, 4>(&nodes, &params, stiffness, &groups)?, groups.len()))
+        add::<LipContact>(builder, parts, false)
     }
 }
 
-fn params(parts: &BodyParts<'_>, pair: &LipPair) -> [f32; 4] {
+/// Number of pairs of points of the finished cuts that adhere, or of the others.
+pub(super) fn count(body: &Body, adhering: bool) -> usize {
+    let pairs = body.severed.iter().flat_map(|severed| &severed.lip_pairs);
+    pairs.filter(|pair| body.adhering_blades.contains(&pair.blade) == adhering).count()
+}
+
+/// Adds a constraint type to the pairs that adhere, or to the others.
+pub(super) fn add<C>(
+    builder: SystemBuilder<f32>,
+    parts: &BodyParts<'_>,
+    adhering: bool,
+) -> Result<(SystemBuilder<f32>, usize), Error>
+where
+    C: for<'a> Constraint<4, Params<f32> = [f32; 4], Material = LipContactMaterial>,
+{
+    let chosen = |pair: &&LipPair| parts.body.adhering_blades.contains(&pair.blade) == adhering;
+    let pairs: Vec<LipPair> = parts.elements.lip_pairs().iter().filter(chosen).copied().collect();
+    // Along growing cuts there may be pairs later.
+    if pairs.is_empty() && !matches!(parts.elements, Elements::Wound(_)) {
+        return Ok((builder, 0));
+    }
+    let nodes: Vec<[u32; 4]> = pairs.iter().map(|pair| pair.nodes).collect();
+    let params: Vec<[f32; 4]> = pairs.iter().map(|pair| params::<C>(parts, pair)).collect();
+    let color = |pair: &LipPair| parts.body.mesh.edge_color(pair.edge, pair.number);
+    let groups = Groups::from_colors(&pairs.iter().map(color).collect::<Vec<u16>>())?;
+    let stiffness = if parts.compliant() { compliances(parts, &pairs)? } else { Stiffness::pbd(1.0) };
+    Ok((builder.add::<C, 4>(&nodes, &params, stiffness, &groups)?, groups.len()))
+}
+
+fn params<C>(parts: &BodyParts<'_>, pair: &LipPair) -> [f32; 4]
+where
+    C: Constraint<4, Material = LipContactMaterial>,
+{
     let rest = pair.nodes.map(|node| parts.position(node));
     let material = LipContactMaterial { part: pair.part.into(), normal: pair.normal.map(f64::from) };
-    LipContact::from_rest(&rest, &material).map(|param| param as f32)
+    let params: Vec<f32> = C::from_rest::<f64>(&rest, &material).as_ref().iter().map(|&p| p as f32).collect();
+    [params[0], params[1], params[2], params[3]]
 }
 
 /// The compliance of each pair. Its modulus is the sum of those of the springs and the volumes: no

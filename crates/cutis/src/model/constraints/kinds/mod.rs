@@ -4,6 +4,7 @@
 //! folder, with its section of the scene, the range of its values and the way it is built. The
 //! scene format, the plan, the reports, `--without` and `cutis tune` follow from the row.
 
+mod adhesion;
 pub(crate) mod contact;
 mod distance;
 mod freed;
@@ -21,6 +22,7 @@ use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use adhesion::AdhesionSection;
 pub use contact::ContactSection;
 pub use distance::DistanceSection;
 pub use membrane::{MembraneDirections, MembraneSection};
@@ -74,6 +76,9 @@ constraint_kinds! {
     membrane: MembraneSection,
     /// Contact of the lips of incisions without a width. Scenes with sutures have it by default.
     contact: ContactSection,
+    /// Adhesion of undermined skin to what is below it. Scenes with an undermining that adheres
+    /// have it by default.
+    adhesion: AdhesionSection,
 }
 
 /// One row of the table of constraint kinds.
@@ -199,6 +204,18 @@ impl ConstraintsSection {
     /// The kinds that the scene names, each with its row of the table.
     pub(crate) fn named(&self) -> impl Iterator<Item = (&'static KindRow, &dyn ConstraintKind)> {
         KINDS.iter().filter_map(|row| Some((row, (row.section)(self)?)))
+    }
+
+    /// Whether points on both sides of cuts touch or adhere.
+    pub(crate) fn joins_lips(&self) -> bool {
+        self.contact.as_ref().is_some_and(|contact| contact.acts)
+            || self.adhesion.as_ref().is_some_and(|adhesion| adhesion.acts)
+    }
+
+    /// Number of pairs of points of the finished cuts that touch or adhere.
+    pub(crate) fn lip_pairs(&self, body: &Body) -> usize {
+        let touching = self.contact.as_ref().map_or(0, |contact| contact.pairs(body));
+        touching + self.adhesion.as_ref().map_or(0, |adhesion| adhesion.pairs(body))
     }
 
     /// Whether a kind that the scene names acts on the skin.
