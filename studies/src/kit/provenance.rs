@@ -62,10 +62,16 @@ pub fn load() -> Option<String> {
     text.split_whitespace().next().map(str::to_owned)
 }
 
-/// The commit of the checkout, with `-dirty` if there are uncommitted changes.
+/// The commit of the checkout, with `-dirty` if there are uncommitted changes. Pages of results do
+/// not count, because one study may follow another.
 pub fn commit() -> Option<String> {
-    let options = ["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"];
-    let output = command("git").args(options).output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    output.status.success().then(|| text.trim().to_owned())
+    let git = |options: &[&str]| {
+        let output = command("git").args(options).output().ok()?;
+        let text = String::from_utf8(output.stdout).ok()?;
+        output.status.success().then(|| text.trim().to_owned())
+    };
+    let commit = git(&["describe", "--always", "--abbrev=12", "--exclude=*"])?;
+    let changed =
+        git(&["status", "--porcelain", "--untracked-files=no", "--", ":/", ":(top,exclude)docs/results"])?;
+    Some(if changed.is_empty() { commit } else { commit + "-dirty" })
 }
