@@ -43,7 +43,8 @@ class Beam:
         directions = np.array(DIRECTIONS)
         ends = grid[:, None, :] + directions
         inside = (ends < size).all(axis=2)
-        axis = directions.argmax(axis=1)
+        # The last axis of each direction.
+        axis = 2 - directions[:, ::-1].argmax(axis=1)
         edges = np.stack([np.broadcast_to((grid @ strides)[:, None], inside.shape), ends @ strides], axis=2)
         colors = np.arange(7) * 2 + grid[:, axis] % 2
         self.vertex_colors = grid.sum(axis=1) % 4
