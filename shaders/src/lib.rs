@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod chainmail;
+pub mod coloring;
 pub mod constraints;
 pub mod render;
 pub mod resample;

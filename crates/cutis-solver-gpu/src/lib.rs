@@ -14,6 +14,8 @@
 //! - **Chunks.** The constraints of a color are stored in parts that fit WebGPU's baseline limits
 //!   on bindings, buffers and workgroups. Constraints of a color share no vertex, so the result
 //!   does not depend on the split.
+//! - **Any mesh can be colored on the device**: [`color`] divides constraints into groups as
+//!   [`cutis_coloring::greedy`] does, in another order.
 //! - **Only parts in use have pipelines and buffers.** Unused kinds of constraints, handles,
 //!   multipliers and measurements have neither.
 //!
@@ -43,6 +45,7 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod coloring;
 mod descent;
 mod error;
 mod gather;
@@ -53,6 +56,7 @@ mod recorder;
 mod residual;
 mod solver;
 
+pub use coloring::{GpuColoringError, color};
 pub use error::GpuSolverError;
 pub use memory::device_bytes;
 pub use solver::SolverGpu;

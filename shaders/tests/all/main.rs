@@ -1,6 +1,7 @@
 //! Every joined source is valid WGSL within WebGPU's baseline.
 
 mod chainmail;
+mod coloring;
 mod render;
 mod resample;
 mod solver;
