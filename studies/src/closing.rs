@@ -87,6 +87,7 @@ impl Cut {
             format!("constraints.membrane.tension_along_n_per_m={along:.3}"),
             format!("constraints.membrane.tension_across_n_per_m={across:.3}"),
             "output={report=true}".to_owned(),
+            "lattice.region=whole".to_owned(),
         ];
         let report = runs.program.scene(&scene("demo"), &set, &["--frames", "90"], &runs.folder)?;
         number_at(&report, "/wound/mid_mm")

@@ -80,6 +80,8 @@ fn picture(name: &str, set: &[String], paper: bool, out: &Path) -> Result<(), Fa
         let Scene { scan_is_at_rest, materials, constraints, solver, .. } =
             Scene::load(&scene(PAPER), &[])?.scene;
         loaded.scene = Scene { scan_is_at_rest, materials, constraints, solver, ..loaded.scene };
+        // All of the skin shrinks, also far from the cut.
+        loaded.scene.lattice.region = None;
     }
     cutis::run(&loaded, &RunOptions { out: out.into(), resume: false }, &Silent)?;
     Ok(())

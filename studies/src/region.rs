@@ -20,13 +20,18 @@ pub struct Options {
     /// Write the tables of docs/results/region.md. Needs all scans.
     #[arg(long)]
     pub write: bool,
+    /// Only the region that the program picks by itself.
+    #[arg(long)]
+    pub default: bool,
 }
 
 /// Number of scenes of the main job in this study.
 const COMPARED: usize = 2;
 /// Tables of the page.
-pub const TABLES: [&str; 7] = [
+pub const TABLES: [&str; 9] = [
     "provenance",
+    "default-provenance",
+    "default",
     "picked",
     "demo",
     "demo-not-at-rest",
@@ -66,6 +71,9 @@ const TIMED_FRAMES: &str = "10";
 /// # Errors
 /// The program fails, a scan is missing with `--write`, or a file cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    if options.default {
+        return by_default(options, out);
+    }
     let mut page = options.write.then(|| Page::open("region", &TABLES)).transpose()?;
     let provenance = Provenance::start(if options.write { "region --write" } else { "region" });
     let program = Program::build()?;
@@ -80,7 +88,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         let simulate = |(region, grading): (Option<&str>, Option<&str>), options: &[&str]| {
             let mut set = vec!["output={report=true}".to_owned(), "solver.backend=cpu".to_owned()];
             set.extend(own.iter().cloned());
-            set.extend(region.map(|region| format!("lattice.region={region}")));
+            set.push(format!("lattice.region={}", region.unwrap_or("whole")));
             set.extend(grading.map(|grading| format!("lattice.grading={grading}")));
             program.scene(&scene(name), &set, options, &folder)
         };
@@ -119,6 +127,75 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         page.set("provenance", &provenance.markdown())?;
         page.set("picked", &picked)?;
         page.set("checks", &checks.summary())?;
+        page.save(&results())?;
+    }
+    Ok(checks.pass())
+}
+
+/// Cuts of the demo that differ from its own, by half their length in mm.
+const SHORTER_MM: [f64; 2] = [20.0, 35.0];
+/// Largest relative error of the growth in the region that the program picks.
+const DEFAULT_ERROR: f64 = 0.025;
+
+/// Compares the region that the program picks with the whole body.
+fn by_default(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    let page = options.write.then(|| Page::open("region", &TABLES)).transpose()?;
+    let name = if options.write { "region --default --write" } else { "region --default" };
+    let provenance = Provenance::start(name);
+    let program = Program::build()?;
+    let folder = target_dir()?.join("studies/region");
+    let mut table = Table::new([
+        "scene",
+        "tetrahedra, share",
+        "ms/frame, share",
+        "growth, whole body, mm",
+        "growth, mm",
+        "error",
+    ]);
+    let mut checks = Checks::default();
+    let mut cases: Vec<(String, &str, Vec<String>)> = Vec::new();
+    for (name, scan) in SCENES {
+        let Some(own) = volume(scan) else {
+            ensure!(!options.write, "{name}: the page needs all scans (set CUTIS_TEST_DATA)");
+            continue;
+        };
+        cases.push((name.to_owned(), name, own));
+    }
+    for half in SHORTER_MM {
+        let end = |side: f64| format!("[30.0, 110.0, {:.1}]", side * half);
+        let cut = [format!("incision.0.from_mm={}", end(-1.0)), format!("incision.0.to_mm={}", end(1.0))];
+        cases.push((format!("demo, cut of {} mm", 2.0 * half), "demo", cut.to_vec()));
+    }
+    for (what, name, own) in &cases {
+        let simulate = |region: Option<&str>| {
+            let mut set = vec!["output={report=true}".to_owned(), "solver.backend=cpu".to_owned()];
+            set.extend(own.iter().cloned());
+            set.extend(region.map(|region| format!("lattice.region={region}")));
+            Variant::of(region, None, &program.scene(&scene(name), &set, &[], &folder)?)
+        };
+        let [whole, picked, small] =
+            [simulate(Some("whole"))?, simulate(None)?, simulate(Some("{around_mm=40}"))?];
+        let error = |variant: &Variant| variant.growth_mm / whole.growth_mm - 1.0;
+        table.add([
+            what.clone(),
+            format!("{:.0} %", 100.0 * picked.tets / whole.tets),
+            format!("{:.0} %", 100.0 * picked.ms_min / whole.ms_min),
+            format!("{:.2}", whole.growth_mm),
+            format!("{:.2}", picked.growth_mm),
+            format!("{:+.1} %", 100.0 * error(&picked)),
+        ]);
+        let line =
+            |error: f64| format!("{what}: {:+.2} %, at most {} %", 100.0 * error, 100.0 * DEFAULT_ERROR);
+        checks.add(line(error(&picked)), error(&picked).abs() <= DEFAULT_ERROR);
+        let line = format!("{what}: {:+.2} % in a region of 40 mm", 100.0 * error(&small));
+        checks.control(line, error(&small).abs() > DEFAULT_ERROR);
+    }
+    let table = table.markdown();
+    writeln!(out, "{table}")?;
+    checks.print(out)?;
+    if let Some(mut page) = page.filter(|_| checks.pass()) {
+        page.set("default-provenance", &provenance.markdown())?;
+        page.set("default", &table)?;
         page.save(&results())?;
     }
     Ok(checks.pass())

@@ -57,7 +57,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         Ok(TunedRun { ms: number_at(value, "/ms_per_frame")?, growth_mm })
     };
     let (predicted, predicted_whole) = (run_of(measured)?, run_of(picked)?);
-    let set = solver(picked)?;
+    let set = [solver(picked)?.to_vec(), vec!["lattice.region=whole".to_owned()]].concat();
     let one_substep = ["solver.substeps=1".to_owned()];
     let whole_scene = root().join(SCENE);
     let jobs: [(&Path, &[String]); 3] = [(&whole_scene, &set), (&copy, &[]), (&copy, &one_substep)];

@@ -91,7 +91,9 @@ struct Frames {
 
 impl Frames {
     fn measure(&mut self, program: &Program, changes: &[&str], folder: &Path) -> Result<(), Failure> {
-        let mut set = vec!["output={report=true}".to_owned(), "solver.backend=cpu".to_owned()];
+        let mut set = ["output={report=true}", "solver.backend=cpu", "lattice.region=whole"]
+            .map(str::to_owned)
+            .to_vec();
         set.extend(changes.iter().map(|change| (*change).to_owned()));
         let report = program.scene(&scene("demo"), &set, &["--frames", FRAMES], folder)?;
         self.vertices = number_at(&report, "/sizes/vertices")?;

@@ -49,6 +49,37 @@ fn refusal(set: &[(&str, &str)]) -> (String, String) {
     }
 }
 
+/// A scene at rest that names no region gets one. The wound opens in it as in the whole body, to
+/// the error that the plan states. Control: a region of half the size of the cut.
+#[test]
+fn a_scene_at_rest_gets_a_region_that_hardly_changes_the_wound() {
+    let constraints = "{ distance = {}, volume = {}, membrane = { preset = 'trunk' } }";
+    let own = [
+        ("scan_is_at_rest", "true"),
+        ("materials", "trunk"),
+        ("lattice", "{ spacing_mm = 6, split = 'five' }"),
+        ("constraints", constraints),
+        ("incision", "[{ from_mm = [5, 110, -20], to_mm = [5, 110, 20], depth_mm = 15 }]"),
+        ("solver", "{ formulation = 'vbd', substeps = 2, iterations = 4 }"),
+        ("run.frames", "90"),
+        ("output", "{ report = true }"),
+    ];
+    let run = |region: Option<&str>| {
+        let named = region.map(|region| (REGION, region));
+        Run::of(&scene(SMALL, &[&own[..], named.as_slice()].concat())).report
+    };
+    let [picked, whole, small] = [None, Some("whole"), Some("{ around_mm = 20 }")].map(run);
+    let opening = |report: &cutis::report::Report| report.wound.as_ref().unwrap().final_mm;
+    let error = |report| opening(report) / opening(&whole) - 1.0;
+    assert!(opening(&whole) > 2.0 && picked.sizes.tets * 2 < whole.sizes.tets, "{:?}", picked.sizes);
+    assert!(error(&picked) < 0.0 && error(&picked) > -0.04, "{}", error(&picked));
+    assert!(error(&small) < -0.1, "{}", error(&small));
+    let says =
+        |report: &cutis::report::Report| report.left_out.iter().any(|line| line.contains("it was picked"));
+    assert!(says(&picked) && !says(&whole) && !says(&small));
+    assert!(picked.warnings.iter().all(|line| !line.contains("lattice.region")), "{:?}", picked.warnings);
+}
+
 #[test]
 fn a_region_costs_only_its_own_vertices() {
     let (whole, part) = (plan(&[]), plan(&[(REGION, "{ around_mm = 30 }")]));

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use cutis::report::Report;
+use cutis::scene::{LatticeSection, RegionSection, WholeBody};
 use cutis::solver::{Formulation, Settings, Solver};
 use cutis::solver_cpu::SolverCpu;
 use cutis::tune::Demand;
@@ -221,8 +222,7 @@ fn the_picked_region_opens_as_far_as_the_whole_body() {
     assert!(smaller.iter().all(|error| *error > most), "{:?}", tuning.regions);
 
     let tuned = Scene::load(&out, &[]).unwrap();
-    let zone = tuned.scene.lattice.region.as_ref().and_then(|region| region.around_mm);
-    assert_eq!(zone, Some(region.around_mm));
+    assert_eq!(tuned.scene.lattice.region, Some(RegionSection::around(region.around_mm)));
     let growth = |loaded: &LoadedScene| {
         let wound = run_in(folder.path(), loaded, false).unwrap().wound.unwrap();
         wound.final_mm - wound.initial_mm
@@ -230,12 +230,15 @@ fn the_picked_region_opens_as_far_as_the_whole_body() {
     let opening = growth(&tuned);
     assert!((opening - region.wounds[0].growth_mm).abs() < 1e-6, "{opening} {region:?}");
     let mut whole = tuned.clone();
-    whole.scene.lattice = loaded.scene.lattice.clone();
+    whole.scene.lattice = LatticeSection {
+        region: Some(RegionSection::Whole(WholeBody::Whole)),
+        ..loaded.scene.lattice.clone()
+    };
     let error = (opening / growth(&whole) - 1.0).abs();
     assert!((error - region.error.unwrap()).abs() < 1e-6, "{error} {region:?}");
     // Negative control: half of the region does not pass.
     let mut half = tuned.clone();
-    half.scene.lattice.region.as_mut().unwrap().around_mm = Some(0.4 * region.around_mm);
+    half.scene.lattice.region = Some(RegionSection::around(0.4 * region.around_mm));
     assert!((growth(&half) / growth(&whole) - 1.0).abs() > error);
 
     // A scene with a region keeps it.

@@ -136,7 +136,7 @@ impl Reach {
     /// # Errors
     /// The scene is refused, or has no membrane or no incision.
     fn of(name: &'static str, set: &[String], at_rest: bool) -> Result<Self, Failure> {
-        let set = [set, &[format!("scan_is_at_rest={at_rest}")]].concat();
+        let set = [set, &[format!("scan_is_at_rest={at_rest}"), "lattice.region=whole".to_owned()]].concat();
         let Moved { before, after, skin, incision, growth_mm, change } = Moved::of(name, &set)?;
         let path: Vec<Point3<f64>> = incision.path().into_iter().map(Point3::from).collect();
         let from_path = |position: Point3<f64>| {
@@ -188,7 +188,7 @@ impl Directed {
                  {across:?}, modulus_along_n_per_m = 50.0, modulus_across_n_per_m = 50.0, directions = {{ \
                  {lines} = [0, 0, 1] }} }}"
             );
-            let region = "lattice.region.around_mm=60".to_owned();
+            let region = "lattice.region={ around_mm = 60 }".to_owned();
             Ok(Moved::of(name, &[set, &[membrane, region]].concat())?.growth_mm)
         };
         Ok(Self { scene: name, growth_mm: [growth("around")?, growth("along")?] })

@@ -77,13 +77,16 @@ pub fn measure(program: &Program, folder: &Path, checks: &mut Checks) -> Result<
         }
         rows.push(row);
     }
-    let usual = rows.iter().find(|row| row.spacing_mm == USUAL_MM).map_or(f64::NAN, Row::per_vertex_ns);
-    for row in rows.iter().filter(|row| row.spacing_mm < USUAL_MM) {
-        let share = row.per_vertex_ns() / usual;
-        let what =
-            format!("vbd at {} mm: {share:.2} of the cost per vertex at {USUAL_MM} mm", row.spacing_mm);
+    let usual = rows.iter().find(|row| row.spacing_mm == USUAL_MM);
+    let mut check = |what: &str, row: &Row, cost: fn(&Row) -> f64| {
+        let share = cost(row) / usual.map_or(f64::NAN, cost);
+        let what = format!("{what} at {} mm: {share:.2} of the cost at {USUAL_MM} mm", row.spacing_mm);
         checks.add(format!("{what}, at most {MOST}"), share <= MOST);
+    };
+    for row in rows.iter().filter(|row| row.spacing_mm < USUAL_MM) {
+        check("a vertex with vbd", row, Row::per_vertex_ns);
     }
+    rows.last().into_iter().for_each(|row| check("a constraint with pbd", row, Row::per_constraint_ns));
     Ok(rows)
 }
 

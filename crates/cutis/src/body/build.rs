@@ -75,7 +75,7 @@ impl Body {
         let grabbed = handles::grabbed(sections, &mesh, &cut)?;
         let copies = severed.as_ref().map_or(0, |severed| severed.copies.len());
         let stitches = sutures::stitches(sections, &mesh, &cut, &skin[..skin.len() - copies])?;
-        warnings.extend(region::warning(&mesh));
+        warnings.extend(region::warning(sections.lattice, &mesh));
         Ok(Self {
             mesh,
             skin,
@@ -86,6 +86,7 @@ impl Body {
             cut,
             removed,
             severed,
+            picked_region: region::picked(sections.lattice),
             adhering_blades: sections.adhering_blades.clone(),
             growing,
             stitches,

@@ -17,7 +17,7 @@ use cutis_mesh::sever::{Embedded, Severed};
 use cutis_mesh::{Cut, InactiveSkin, Removed, SkinReport, Stitch, TetMesh};
 use nalgebra::Point3;
 
-use crate::scene::HandleSection;
+use crate::scene::{HandleSection, PickedRegion};
 
 pub use find_skin::{SkinRequest, find_skin};
 pub(crate) use growing::GrowingCuts;
@@ -56,6 +56,8 @@ pub(crate) struct Body {
     pub(crate) removed: Removed,
     /// What cuts of no width changed; none if the scene has none.
     pub(crate) severed: Option<Severed>,
+    /// What is known about the region of interest if the program picked it.
+    pub(crate) picked_region: Option<PickedRegion>,
     /// Numbers of the blades whose sides never come apart.
     pub(crate) adhering_blades: Vec<u32>,
     /// The cuts that are made while the body moves; none if the scene has none.

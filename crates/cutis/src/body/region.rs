@@ -7,7 +7,7 @@ use super::BodySections;
 use super::cut_error::cut_error;
 use super::handles::Grasp;
 use crate::Error;
-use crate::scene::{HandleSection, LatticeSection, Zone};
+use crate::scene::{HandleSection, LatticeSection, PickedRegion, Zone};
 
 /// The mesh of the whole body, or of the scene's region of interest. `from_cuts_mm` returns the
 /// distance of a place, in local meters, from the cuts.
@@ -95,9 +95,15 @@ pub(super) fn check_handles(sections: &BodySections<'_>, mesh: &TetMesh) -> Resu
 }
 
 /// Warning about a region of interest that leaves nothing out.
-pub(super) fn warning(mesh: &TetMesh) -> Option<String> {
+pub(super) fn warning(lattice: &LatticeSection, mesh: &TetMesh) -> Option<String> {
     let inactive = mesh.inactive.as_ref()?;
-    (inactive.tets == 0).then(|| "lattice.region holds the whole body: it leaves nothing out".to_owned())
+    (inactive.tets == 0 && picked(lattice).is_none())
+        .then(|| "lattice.region holds the whole body: it leaves nothing out".to_owned())
+}
+
+/// What is known about a region that the program picked.
+pub(super) fn picked(lattice: &LatticeSection) -> Option<PickedRegion> {
+    lattice.region.as_ref()?.picked()
 }
 
 fn region_zone(lattice: &LatticeSection) -> Option<Zone> {

@@ -4,7 +4,7 @@ use crate::backend::{self, Chosen};
 use crate::body::{Body, even_shape, needs_skin, smooth_skin};
 use crate::model::constraints::kinds::KINDS;
 use crate::output::report::MemoryPart;
-use crate::scene::Scene;
+use crate::scene::{PickedRegion, Scene};
 
 /// Sections that the scene does not name, each with the work that is skipped for that reason.
 pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
@@ -53,9 +53,16 @@ fn region(body: &Body, memory: &[MemoryPart]) -> Option<String> {
         part.bytes as f64 * left as f64 / kept.max(1) as f64
     };
     let bytes: f64 = memory.iter().map(saved).sum();
+    let why = body.picked_region.map_or(String::new(), |PickedRegion { wound_mm, error }| {
+        format!(
+            "; it was picked for wounds of {wound_mm:.0} mm, whose opening is about {:.0} % smaller than in \
+             the whole body (lattice.region = \"whole\")",
+            100.0 * error
+        )
+    });
     Some(format!(
         "region: {} of {} tetrahedra and {} of {} vertices lie outside it; they are neither stored nor \
-         simulated, which saves about {:.1} MB of the solver's memory",
+         simulated, which saves about {:.1} MB of the solver's memory{why}",
         inactive.tets,
         inactive.tets + mesh.tets.len(),
         inactive.vertices,

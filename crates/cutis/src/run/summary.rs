@@ -30,9 +30,14 @@ pub(super) fn report(
     let Simulated { mut plan, device, resumed, result } = simulated;
     let (rows, end) = (result.rows, result.end);
     let wounds = wounds(body, &rows);
-    warn(&mut plan, &crossed_lips(loaded, body, &wounds), clock.progress);
     let rest = &body.mesh.positions;
     let moved = rest.iter().zip(&end.positions).map(|(a, b)| f64::from((b - a).norm()) * 1e3);
+    let max_displacement_mm = moved.fold(0.0, f64::max);
+    let border_displacement_mm = body.border_displacement_mm(&end.positions);
+    let mut late = crossed_lips(loaded, body, &wounds);
+    let border_mm = body.picked_region.and(border_displacement_mm);
+    late.extend(narrow_region(border_mm, max_displacement_mm));
+    warn(&mut plan, &late, clock.progress);
     let report = Report {
         schema: SCHEMA.into(),
         cutis_version: env!("CARGO_PKG_VERSION").into(),
@@ -61,8 +66,8 @@ pub(super) fn report(
         resample: outputs.resample,
         chainmail: end.chainmail,
         residuals: end.residuals,
-        max_displacement_mm: moved.fold(0.0, f64::max),
-        border_displacement_mm: body.border_displacement_mm(&end.positions),
+        max_displacement_mm,
+        border_displacement_mm,
         left_out: plan.left_out,
         warnings: [plan.warnings, outputs.warnings].concat(),
     };
@@ -74,6 +79,19 @@ pub(super) fn report(
         report.write(&folder.report())?;
     }
     Ok(report)
+}
+
+/// Displacement at the border of a region that was picked, over the largest one, above which it is
+/// reported. The error of the opening is about this share (`docs/results/region.md`).
+const NARROW: f64 = 0.05;
+
+/// Warning about a region that the program picked and that holds the wounds back.
+fn narrow_region(border_mm: Option<f64>, most_mm: f64) -> Option<String> {
+    let border_mm = border_mm.filter(|&mm| mm > NARROW * most_mm)?;
+    Some(format!(
+        "tissue at the border of the picked region moved by {border_mm:.2} mm, and the largest displacement is \
+         {most_mm:.2} mm: the region holds the wounds back. Set lattice.region to a larger zone or to \"whole\""
+    ))
 }
 
 /// The sutures with the forces after the last frame.
@@ -155,4 +173,18 @@ fn crossed_lips(loaded: &LoadedScene, body: &Body, wounds: &[Wound]) -> Vec<Stri
         })
     };
     wounds.iter().enumerate().filter_map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::narrow_region;
+
+    #[test]
+    fn a_region_whose_border_moves_is_reported() {
+        assert_eq!(narrow_region(None, 10.0), None);
+        assert_eq!(narrow_region(Some(0.49), 10.0), None);
+        assert_eq!(narrow_region(Some(0.0), 0.0), None);
+        let warning = narrow_region(Some(0.51), 10.0).unwrap();
+        assert!(warning.contains("0.51 mm") && warning.contains("lattice.region"), "{warning}");
+    }
 }

@@ -153,6 +153,7 @@ impl Scene {
             }
         })?;
         crate::model::fill_defaults(&mut scene);
+        super::pick_region::fill(&mut scene);
         scene.validate(SceneFile { file, steps: &steps })?;
         // Paths in a scene start from its folder, and paths in an override from the present one.
         let strokes =

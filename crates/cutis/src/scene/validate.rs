@@ -122,9 +122,10 @@ impl Scene {
             check.require(n.iter().all(|&n| n >= 2), "lattice.vertices", format!("{n:?}"), why)?;
         }
         let acts = self.cuts() || !self.handle.is_empty();
-        if let Some(region) = &lattice.region {
+        if let Some(RegionSection::Zone(region)) = &lattice.region {
             let corners = [region.min_mm, region.max_mm];
-            check.zone("lattice.region", region.around_mm, corners, region.zone(), acts)?;
+            let zone = Zone::of(region.around_mm, region.min_mm, region.max_mm);
+            check.zone("lattice.region", region.around_mm, corners, zone, acts)?;
         }
         if let Some(grading) = &lattice.grading {
             let corners = [grading.min_mm, grading.max_mm];

@@ -7,7 +7,7 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, TableLike, Value};
 
 use crate::Error;
 use crate::run::files;
-use crate::scene::{LoadedScene, Scene};
+use crate::scene::{LoadedScene, RegionSection, Scene};
 
 /// Destination of the copy, checked before the long work starts.
 pub(super) struct SceneCopy<'a> {
@@ -59,7 +59,7 @@ impl<'a> SceneCopy<'a> {
 /// The text of a scene file that describes `wanted` when it is read from `directory`.
 fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<String, String> {
     let plain = |e: &dyn std::fmt::Display| e.to_string();
-    let value = |scene: &Scene| toml::Table::try_from(without_path(scene)).map_err(|e| plain(&e));
+    let value = |scene: &Scene| toml::Table::try_from(comparable(scene)).map_err(|e| plain(&e));
     let written = Scene::parse(&loaded.text, &loaded.file, Path::new(""), &[]).map_err(|e| plain(&e))?.scene;
     let mut document: DocumentMut = loaded.text.parse().map_err(|e| plain(&e))?;
     change(document.as_table_mut(), &value(&written)?, &value(wanted)?);
@@ -73,15 +73,19 @@ fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<Stri
         document["volume"]["path"] = toml_edit::value(text);
     }
     let found = read(&document).map_err(|e| plain(&e))?.scene;
-    if without_path(&found) != without_path(wanted) || path(&found) != path(wanted) {
+    if comparable(&found) != comparable(wanted) || path(&found) != path(wanted) {
         return Err("the edited scene has other values than intended; this is a bug in cutis".into());
     }
     Ok(document.to_string())
 }
 
-fn without_path(scene: &Scene) -> Scene {
+/// The scene without what may differ between two files that describe it.
+fn comparable(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.volume.path = None;
+    if let Some(RegionSection::Zone(zone)) = &mut scene.lattice.region {
+        zone.picked = None;
+    }
     scene
 }
 

@@ -41,7 +41,7 @@ use crate::model::needs_system;
 use crate::report::Machine;
 use crate::run::clock::Clock;
 use crate::run::prepare::{Prepared, prepare};
-use crate::scene::LoadedScene;
+use crate::scene::{LoadedScene, RegionSection, WholeBody};
 use crate::{CostReport, Error, Progress};
 
 pub use ablation::Omission;
@@ -90,6 +90,7 @@ pub struct TuneOptions {
 pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress) -> Result<Tuning, Error> {
     needs_system(loaded)?;
     check(loaded, options)?;
+    let loaded = &on_whole_body(loaded);
     let copy = SceneCopy::to(&options.out, options.overwrite, loaded)?;
     let mut clock = Clock::new(progress);
     let Prepared { source, body, backend, plan, .. } = prepare(loaded, Request::of(loaded)?, &mut clock)?;
@@ -174,6 +175,17 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
     }
     tuning.stages = clock.stages;
     Ok(tuning)
+}
+
+/// The scene on the whole body if the program picked its region, so that regions are compared with
+/// that.
+fn on_whole_body(loaded: &LoadedScene) -> LoadedScene {
+    let mut loaded = loaded.clone();
+    let region = &mut loaded.scene.lattice.region;
+    if region.as_ref().is_some_and(|region| region.picked().is_some()) {
+        *region = Some(RegionSection::Whole(WholeBody::Whole));
+    }
+    loaded
 }
 
 /// Refuses scenes and options that cannot be tuned.

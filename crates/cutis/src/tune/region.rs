@@ -57,10 +57,9 @@ impl RegionTrial {
 
     /// A copy of `lattice` with this region.
     pub(super) fn applied_to(&self, lattice: &LatticeSection) -> LatticeSection {
-        let region = RegionSection { around_mm: Some(self.around_mm), min_mm: None, max_mm: None };
         let graded = self.grading_mm.map(GradingSection::around);
         LatticeSection {
-            region: Some(region),
+            region: Some(RegionSection::around(self.around_mm)),
             grading: graded.or_else(|| lattice.grading.clone()),
             ..lattice.clone()
         }
@@ -83,7 +82,8 @@ impl Baseline<'_> {
     /// `most`. None is tried if the scene has a region, or neither an incision nor a handle.
     pub(super) fn regions(&self, most: f64, limit_s: f64, clock: &mut Clock<'_>) -> Vec<RegionTrial> {
         let scene = &self.loaded.scene;
-        let (None, Some(reach_mm)) = (&scene.lattice.region, self.reach_mm()) else { return Vec::new() };
+        let is_whole = scene.lattice.region.as_ref().is_none_or(|region| region.zone().is_none());
+        let Some(reach_mm) = self.reach_mm().filter(|_| is_whole) else { return Vec::new() };
         let fine = scene.lattice.grading.is_none().then_some((FINE * reach_mm).ceil());
         let zones: &[Option<f64>] = if fine.is_some() { &[None, fine] } else { &[None] };
         let (mut list, mut left_s) = (Vec::new(), limit_s);
@@ -222,7 +222,7 @@ mod tests {
         let graded = RegionTrial { grading_mm: Some(40.0), ..plain.clone() };
         for (trial, grading) in [(plain, own), (graded, GradingSection::around(40.0))] {
             let found = trial.applied_to(&lattice);
-            assert_eq!(found.region.as_ref().and_then(|region| region.around_mm), Some(80.0));
+            assert_eq!(found.region, Some(RegionSection::around(80.0)));
             assert_eq!((found.grading, found.spacing_mm), (Some(grading), Some(3.0)));
         }
     }

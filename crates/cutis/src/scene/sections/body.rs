@@ -6,6 +6,7 @@ use cutis_mesh::{HalfSpace, SkinMode, Split};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::region::RegionSection;
 use crate::body::AIR_BELOW_HU;
 use crate::scene::choice::OneOr;
 
@@ -50,9 +51,11 @@ pub struct LatticeSection {
     /// How a cell is split into tetrahedra.
     #[serde(default)]
     pub split: Split,
-    /// The part of the body that is simulated: `around_mm`, or a box. Tissue outside it does not
-    /// move and takes neither time nor memory of the solver. Skin and largest part are found on the
-    /// whole body first. Left out: the whole body.
+    /// The part of the body that is simulated: `"whole"`, `around_mm`, or a box. Tissue outside it
+    /// does not move and takes neither time nor memory of the solver. Skin and largest part are
+    /// found on the whole body first. Left out: about 105 mm around the incisions if the scan is
+    /// at rest, nothing else acts but sutures, and the scene has the presets of `materials` and
+    /// `constraints.membrane` and no `grading`. In other scenes the whole body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<RegionSection>,
     /// A fine zone, `around_mm` or a box, in which the lattice has the spacing that it would have
@@ -60,21 +63,6 @@ pub struct LatticeSection {
     /// axis. Left out: all cells have the same size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grading: Option<GradingSection>,
-}
-
-/// The part of the body that is simulated: `around_mm`, or a box.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RegionSection {
-    /// Everything within this distance of an incision or a handle, mm.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub around_mm: Option<f64>,
-    /// Lowest corner of the box, mm.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub min_mm: Option<[f64; 3]>,
-    /// Highest corner of the box, mm.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_mm: Option<[f64; 3]>,
 }
 
 /// A fine zone, `around_mm` or a box, and the growth of the lattice steps outside it.
@@ -131,18 +119,16 @@ pub(crate) enum Zone {
 
 impl Zone {
     /// The zone, if exactly one of the two is given.
-    fn of(around_mm: Option<f64>, min_mm: Option<[f64; 3]>, max_mm: Option<[f64; 3]>) -> Option<Self> {
+    pub(crate) fn of(
+        around_mm: Option<f64>,
+        min_mm: Option<[f64; 3]>,
+        max_mm: Option<[f64; 3]>,
+    ) -> Option<Self> {
         match (around_mm, min_mm, max_mm) {
             (Some(around), None, None) => Some(Self::Around(around)),
             (None, Some(min), Some(max)) => Some(Self::Box(min, max)),
             _ => None,
         }
-    }
-}
-
-impl RegionSection {
-    pub(crate) fn zone(&self) -> Option<Zone> {
-        Zone::of(self.around_mm, self.min_mm, self.max_mm)
     }
 }
 

@@ -5,6 +5,7 @@ mod body;
 mod cuts;
 mod material_presets;
 mod materials;
+mod region;
 mod running;
 mod sutures;
 
@@ -12,5 +13,6 @@ pub use actions::*;
 pub use body::*;
 pub use cuts::*;
 pub use materials::*;
+pub use region::*;
 pub use running::*;
 pub use sutures::*;
