@@ -66,12 +66,20 @@ fn table(heading: &str) -> Vec<Vec<String>> {
 fn tables_hold_the_figures_of_the_report() {
     let report = &finished().report;
     let stages = report["stages"].as_array().unwrap();
-    let rows = table("Time per stage");
+    let rows = table("Time and memory per stage");
     assert_eq!(rows.len(), stages.len());
     for (row, stage) in rows.iter().zip(stages) {
         assert_eq!((row[0].as_str(), row[2].as_str()), (stage["name"].as_str().unwrap(), "cpu"));
         let ms = number(row[1].strip_suffix(" ms").unwrap());
         assert!((ms - stage["ms"].as_f64().unwrap()).abs() < 0.051, "{row:?}");
+        let bytes = stage.get("peak_bytes").and_then(|bytes| bytes.as_f64());
+        assert_eq!(bytes.is_some(), cfg!(target_os = "linux"));
+        let shown = row[3].strip_prefix("peak ").and_then(|cell| cell.strip_suffix(" MB")).map(number);
+        assert!(
+            shown.zip(bytes).is_none_or(|(mb, bytes)| bytes > 5e6 && (mb - bytes / 1e6).abs() < 0.51),
+            "{row:?}"
+        );
+        assert_eq!(shown.is_some(), bytes.is_some(), "{row:?}");
     }
 
     let residuals = report["residuals"].as_array().unwrap();

@@ -170,14 +170,15 @@ fn summary(report: &Report) -> String {
 
 fn tables(report: &Report) -> String {
     let mut out = timeline(&report.steps);
-    out.push_str("<h2>Time per stage</h2><table>");
+    out.push_str("<h2>Time and memory per stage</h2><table>");
     for stage in &report.stages {
         let _ = write!(
             out,
-            "<tr><td>{}</td><td class=\"n\">{:.1} ms</td><td>{}</td></tr>",
+            "<tr><td>{}</td><td class=\"n\">{:.1} ms</td><td>{}</td><td class=\"n\">{}</td></tr>",
             escape(&stage.name),
             stage.ms,
-            escape(&stage.on)
+            escape(&stage.on),
+            stage.peak_bytes.map(|bytes| format!("peak {:.0} MB", 1e-6 * bytes as f64)).unwrap_or_default()
         );
     }
     out.push_str("</table>");

@@ -58,7 +58,7 @@ pub struct Report {
     /// Work of the GPU; none on a CPU backend.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<DeviceWork>,
-    /// Time per stage.
+    /// Time and memory per stage.
     pub stages: Vec<Stage>,
     /// Time per frame.
     pub frames: Frames,
@@ -274,7 +274,7 @@ pub struct DeviceWork {
     pub readback_bytes: u64,
 }
 
-/// Time of one stage.
+/// Time and memory of one stage.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Stage {
     /// Name of the stage.
@@ -283,6 +283,10 @@ pub struct Stage {
     pub ms: f64,
     /// Where its heavy part ran: `cpu` or `gpu`.
     pub on: String,
+    /// Largest resident memory of the process during the stage, bytes. None where the system does
+    /// not tell; Linux does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_bytes: Option<u64>,
 }
 
 /// Time per frame.

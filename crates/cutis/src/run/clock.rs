@@ -1,11 +1,13 @@
-//! Times the stages of a run for the report, and announces them to the user.
+//! Measures the time and the memory of the stages of a run for the report, and announces them to
+//! the user.
 
 use std::time::Instant;
 
+use super::peak_memory::PeakMemory;
 use crate::output::report::Stage;
 use crate::{Error, Progress};
 
-/// Times the stages of a run and announces them to the user.
+/// Measures the stages of a run and announces them to the user.
 pub(crate) struct Clock<'a> {
     pub(crate) progress: &'a dyn Progress,
     pub(crate) stages: Vec<Stage>,
@@ -45,11 +47,11 @@ impl<'a> Clock<'a> {
         work: impl FnOnce(&dyn Progress) -> Result<(T, &'static str), Error>,
     ) -> Result<T, Error> {
         self.progress.begin(name, total);
-        let start = Instant::now();
+        let (memory, start) = (PeakMemory::start(), Instant::now());
         let result = work(self.progress);
         let ms = start.elapsed().as_secs_f64() * 1e3;
         let on = result.as_ref().map_or("", |(_, on)| on);
-        self.stages.push(Stage { name: name.into(), ms, on: on.into() });
+        self.stages.push(Stage { name: name.into(), ms, on: on.into(), peak_bytes: memory.bytes() });
         self.progress.end();
         result.map(|(value, _)| value)
     }

@@ -9,6 +9,7 @@ pub(crate) mod checkpoint;
 pub(crate) mod clock;
 pub(crate) mod files;
 pub(crate) mod frames;
+mod peak_memory;
 pub(crate) mod prepare;
 mod run_loop;
 mod simulate;
