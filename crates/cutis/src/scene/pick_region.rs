@@ -3,7 +3,7 @@
 //! A region that is too small holds the wound back. Skin that slides over soft tissue feels a cut
 //! up to a distance that depends on both, and not on the cut. With the tissue and the skin of the
 //! presets, cuts of 40 to 100 mm open less in a region of size `r` around them than in the whole
-//! body by at most about `1.1 exp(−r/26 mm)` (`cargo xtask study region`).
+//! body by at most about `1.1 exp(−r/26 mm)` (`cargo xtask study region --default`).
 
 use nalgebra::{Point3, distance};
 
