@@ -66,7 +66,7 @@ fn more_colors_than_a_mask_holds() {
 fn parts_do_not_change_the_groups() {
     let tets = tuples::<4>(2000, 700, 4);
     let expected = by_priority(&tets, 700);
-    on_each_adapter_with(&GpuOptions { chunk_cap: Some(16_384), ..GpuOptions::default() }, |gpu| {
+    on_each_adapter_with(&GpuOptions { chunk_cap: Some(256), ..GpuOptions::default() }, |gpu| {
         assert!(gpu.chunk_len(16) < tets.len());
         assert_eq!(color(gpu, &tets, 700).unwrap(), expected);
     });
