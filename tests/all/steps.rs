@@ -199,6 +199,20 @@ fn a_hook_grabs_tissue_where_it_is() {
     assert!(2 * opened > grabbed.len(), "{opened} of {} vertices opened before", grabbed.len());
 }
 
+/// An excision that is as deep as it is wide is planned in a region, because it cuts nothing
+/// outside. Control: a region that is smaller than the piece is refused.
+#[test]
+fn a_large_excision_fits_its_region() {
+    let piece = excise(&ellipse(40.0, 40.0), "").replace("depth_mm = 16", "depth_mm = 40");
+    let plan = |region: &str| {
+        let set = [("lattice.region", region), ("lattice.spacing_mm", "12"), ("output", "{}")];
+        cutis::check(&operated(&[&piece], &set), &cutis::Silent)
+    };
+    plan("{ around_mm = 105 }").unwrap();
+    let error = plan("{ min_mm = [-20, 60, -20], max_mm = [30, 200, 20] }").unwrap_err().to_string();
+    assert!(error.contains("step[0]") && error.contains("lattice.region"), "{error}");
+}
+
 /// A hook lifts undermined skin more easily than skin that adheres, which takes its bed along. Both
 /// leave the scan as it is until the hook pulls.
 #[test]

@@ -300,31 +300,45 @@ fn check_within(mesh: &TetMesh, slits: &[Slit], margin: f64) -> Result<(), MeshE
 
 /// Where a blade cuts outside the region or in the coarse part of a lattice, as text. None if it
 /// does not.
+///
+/// A blade touches the vertices in its piece and both ends of each edge that it severs.
 fn blade_beyond(mesh: &TetMesh, blade: &Blade) -> Option<String> {
-    let (lattice, grid) = (&mesh.lattice, mesh.lattice.grid());
-    let reach = longest_edge(lattice);
-    let position_of = |point: usize| mesh.frame.to_local(lattice.mm(grid.point(point)));
-    let cuts = |point: usize| {
-        let position = position_of(point).cast();
-        blade.near(&position, reach)
-            && blade.side(position, reach).is_some()
-            && blade.reached_at(position, reach).is_some()
+    let (lattice, grid, inactive) = (&mesh.lattice, mesh.lattice.grid(), mesh.inactive.as_ref());
+    if lattice.planes().is_none() && inactive.is_none() {
+        return None;
+    }
+    let (reach, around) = (longest_edge(lattice), Neighbors::new(lattice));
+    let (vertex_of, position_of) =
+        (mesh.vertex_of_point(), |point: usize| mesh.frame.to_local(lattice.mm(grid.point(point))).cast());
+    let in_body = |point: usize| {
+        vertex_of[point] != NO_VERTEX || inactive.is_some_and(|inactive| inactive.points[point])
+    };
+    let touched = |point: usize| {
+        let position = position_of(point);
+        if !blade.near(&position, reach) {
+            return false;
+        }
+        let mut touched = blade.encloses(position);
+        around.of(point, |other| {
+            touched |= in_body(other) && blade.separates([position, position_of(other)], reach);
+        });
+        touched
     };
     let vertices = || mesh.lattice_index.iter().map(|&point| point as usize);
     let refuse = |point: usize, place: &str| {
         let at_mm: [f64; 3] = lattice.mm(grid.point(point)).into();
         format!("it touches a vertex of the body at {at_mm:.1?} mm that lies {place}; make that larger")
     };
-    if let Some(inactive) = &mesh.inactive {
+    if let Some(inactive) = inactive {
         let border = vertices().zip(&inactive.border).filter(|(_, border)| **border).map(|(point, _)| point);
         let outside = (0..grid.len()).filter(|&point| inactive.points[point]);
-        if let Some(point) = border.chain(outside).find(|&point| cuts(point)) {
+        if let Some(point) = border.chain(outside).find(|&point| touched(point)) {
             return Some(refuse(point, "outside the region (lattice.region)"));
         }
     }
     let planes = lattice.planes()?;
     let coarse = |&point: &usize| !planes.is_fine(grid.point(point));
-    let point = vertices().filter(coarse).find(|&point| cuts(point))?;
+    let point = vertices().filter(coarse).find(|&point| touched(point))?;
     Some(refuse(point, "in the coarse part of the lattice (lattice.grading)"))
 }
 

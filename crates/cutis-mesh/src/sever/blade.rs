@@ -189,11 +189,6 @@ impl Blade {
         self.length
     }
 
-    /// Whether a position is on the positive side. None if it is farther than `reach` in m.
-    pub(crate) fn side(&self, position: Point3<f64>, reach: f64) -> Option<bool> {
-        Some(self.distance(position, reach)? >= 0.0)
-    }
-
     /// Signed distance in m, up to `reach`. On the blade it is zero.
     pub(super) fn distance(&self, position: Point3<f64>, reach: f64) -> Option<f64> {
         self.shape.distance(position, reach)

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 
 use super::blade::{Shape, Station};
-use super::depth::SkinDepth;
+use super::depth::{SPREAD_STEPS, SkinDepth};
 use super::ribbon::Ribbon;
 use crate::skin_surface::Facet;
 
@@ -76,8 +76,21 @@ impl Bowl {
         if turns == 0.0 {
             return None;
         }
-        let skin = SkinDepth::new(facets, depth + above + 2.0 * margin, step);
         let (outside, slack) = (turns.signum(), BEYOND_STEPS * step);
+        // The skin of the piece and around it. Without this limit, skin on the other side of the
+        // body would count for positions deep below the piece, and the floor would continue there.
+        let (width, bottom) = (margin + SPREAD_STEPS * step, depth + margin);
+        let belongs = |center: Point3<f64>| {
+            let distance = around.distance(center, f64::INFINITY);
+            let place = around.place(center, f64::INFINITY);
+            distance.is_some_and(|distance| outside * distance <= width)
+                && place.is_some_and(|[_, t]| t < bottom - 1e-6 * step)
+        };
+        let skin = SkinDepth::new(
+            facets.into_iter().filter(|facet| belongs(facet.center)).collect(),
+            depth.max(above) + margin,
+            step,
+        );
         let mut bowl = Self { around, walls, outside, skin, depth, length, slack, size: 0.0 };
         let [low, high] = bowl.bounds();
         bowl.size = (high - low).norm();

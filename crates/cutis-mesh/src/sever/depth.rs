@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use crate::skin_surface::Facet;
 
 /// Radius over which the skin is averaged, beyond the distance to it, in lattice steps.
-const SPREAD_STEPS: f64 = 2.5;
+pub(super) const SPREAD_STEPS: f64 = 2.5;
 
 /// The skin near a cut, for depths below it.
 ///
