@@ -166,7 +166,7 @@ impl<'a> Resampler<'a> {
         });
         self.tolerance = Some(space.tolerance);
         let report = self.reports.iter().fold(ResampleReport::default(), |sum, tile| sum + *tile);
-        Ok(ResampleReport { inverted_tets: warp.inverted_tets(), ..report })
+        Ok(ResampleReport { inverted_tets: warp.inverted_tets(&is_moved), ..report })
     }
 
     /// The output of the last update, in the order of [`Volume::voxels`]. All zeros before the

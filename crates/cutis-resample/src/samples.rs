@@ -9,28 +9,52 @@ use crate::tiling::TILE;
 /// Samples that are taken at once. Their numbers fit the first cache of a processor.
 const BLOCK: usize = 128;
 
+/// Voxels that are added or located at once.
+const LANES: usize = 8;
+
+/// Most voxels at a time: those of a tile, because each has one owner.
+const MOST: usize = TILE[0] * TILE[1] * TILE[2];
+
 /// Voxels of a tile, and their places at rest.
-#[derive(Default)]
+///
+/// All arrays are longer than needed by [`LANES`], so that loops may run beyond the last voxel.
 pub struct Samples {
+    count: usize,
     /// Place of each voxel in the values of the tile.
-    pub places: Vec<u32>,
+    places: Vec<u32>,
     /// Continuous voxel index at rest, by axis.
     rest: [Vec<f64>; 3],
 }
 
 impl Samples {
+    pub fn new() -> Self {
+        let length = MOST + LANES;
+        Self { count: 0, places: vec![0; length], rest: [0; 3].map(|_| vec![0.0; length]) }
+    }
+
     pub fn clear(&mut self) {
-        self.places.clear();
-        self.rest.iter_mut().for_each(Vec::clear);
+        self.count = 0;
+    }
+
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        self.count
     }
 
     /// Adds the voxels of a row of the tile whose bits are set.
     #[inline(always)]
     pub fn add(&mut self, row: usize, mut bits: u64) {
         let start = (row * TILE[0]) as u32;
+        // A tet is convex, so the bits are in one run, unless another tet owns some of them.
         while bits != 0 {
-            self.places.push(start + bits.trailing_zeros());
-            bits &= bits - 1;
+            let first = bits.trailing_zeros();
+            let run = (bits >> first).trailing_ones().min(LANES as u32);
+            let next = &mut self.places[self.count..][..LANES];
+            for (n, place) in (0..).zip(next) {
+                *place = start + first + n;
+            }
+            self.count += run as usize;
+            bits &= (u64::MAX << (run - 1)) << first << 1;
         }
     }
 
@@ -43,14 +67,21 @@ impl Samples {
         region: &[Range<usize>; 3],
     ) {
         let start = [0, 1, 2].map(|axis| region[axis].start as u32);
-        for &place in &self.places[first..] {
-            let (column, row) = (place % TILE[0] as u32, place / TILE[0] as u32);
-            let x = f64::from(start[0] + column);
-            let y = f64::from(start[1] + row % TILE[1] as u32);
-            let z = f64::from(start[2] + row / TILE[1] as u32);
+        for n in (first..self.count).step_by(LANES) {
+            let places = &self.places[n..][..LANES];
+            let mut at = [[0.0; LANES]; 3];
+            for n in 0..LANES {
+                let (column, row) = (places[n] % TILE[0] as u32, places[n] / TILE[0] as u32);
+                at[0][n] = f64::from(start[0] + column);
+                at[1][n] = f64::from(start[1] + row % TILE[1] as u32);
+                at[2][n] = f64::from(start[2] + row / TILE[1] as u32);
+            }
             for axis in 0..3 {
                 let [by_x, by_y, by_z] = linear[axis];
-                self.rest[axis].push(((by_x * x + by_y * y) + by_z * z) + offset[axis]);
+                let rest = &mut self.rest[axis][n..][..LANES];
+                for n in 0..LANES {
+                    rest[n] = ((by_x * at[0][n] + by_y * at[1][n]) + by_z * at[2][n]) + offset[axis];
+                }
             }
         }
     }
@@ -59,8 +90,8 @@ impl Samples {
     #[inline(always)]
     pub fn write(&self, sampler: &Sampler<'_>, values: &mut [i16]) {
         let mut first = 0;
-        while first < self.places.len() {
-            let end = self.places.len().min(first + BLOCK);
+        while first < self.count {
+            let end = self.count.min(first + BLOCK);
             let [x, y, z] = [0, 1, 2].map(|axis| &self.rest[axis][first..end]);
             write_block(sampler, [x, y, z], &self.places[first..end], values);
             first = end;

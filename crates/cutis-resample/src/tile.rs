@@ -69,7 +69,7 @@ impl Tile {
             twice: bits(),
             values: vec![0; TILE_ROWS * TILE[0]],
             rows: Rows::new(),
-            samples: Samples::default(),
+            samples: Samples::new(),
         }
     }
 
@@ -131,7 +131,7 @@ impl Tile {
             let maps = rasters.rest_maps(&rest);
             self.samples.clear();
             for (n, &tet) in group.iter().enumerate() {
-                let first = self.samples.places.len();
+                let first = self.samples.len();
                 let rest = source.moved[tet as usize].then_some(&rest);
                 self.claim(source, &rasters, n, tet, rest);
                 self.samples.locate(&maps.map(n), first, &self.region);
@@ -166,27 +166,29 @@ impl Tile {
                         continue;
                     }
                     let row = self.row(j + n, k);
-                    let held = if self.rows.is_close {
-                        raster.levels([j + n, k], columns, start)
-                    } else {
-                        HeldColumns { near, inside: near, strict: near }
-                    };
+                    let mut held = HeldColumns { near, inside: near, strict: near };
+                    if self.rows.is_close {
+                        held = raster.levels([j + n, k], columns, start);
+                        // A tet that holds a center wins over one that only comes near it. Of
+                        // several, the first one wins.
+                        let own = held.near & !(held.inside | self.inside[row] | self.near[row]);
+                        self.near[row] |= own;
+                        if let Some(rest) = rest
+                            && own != 0
+                        {
+                            self.moved[row] |= own;
+                            self.sample_near(source, raster, rest, row, own);
+                        }
+                    }
                     if in_body {
                         self.twice[row] |= self.once[row] & held.strict;
                         self.once[row] |= held.strict;
                     }
-                    // The first tet wins, and a tet that holds the center wins over one that only
-                    // comes near it.
                     let own = held.inside & !self.inside[row];
-                    let own_near = held.near & !(held.inside | self.inside[row] | self.near[row]);
                     self.inside[row] |= own;
-                    self.near[row] |= own_near;
-                    if let Some(rest) = rest {
-                        self.moved[row] |= own | own_near;
+                    if rest.is_some() {
+                        self.moved[row] |= own;
                         self.samples.add(row, own);
-                        if own_near != 0 {
-                            self.sample_near(source, raster, rest, row, own_near);
-                        }
                     } else if self.moved[row] & own != 0 {
                         self.restore(source, row, self.moved[row] & own);
                     }
