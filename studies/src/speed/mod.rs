@@ -1,6 +1,7 @@
 //! What a frame costs: the sizes of the paper's Table 4, and bodies from thousands to millions of
-//! tetrahedra.
+//! tetrahedra. And the time and memory of a whole run on a large CT.
 
+mod memory;
 mod scaling;
 mod table4;
 
@@ -31,7 +32,7 @@ pub struct Options {
 }
 
 /// Tables of the page.
-pub const TABLES: [&str; 4] = ["provenance", "table4", "scaling", "checks"];
+pub const TABLES: [&str; 5] = ["provenance", "table4", "scaling", "memory", "checks"];
 
 /// Measures everything. Returns whether all checks hold.
 ///
@@ -46,20 +47,25 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let table4 = table4::measure(&program, &options.backends, &folder, &mut checks)?;
     let table = table4::table(&table4).markdown();
     writeln!(out, "{table}")?;
-    let mut scaling = Vec::new();
-    let mut scaling_table = String::new();
+    let (mut scaling, mut memory) = (Vec::new(), Vec::new());
+    let [mut scaling_table, mut memory_table] = [String::new(), String::new()];
     if !options.table4 {
         scaling = scaling::measure(&program, &folder, &mut checks)?;
         scaling_table = scaling::table(&scaling).markdown();
-        writeln!(out, "{scaling_table}")?;
+        memory = memory::measure(&program, &folder, &mut checks)?;
+        memory_table = memory::table(&memory).markdown();
+        writeln!(out, "{scaling_table}\n{memory_table}")?;
     }
     checks.print(out)?;
     if let Some(path) = &options.json {
-        write_json(path, &json!({"provenance": provenance, "table4": table4, "scaling": scaling}))?;
+        let figures =
+            json!({"provenance": provenance, "table4": table4, "scaling": scaling, "memory": memory});
+        write_json(path, &figures)?;
     }
     if let Some(mut page) = page.filter(|_| checks.pass()) {
         page.set("table4", &table)?;
         page.set("scaling", &scaling_table)?;
+        page.set("memory", &memory_table)?;
         page.set("provenance", &provenance.markdown())?;
         page.set("checks", &checks.summary())?;
         page.save(&results())?;
