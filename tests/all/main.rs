@@ -24,6 +24,7 @@ mod region;
 mod resume;
 mod scene_files;
 mod scenes;
+mod settle;
 mod shear_lag;
 mod sheet_tension;
 mod skin_counts;

@@ -48,6 +48,22 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Find where a wound ends up: straight to the state of rest, without the motion
+    ///
+    /// Frames are computed first only if something happens over time in the scene: cuts that grow,
+    /// sutures, handles.
+    Settle {
+        /// Scene file (TOML)
+        scene: PathBuf,
+        /// Run folder [default: the scene's name with `-run`, in the current folder]
+        #[arg(long)]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        change: Change,
+        /// Print report.json on standard output
+        #[arg(long)]
+        json: bool,
+    },
     /// Show what a scene would cost: sizes, memory, time, and what it skips
     Check {
         /// Scene file (TOML)

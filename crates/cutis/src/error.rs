@@ -10,6 +10,7 @@ use cutis_gpu::GpuError;
 use cutis_mesh::MeshError;
 use cutis_render::RenderError;
 use cutis_resample::ResampleError;
+use cutis_rest::RestError;
 use cutis_skin::SkinError;
 use cutis_solver::SolverError;
 use cutis_solver_cpu::CpuError;
@@ -91,6 +92,9 @@ pub enum Error {
     /// An error of the system or of time stepping.
     #[error(transparent)]
     Solver(#[from] SolverError),
+    /// The body has no state of rest, or none was found.
+    #[error("run.until = \"rest\": {0}")]
+    Rest(#[from] RestError),
     /// An error of the CPU backend.
     #[error(transparent)]
     Cpu(#[from] CpuError),
@@ -188,6 +192,7 @@ impl Error {
                     | GpuError::Limit { .. }
                     | GpuError::OutOfMemory { .. }
             ),
+            Self::Rest(e) => !matches!(e, RestError::NotAtRest { .. }),
             Self::Resample(_) | Self::Render(_) | Self::Stopped { .. } | Self::NoSetting { .. } => false,
         }
     }

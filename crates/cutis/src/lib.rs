@@ -42,6 +42,7 @@ pub use cutis_gpu as gpu;
 pub use cutis_mesh as mesh;
 pub use cutis_render as render;
 pub use cutis_resample as resample;
+pub use cutis_rest as rest;
 pub use cutis_solver as solver;
 pub use cutis_solver_cpu as solver_cpu;
 #[cfg(feature = "gpu")]

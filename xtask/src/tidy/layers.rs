@@ -50,6 +50,11 @@ const LAYERS: &[Layer] = &[
         level: 3,
         may_use: These(&["cutis-volume", "cutis-gpu", "cutis-shaders"]),
     },
+    Layer {
+        name: "cutis-rest",
+        level: 3,
+        may_use: These(&["cutis-solver", "cutis-constraints", "cutis-coloring"]),
+    },
     Layer { name: "cutis-newton", level: 3, may_use: These(&["cutis-solver", "cutis-constraints"]) },
     Layer { name: "cutis-skin", level: 3, may_use: These(&["cutis-volume", "cutis-mesh"]) },
     Layer {

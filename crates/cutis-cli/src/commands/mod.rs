@@ -17,6 +17,7 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
         Command::Run { scene, out, change, resume, json } => {
             simulate::run(&scene, out, &change, resume, json)
         }
+        Command::Settle { scene, out, change, json } => simulate::settle(&scene, out, &change, json),
         Command::Check { scene, change, lattice, json } => simulate::check(&scene, &change, lattice, json),
         Command::Tune { scene, tune: args, change, json } => tune::tune(&scene, &change, &args, json),
         Command::Resample { scene, run, volume, out, change } => {

@@ -15,6 +15,16 @@ pub(crate) fn demo(out: &Path, change: &Change, json: bool) -> Result<(), Error>
     finish(&loaded, RunOptions { out: out.into(), resume: false }, json)
 }
 
+pub(crate) fn settle(scene: &Path, out: Option<PathBuf>, change: &Change, json: bool) -> Result<(), Error> {
+    let mut overrides = change.overrides(None);
+    overrides.push(Override { key: "run.until".into(), value: "rest".into() });
+    let mut loaded = change.applied(Scene::load(scene, &overrides)?);
+    if change.frames.is_none() && !loaded.scene.moves_over_time() {
+        loaded.scene.run.frames = 0;
+    }
+    finish(&loaded, RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume: false }, json)
+}
+
 pub(crate) fn run(
     scene: &Path,
     out: Option<PathBuf>,
@@ -23,12 +33,14 @@ pub(crate) fn run(
     json: bool,
 ) -> Result<(), Error> {
     let loaded = change.applied(Scene::load(scene, &change.overrides(None))?);
-    let out = out.unwrap_or_else(|| {
-        let mut name = scene.file_stem().unwrap_or_default().to_owned();
-        name.push("-run");
-        name.into()
-    });
-    finish(&loaded, RunOptions { out, resume }, json)
+    finish(&loaded, RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume }, json)
+}
+
+/// The run folder of a scene that names none.
+fn folder(scene: &Path) -> PathBuf {
+    let mut name = scene.file_stem().unwrap_or_default().to_owned();
+    name.push("-run");
+    name.into()
 }
 
 fn finish(loaded: &LoadedScene, options: RunOptions, json: bool) -> Result<(), Error> {
@@ -52,6 +64,7 @@ fn summary(report: &Report, out: &Path) -> String {
             report.frames.ms_mean
         ),
     ];
+    lines.extend(report.rest.iter().map(|rest| rest.summary()));
     lines.extend(report.tension_summary());
     lines.extend(report.model_summary());
     lines.extend(report.wounds.iter().map(|w| {

@@ -10,6 +10,7 @@ pub(crate) mod constraints;
 mod costs;
 mod scene_system;
 
+use cutis_rest::Rest;
 use cutis_solver::StepProfile;
 use nalgebra::Point3;
 
@@ -107,6 +108,15 @@ pub(crate) trait Simulation {
     /// without handles, without a report, or if the formulation knows no forces.
     fn handle_forces(&mut self) -> Result<Vec<f64>, Error> {
         Ok(Vec::new())
+    }
+
+    /// Puts the body into the state of rest that it would reach from its present state.
+    ///
+    /// # Errors
+    /// [`Error::Rest`] if there is none, [`Error::Request`] for a model without energies.
+    fn settle(&mut self) -> Result<Rest, Error> {
+        let why = "this model has no energy that ends in a state of rest";
+        Err(Error::Request { what: "run.until = \"rest\"".into(), why: why.into() })
     }
 
     /// The state after `frame` frames. A checkpoint has at least three words per vertex.

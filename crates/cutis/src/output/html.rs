@@ -150,6 +150,9 @@ fn summary(report: &Report) -> String {
         escape(&machine),
         report.frames.ms_mean
     );
+    if let Some(rest) = &report.rest {
+        let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&rest.summary())));
+    }
     for line in report.tension_summary() {
         let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&line)));
     }

@@ -5,6 +5,7 @@ pub(crate) mod html;
 mod pictures;
 pub mod report;
 mod resample_run;
+pub mod rest_report;
 mod skin_lines;
 pub mod step_report;
 pub mod suture_report;

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::ScanTension;
 use crate::model::constraints::kinds::report_name;
+use crate::output::rest_report::RestReport;
 use crate::output::step_report::{HandleReport, StepReport};
 use crate::output::suture_report::SutureReport;
 use crate::run::files;
@@ -62,6 +63,10 @@ pub struct Report {
     pub stages: Vec<Stage>,
     /// Time per frame.
     pub frames: Frames,
+    /// The state of rest after the frames, if the run ends there. `wounds`, `sutures` and `handles`
+    /// are those in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<RestReport>,
     /// What is done to the body, in the order of time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<StepReport>,

@@ -11,7 +11,8 @@ use super::frames::FrameRow;
 use super::timing::{PartTimes, Timing};
 use crate::backend::{DeviceMeter, DevicePositions};
 use crate::model::{Simulation, SimulationEnd};
-use crate::scene::RunSection;
+use crate::output::rest_report::RestReport;
+use crate::scene::{RunEnd, RunSection};
 use crate::{Error, Progress};
 
 /// Inputs of the frames in addition to the simulation.
@@ -35,6 +36,8 @@ pub(super) struct RunResult {
     /// The state before the first frame, then one row per frame.
     pub(super) rows: Vec<FrameRow>,
     pub(super) end: SimulationEnd,
+    /// The body at rest after the frames, if the run ends there.
+    pub(super) rest: Option<(RestReport, FrameRow)>,
     /// The final positions on the GPU, if the simulation ran there and an output needs them.
     pub(super) on_device: Option<DevicePositions>,
     pub(super) times: PartTimes,
@@ -70,7 +73,7 @@ impl RunLoop<'_> {
         at: &mut Position,
     ) -> Result<RunResult, Error> {
         let lips = Lips::new(self.gapes);
-        let RunSection { frames, checkpoint_every: every } = *self.run;
+        let RunSection { frames, until, checkpoint_every: every } = *self.run;
         let row = |simulation: &mut dyn Simulation, frame, ms| {
             let time_s = simulation.time_s();
             let sutures = suture_forces(self.sutures, &simulation.thread_forces()?);
@@ -96,12 +99,20 @@ impl RunLoop<'_> {
             }
             progress.advance(u64::from(frame - self.done()));
         }
+        let mut rest = None;
+        if until == RunEnd::Rest {
+            let start = Instant::now();
+            let mut found = RestReport::of(&simulation.settle()?);
+            found.ms = start.elapsed().as_secs_f64() * 1e3;
+            let row = row(simulation, frames, found.ms)?;
+            rest = Some((found, row));
+        }
         let end = simulation.end()?;
         let on_device = if self.resamples { simulation.positions_on_device() } else { None };
         if rows.len() > 1 {
             self.time_extra_frame(simulation, &mut times);
         }
-        Ok(RunResult { rows, end, on_device, times })
+        Ok(RunResult { rows, rest, end, on_device, times })
     }
 
     /// Times the parts of one more frame, if they are not timed in every frame. The state is no

@@ -29,7 +29,9 @@ pub(super) fn report(
     let Setup { loaded, options, folder, source, body } = *setup;
     let Simulated { mut plan, device, resumed, result } = simulated;
     let (rows, end) = (result.rows, result.end);
-    let wounds = wounds(body, &rows);
+    let (settling, settled) = result.rest.unzip();
+    let last = settled.as_ref().or(rows.last());
+    let wounds = wounds(body, last);
     let rest = &body.mesh.positions;
     let moved = rest.iter().zip(&end.positions).map(|(a, b)| f64::from((b - a).norm()) * 1e3);
     let max_displacement_mm = moved.fold(0.0, f64::max);
@@ -57,12 +59,13 @@ pub(super) fn report(
         device: device.as_ref().map(DeviceMeter::work),
         stages: clock.stages,
         frames: frame_times(&rows),
+        rest: settling,
         wound: wounds.first().cloned(),
         wounds,
         steps: plan.steps,
         free_pieces_ml: body.free_pieces_ml.clone(),
-        sutures: sutures(loaded, body, &rows),
-        handles: handles(body, &rows),
+        sutures: sutures(loaded, body, last),
+        handles: handles(body, last),
         resample: outputs.resample,
         chainmail: end.chainmail,
         residuals: end.residuals,
@@ -94,9 +97,9 @@ fn narrow_region(border_mm: Option<f64>, most_mm: f64) -> Option<String> {
     ))
 }
 
-/// The sutures with the forces after the last frame.
-fn sutures(loaded: &LoadedScene, body: &Body, rows: &[FrameRow]) -> Vec<SutureReport> {
-    let forces = rows.last().map(|row| row.sutures.as_slice()).unwrap_or_default();
+/// The sutures with the forces at the end.
+fn sutures(loaded: &LoadedScene, body: &Body, last: Option<&FrameRow>) -> Vec<SutureReport> {
+    let forces = last.map(|row| row.sutures.as_slice()).unwrap_or_default();
     let sections = loaded.scene.suture.iter().zip(&body.stitches).zip(forces);
     let report = |((section, stitches), &[force_n, largest_n]): ((&SutureSection, &Vec<_>), &[f64; 2])| {
         let wound = loaded.scene.wound(&section.wound).unwrap_or_default();
@@ -119,17 +122,17 @@ fn wound_length(body: &Body, wound: usize) -> f64 {
     incisions.chain(excisions).nth(wound).unwrap_or_default()
 }
 
-/// The handles with the forces after the last frame.
-fn handles(body: &Body, rows: &[FrameRow]) -> Vec<HandleReport> {
-    let forces = rows.last().map(|row| row.handles.as_slice()).unwrap_or_default();
+/// The handles with the forces at the end.
+fn handles(body: &Body, last: Option<&FrameRow>) -> Vec<HandleReport> {
+    let forces = last.map(|row| row.handles.as_slice()).unwrap_or_default();
     let report = |(grabbed, &force_n): (&Vec<u32>, &f64)| HandleReport { vertices: grabbed.len(), force_n };
     body.grabbed.iter().zip(forces).map(report).collect()
 }
 
-/// Opening of each wound, in the body at rest and after the last frame.
-fn wounds(body: &Body, rows: &[FrameRow]) -> Vec<Wound> {
+/// Opening of each wound, in the scan and at the end.
+fn wounds(body: &Body, last: Option<&FrameRow>) -> Vec<Wound> {
     let before = body.cut.gapes.iter().map(|gape| gape.measure(&body.mesh.positions));
-    let after = rows.last().map(|row| row.gapes.as_slice()).unwrap_or_default();
+    let after = last.map(|row| row.gapes.as_slice()).unwrap_or_default();
     let wound = |(before, after): (WoundGape, &WoundGape)| Wound {
         initial_mm: before.mean_mm,
         final_mm: after.mean_mm,

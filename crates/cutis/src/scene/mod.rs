@@ -117,6 +117,16 @@ impl Scene {
         incisions.chain(self.excision.iter().map(|excision| excision.name.as_deref()))
     }
 
+    /// Whether something happens over time: cuts that grow or come later, sutures, handles.
+    pub fn moves_over_time(&self) -> bool {
+        let later = |at_s: f64, speed_mm_s: Option<f64>| at_s > 0.0 || speed_mm_s.is_some();
+        !self.handle.is_empty()
+            || !self.suture.is_empty()
+            || self.incision.iter().any(|cut| later(cut.at_s, cut.speed_mm_s))
+            || self.undermining.iter().any(|cut| later(cut.at_s, cut.speed_mm_s))
+            || self.excision.iter().any(|cut| later(cut.at_s, None))
+    }
+
     /// Whether something cuts the body.
     pub fn cuts(&self) -> bool {
         self.wounds() > 0

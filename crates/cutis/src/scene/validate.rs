@@ -168,6 +168,9 @@ impl Scene {
 
     fn validate_solver(&self, check: &Check<'_>) -> Result<(), Error> {
         let s = &self.solver;
+        let energies = self.model == ModelChoice::Pbd && s.formulation != Formulation::Pbd;
+        let why = "needs energies: model = \"pbd\" with solver.formulation = \"vbd\" or \"xpbd\"";
+        check.require(energies || self.run.until == RunEnd::Frames, "run.until", "\"rest\"", why)?;
         let named = s.adapter.as_ref().is_none_or(|adapter| !adapter.trim().is_empty());
         let why = "must be a part of an adapter's name, or its index; `cutis devices` lists them";
         check.require(named, "solver.adapter", "\"\"", why)?;

@@ -66,19 +66,33 @@ pub enum BackendChoice {
     Gpu,
 }
 
+/// Where a run ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum RunEnd {
+    /// After the frames.
+    #[default]
+    Frames,
+    /// In the state of rest after the frames.
+    Rest,
+}
+
 /// How long to run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSection {
     /// Number of frames.
     pub frames: u32,
+    /// Where the run ends: `frames` after the frames, or `rest` in the state of rest that the body
+    /// would reach after them. The state of rest is computed without the motion to it.
+    pub until: RunEnd,
     /// Frames between checkpoints, from which `--resume` continues; 0 writes none.
     pub checkpoint_every: u32,
 }
 
 impl Default for RunSection {
     fn default() -> Self {
-        Self { frames: 60, checkpoint_every: 0 }
+        Self { frames: 60, until: RunEnd::default(), checkpoint_every: 0 }
     }
 }
 

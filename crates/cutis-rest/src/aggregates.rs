@@ -1,0 +1,77 @@
+//! Groups of neighboring nodes that become the nodes of a coarser level.
+
+use crate::blocks::Blocks;
+
+/// Couplings weaker than this share of the geometric mean of both diagonal blocks join no nodes.
+const WEAK: f64 = 0.02;
+
+/// Mark of a node that is in no aggregate.
+const NONE: u32 = u32::MAX;
+
+/// A division of the nodes of a level.
+pub(crate) struct Aggregates {
+    /// Aggregate of each node.
+    pub of: Vec<u32>,
+    pub count: usize,
+}
+
+impl Aggregates {
+    /// Divides the nodes of a matrix along its strong couplings (Vaněk, Mandel and Brezina,
+    /// Computing 56, 1996). A node whose neighbors are all free forms an aggregate with them. The
+    /// rest join the aggregate to which they couple most. Nodes with many neighbors come first,
+    /// because larger aggregates make smaller levels.
+    pub fn of<const B: usize>(matrix: &Blocks<f64, B, B>) -> Self {
+        let count = matrix.height();
+        let size = |row: usize| matrix.get(row, row).map_or(0.0, |block| block.norm());
+        let sizes: Vec<f64> = (0..count).map(size).collect();
+        let strong = |row: usize| {
+            matrix.row(row).filter_map({
+                let sizes = &sizes;
+                move |(column, block)| {
+                    let strength = block.norm();
+                    let is_strong = column != row && strength > WEAK * (sizes[row] * sizes[column]).sqrt();
+                    is_strong.then_some((column, strength))
+                }
+            })
+        };
+        let neighbors = |row: usize| matrix.starts[row + 1] - matrix.starts[row];
+        let mean = matrix.columns.len().div_ceil(count.max(1));
+        let (most, few): (Vec<usize>, Vec<usize>) = (0..count).partition(|&row| neighbors(row) >= mean);
+        let mut of = vec![NONE; count];
+        let mut aggregates = 0;
+        for row in most.into_iter().chain(few) {
+            if of[row] == NONE && strong(row).all(|(column, _)| of[column] == NONE) {
+                let mut members = 0;
+                for (column, _) in strong(row) {
+                    of[column] = aggregates;
+                    members += 1;
+                }
+                // A lone node waits for a neighbor's aggregate.
+                if members > 0 {
+                    of[row] = aggregates;
+                    aggregates += 1;
+                }
+            }
+        }
+        let seeds = of.clone();
+        for row in 0..count {
+            if of[row] == NONE {
+                let joined = strong(row).filter(|(column, _)| seeds[*column] != NONE);
+                let closest = joined.max_by(|(_, a), (_, b)| a.total_cmp(b));
+                of[row] = closest.map_or(NONE, |(column, _)| seeds[column]);
+            }
+        }
+        for row in 0..count {
+            if of[row] == NONE {
+                of[row] = aggregates;
+                for (column, _) in strong(row) {
+                    if of[column] == NONE {
+                        of[column] = aggregates;
+                    }
+                }
+                aggregates += 1;
+            }
+        }
+        Self { of, count: aggregates as usize }
+    }
+}

@@ -1,0 +1,41 @@
+//! States of rest of soft bodies, without the motion to them.
+//!
+//! A body at rest is at a minimum of `U(x) = Σ ½C²/α − Σ (m g + load)·x`. Local sweeps, such as
+//! those of PBD and vertex block descent, carry a force by one element per color and iteration. So
+//! their number of iterations grows with the resolution. [`Body::settle`] finds the minimum by
+//! Newton's method. Conjugate gradients solve its equations, with a multigrid cycle as
+//! preconditioner. The number of cycles hardly grows with the resolution.
+//!
+//! The energies are those of a [`System`](cutis_solver::System). All types of constraints count,
+//! through their values and gradients. The result has the same bits for any number of threads.
+//!
+//! # Method
+//! - **Equations.** `H d = −∇U` with `H = Σ (∇C∇Cᵀ + C∇²C)/α`. Second derivatives count only for
+//!   stretched constraints of types whose value is curved in a single vertex, such as lengths. They
+//!   come from central differences of the gradients. The others could make `H` indefinite. Far from
+//!   a minimum, and for volumes under pressure, this is a Gauss–Newton step.
+//! - **Preconditioner.** Smoothed aggregation (Vaněk, Mandel and Brezina, Computing 56, 1996): see
+//!   `multigrid.rs`. It is built from `H` alone, so it knows every cut.
+//! - **Steps.** A line search lowers `U` in each step (Armijo). The equations are solved only as
+//!   exactly as the step deserves (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996).
+#![forbid(unsafe_code)]
+
+mod aggregates;
+mod blocks;
+mod body;
+mod conjugate;
+mod energy;
+mod error;
+mod hessian;
+mod multigrid;
+mod options;
+mod settle;
+
+pub use body::Body;
+pub use error::RestError;
+pub use options::{Options, Rest, Step};
+pub use settle::Search;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,126 @@
+//! Equilibria, compared with a direct solver.
+
+use cutis_newton::{Problem, relative_rms};
+use cutis_rest::{Body, Options, Rest};
+use nalgebra::Point3;
+
+use crate::blocks::{EDGE, GRAVITY_M_S2, Make};
+
+/// Options for comparisons.
+const EXACT: Options = Options { error: 1e-9, force: 1e-12, most_steps: 100, most_cycles: 300 };
+
+fn settled(make: Make, options: &Options) -> Rest {
+    Body::of(&make.system(), GRAVITY_M_S2).unwrap().settle(options, &mut |_| ()).unwrap()
+}
+
+fn cycles(rest: &Rest) -> usize {
+    rest.steps.iter().map(|step| step.cycles).sum()
+}
+
+/// Blocks of soft and stiff halves, with little and much change of volume, whole and cut. The small
+/// ones are solved directly, the others on several levels.
+#[test]
+fn blocks_rest_where_a_direct_solver_finds_them() {
+    let usual = Make::default();
+    let makes = [
+        Make { size: 5, ..usual },
+        usual,
+        Make { size: 13, ..usual },
+        Make { size: 11, cut: true, ..usual },
+        Make { size: 11, contrast: 1000.0, ..usual },
+        Make { size: 11, incompressibility: 100.0, ..usual },
+        Make { size: 11, youngs_modulus_pa: 3e3, ..usual },
+    ];
+    for (n, make) in makes.into_iter().enumerate() {
+        let system = make.system();
+        let problem = Problem::of(&system, GRAVITY_M_S2).unwrap();
+        let start = system.positions();
+        let expected = problem.equilibrium(&start, &cutis_newton::Options::default()).unwrap();
+        let found = settled(make, &EXACT);
+        let error = relative_rms(&found.positions, &expected.positions, &start);
+        assert!(error < 1e-6, "block {n}: {error:e} in {:?}", found.steps);
+        // Control: the block moves by more than the error, and a rough search ends elsewhere.
+        let sag = start.iter().zip(&found.positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(sag > 1e-3 * EDGE, "block {n}: {sag}");
+        let rough = settled(make, &Options { error: 0.05, force: 0.0, ..EXACT });
+        let rough = relative_rms(&rough.positions, &expected.positions, &start);
+        assert!(rough > error && rough < 0.05, "block {n}: {rough:e}");
+    }
+}
+
+/// The error that a search states is not smaller than the true one.
+#[test]
+fn stated_errors_hold() {
+    let usual = Make { size: 11, ..Make::default() };
+    for make in [
+        Make { youngs_modulus_pa: 3e3, ..usual },
+        Make { contrast: 1000.0, ..usual },
+        Make { incompressibility: 100.0, ..usual },
+        Make { cut: true, ..usual },
+    ] {
+        let exact = settled(make, &EXACT);
+        let start = make.system().positions();
+        for error in [0.1, 0.01, 1e-3, 1e-5] {
+            let found = settled(make, &Options { error, force: 0.0, ..EXACT });
+            let real = relative_rms(&found.positions, &exact.positions, &start);
+            assert!(
+                real <= found.error && found.error <= error,
+                "{error}: {} and {real} {:#?}",
+                found.error,
+                found.steps
+            );
+        }
+    }
+}
+
+/// From 500 to 33 thousand vertices the cycles grow by less than a half.
+#[test]
+fn cycles_hardly_grow_with_the_body() {
+    let options = Options { error: 1e-3, ..EXACT };
+    let counts = [8, 16, 32].map(|size| cycles(&settled(Make { size, ..Make::default() }, &options)));
+    assert!(2 * counts[2] <= 3 * counts[0].max(counts[1]), "{counts:?}");
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let make = Make { size: 14, cut: true, ..Make::default() };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| settled(make, &Options::default()))
+    };
+    let one = on(1);
+    for threads in [2, 3, 8] {
+        assert!(on(threads) == one, "{threads} threads");
+    }
+}
+
+#[test]
+fn a_body_at_rest_does_not_move() {
+    let system = Make::default().system();
+    let rest = Body::of(&system, [0.0; 3]).unwrap().settle(&Options::default(), &mut |_| ()).unwrap();
+    assert_eq!((rest.positions, rest.steps.len(), rest.error), (system.positions(), 0, 0.0));
+}
+
+/// A body far from its rest shape, turned inside out in a part, comes to rest or says that it did
+/// not.
+#[test]
+fn a_start_far_from_rest_ends_at_a_minimum_or_an_error() {
+    let system = Make { size: 6, ..Make::default() }.system();
+    let options = Options { most_steps: 300, ..EXACT };
+    let moved = |by: f64| -> Vec<Point3<f64>> {
+        let wave =
+            |x: &Point3<f64>| Point3::new(x.x + by * (90.0 * x.y).sin(), x.y + by * (70.0 * x.z).sin(), x.z);
+        system.positions().iter().map(wave).collect()
+    };
+    let body = Body::of(&system, GRAVITY_M_S2).unwrap();
+    let expected = body.settle(&options, &mut |_| ()).unwrap();
+    for by in [0.005, 0.01] {
+        let found = body.settle_from(&moved(by), &options, &mut |_| ()).unwrap();
+        let error = relative_rms(&found.positions, &expected.positions, &system.positions());
+        assert!(error < 1e-5, "{by}: {error}");
+    }
+    match body.settle_from(&moved(0.08), &options, &mut |_| ()) {
+        Ok(rest) => assert!(rest.force < 1e-3, "{}", rest.force),
+        Err(error) => assert!(error.to_string().contains("not at rest"), "{error}"),
+    }
+}

@@ -1,0 +1,143 @@
+//! Runs that end in the state of rest.
+
+use cutis::rest::{Body, Options};
+use cutis::{Error, Scene};
+use cutis_newton::{Problem, relative_rms};
+
+use crate::identity::original;
+use crate::scenes::{Run, SMALL, folder, overrides, run_in, scene};
+
+const TISSUE: &str = "{ distance = { youngs_modulus_pa = 2e4 }, volume = { bulk_modulus_pa = 1e5 }, \
+     membrane = { preset = 'trunk' }, contact = {} }";
+const CUT: &str = "[{ from_mm = [30.3, 110, -50], to_mm = [30.3, 110, 50], depth_mm = 20 }]";
+const REST: (&str, &str) = ("run", "{ frames = 0, until = 'rest' }");
+
+fn small(set: &[(&str, &str)]) -> cutis::LoadedScene {
+    let own = [
+        ("scan_is_at_rest", "true"),
+        ("constraints", TISSUE),
+        ("incision", CUT),
+        ("solver.formulation", "vbd"),
+        ("output", "{ report = true }"),
+    ];
+    scene(SMALL, &[&own[..], set].concat())
+}
+
+/// The state of rest is that of a direct solver. Control: with another tension it is not.
+#[test]
+fn a_wound_rests_where_a_direct_solver_finds_it() {
+    let system = |constraints: &str| {
+        let set = [("lattice.region", "{ around_mm = 45 }"), ("constraints", constraints)];
+        cutis::build_system(&small(&set)).unwrap().system
+    };
+    let [system, other] = [system(TISSUE), system(&TISSUE.replace("trunk", "limb"))];
+    let start = system.to_f64().positions();
+    let problem = Problem::of(&system, [0.0; 3]).unwrap();
+    let expected = problem.equilibrium(&start, &cutis_newton::Options::default()).unwrap();
+    let error = |system| {
+        let body = Body::of(system, [0.0; 3]).unwrap();
+        let options = Options { error: 1e-9, force: 1e-12, ..Options::default() };
+        let found = body.settle(&options, &mut |_| ()).unwrap();
+        relative_rms(&found.positions, &expected.positions, &start)
+    };
+    let [same, other] = [&system, &other].map(error);
+    assert!(same < 1e-6 && other > 0.01, "{same:e} and {other:e}");
+}
+
+/// A wound settles to the same opening from the start and after some frames, and after few frames
+/// alone it is elsewhere.
+#[test]
+fn the_way_to_rest_does_not_matter() {
+    let opening = |set: &[(&str, &str)]| Run::of(&small(set)).report.wound.unwrap().final_mm;
+    let settled = opening(&[REST]);
+    let after = opening(&[("run", "{ frames = 20, until = 'rest' }")]);
+    let short = opening(&[("run.frames", "3")]);
+    assert!((settled / after - 1.0).abs() < 2e-3, "{settled} and {after} mm");
+    assert!((settled / short - 1.0).abs() > 0.05, "{settled} and {short} mm");
+}
+
+/// The report states the error and the steps, and the lips of the cut move no more.
+#[test]
+fn the_report_states_the_error() {
+    let run = Run::of(&small(&[REST]));
+    let rest = run.report.rest.clone().unwrap();
+    assert!(rest.error > 0.0 && rest.error <= 1e-3 && !rest.steps.is_empty(), "{rest:?}");
+    assert!(String::from_utf8(run.bytes("report.html")).unwrap().contains("At rest, with an estimated"));
+    assert!(Run::of(&small(&[("run.frames", "2")])).report.rest.is_none());
+}
+
+/// A body that is at rest in the scan does not move by one bit, on any lattice.
+#[test]
+fn an_uncut_body_does_not_move() {
+    for lattice in [("lattice.split", "kuhn6"), ("lattice.split", "five")] {
+        let run = Run::of(&small(&[
+            REST,
+            lattice,
+            ("incision", "[]"),
+            ("output", "{ volume = true, report = true }"),
+        ]));
+        assert_eq!(run.report.max_displacement_mm, 0.0, "{:?}", run.report.rest);
+        assert!(run.deformed().voxels() == original().voxels());
+    }
+}
+
+#[test]
+fn threads_do_not_change_the_state_of_rest() {
+    let on = |threads: &str| {
+        let run = Run::of(&small(&[REST, ("solver.threads", threads), ("output", "{ surface = true }")]));
+        run.bytes("skin.vtu")
+    };
+    let one = on("1");
+    for threads in ["2", "3", "8"] {
+        assert!(on(threads) == one, "{threads} threads");
+    }
+}
+
+/// Sutures pull in the frames. The closed wound settles where a longer run ends. Control: without
+/// them it stays open.
+#[test]
+fn a_sutured_wound_settles_closed() {
+    let sew = "[{ wound = 0, every_mm = 10, bite_mm = 10, at_s = 0.1, tighten_s = 0.3 }]";
+    let report = |set: &[(&str, &str)]| {
+        let own = [("suture", sew), ("solver.substeps", "2"), ("solver.iterations", "8")];
+        Run::of(&small(&[&own[..], set].concat())).report
+    };
+    let settled = report(&[("run", "{ frames = 30, until = 'rest' }")]);
+    let long = report(&[("run.frames", "150")]);
+    let open = report(&[REST, ("suture", "[]")]);
+    let [settled_mm, long_mm, open_mm] =
+        [&settled, &long, &open].map(|report| report.wound.as_ref().unwrap().final_mm);
+    assert!((settled_mm - long_mm).abs() < 0.01 * open_mm, "{settled_mm} and {long_mm} of {open_mm} mm");
+    assert!(settled_mm < 0.5 * open_mm, "{settled_mm} of {open_mm} mm");
+    let [force, expected] = [&settled, &long].map(|report| report.sutures[0].force_n);
+    assert!((force / expected - 1.0).abs() < 0.02, "{force} and {expected} N");
+}
+
+#[test]
+fn models_without_energies_are_refused() {
+    for (name, set) in
+        [("demo-paper.toml", ("solver.formulation", "pbd")), ("demo-chainmail.toml", ("model", "chainmail"))]
+    {
+        let set = overrides(&[("run.until", "rest"), set]);
+        let error = Scene::load(&folder().join(name), &set).unwrap_err();
+        assert!(matches!(&error, Error::SceneKey { key, .. } if key == "run.until"), "{error}");
+        assert!(error.is_bad_input());
+    }
+    let wrong = Scene::load(&folder().join(SMALL), &overrides(&[("run.until", "sleep")])).unwrap_err();
+    assert!(wrong.to_string().contains("frames") && wrong.to_string().contains("rest"), "{wrong}");
+}
+
+/// Tissue that nothing holds has no state of rest under its weight.
+#[test]
+fn a_body_that_falls_is_an_error() {
+    let set = [
+        ("scan_is_at_rest", "false"),
+        ("fixed", "{}"),
+        ("solver.gravity_m_s2", "[0, 0, -9.81]"),
+        ("incision", "[]"),
+        REST,
+    ];
+    let temporary = tempfile::tempdir().unwrap();
+    let error = run_in(temporary.path(), &small(&set), false).unwrap_err();
+    assert!(error.to_string().contains("not at rest") && !error.is_bad_input(), "{error}");
+}
