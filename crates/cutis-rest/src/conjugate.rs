@@ -43,7 +43,7 @@ pub(crate) fn solve(
     {
         let product = matrix.times(&direction);
         let curvature = dot(&direction, &product);
-        if !(curvature > 0.0) {
+        if curvature.is_nan() || curvature <= 0.0 {
             indefinite = true;
             break;
         }
@@ -54,7 +54,7 @@ pub(crate) fn solve(
         z = multigrid.cycle(&residual);
         cycles += 1;
         let next = dot(&residual, &z);
-        if !(next > 0.0) {
+        if next.is_nan() || next <= 0.0 {
             break;
         }
         let ratio = next / energy;

@@ -82,12 +82,9 @@ impl Body {
             (force, size, rounding)
         };
         let found: Vec<_> = self.free.par_iter().enumerate().with_min_len(ROWS).map(at_vertex).collect();
-        let square = |of: &dyn Fn(&(Vector3<f64>, f64, f64)) -> f64| {
-            found.iter().map(|found| of(found).powi(2)).sum::<f64>().sqrt()
-        };
-        let norm = square(&|found| found.0.norm());
-        let scale = square(&|found| found.1);
-        let floor = f64::EPSILON * square(&|found| found.2);
+        let norm = root_of_squares(found.iter().map(|(force, ..)| force.norm()));
+        let scale = root_of_squares(found.iter().map(|(_, size, _)| *size));
+        let floor = f64::EPSILON * root_of_squares(found.iter().map(|(.., rounding)| *rounding));
         let noise = f64::EPSILON * noise;
         let forces = found.into_iter().map(|(force, ..)| force).collect();
         State { x, values, gradients, forces, norm, scale, floor, noise }
@@ -121,4 +118,9 @@ impl Body {
         }
         self.at(x)
     }
+}
+
+/// The root of the sum of squares.
+fn root_of_squares(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|value| value * value).sum::<f64>().sqrt()
 }

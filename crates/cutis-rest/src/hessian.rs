@@ -90,7 +90,7 @@ impl Work {
         let extent = self.places.iter().map(|place| (place - first).norm()).fold(0.0, f64::max);
         let step = f64::EPSILON.cbrt() * extent;
         self.curvature.clear();
-        if !(step > 0.0) {
+        if step.is_nan() || step <= 0.0 {
             return;
         }
         self.curvature.resize(self.places.len(), Matrix3::zeros());
