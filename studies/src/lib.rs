@@ -42,6 +42,7 @@ mod tests {
             (crate::patch::PAGE, &crate::patch::TABLES),
             ("peers", &crate::peers::TABLES),
             ("region", &crate::region::TABLES),
+            ("speed", &crate::speed::TABLES),
             ("stability", &crate::stability::TABLES),
             ("tuning", &crate::tuning::TABLES),
             ("wound", &crate::wound::TABLES),
