@@ -10,14 +10,14 @@
 //! through their values and gradients. The result has the same bits for any number of threads.
 //!
 //! # Method
-//! - **Equations.** `H d = −∇U` with `H = Σ (∇C∇Cᵀ + C∇²C)/α`. Second derivatives count only for
-//!   stretched constraints of types whose value is curved in a single vertex, such as lengths. They
-//!   come from central differences of the gradients. The others could make `H` indefinite. Far from
-//!   a minimum, and for volumes under pressure, this is a Gauss–Newton step.
+//! - **Equations.** `H d = −∇U` with `H = Σ (∇C∇Cᵀ + C∇²C)/α`. Far from rest, the second
+//!   derivatives `∇²C` count only for stretched constraints of types whose value is curved in a
+//!   single vertex, such as lengths: the others could make `H` indefinite. Near rest all of them
+//!   count. They come from central differences of the gradients.
 //! - **Preconditioner.** Smoothed aggregation (Vaněk, Mandel and Brezina, Computing 56, 1996): see
 //!   `multigrid.rs`. It is built from `H` alone, so it knows every cut.
-//! - **Steps.** A line search lowers `U` in each step (Armijo). The equations are solved only as
-//!   exactly as the step deserves (Eisenstat and Walker, SIAM J. Sci. Comput. 17, 1996).
+//! - **Steps.** A line search lowers `U` in each step (Armijo). The equations are solved to 10 % far
+//!   from rest and to 1 % near it.
 #![forbid(unsafe_code)]
 
 mod aggregates;

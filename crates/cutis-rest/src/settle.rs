@@ -2,8 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::blocks::Blocks;
-use crate::blocks::dot;
+use crate::blocks::{Blocks, dot};
 use crate::conjugate::{self, Solution};
 use crate::energy::State;
 use crate::hessian::Curvature;
@@ -40,6 +39,8 @@ pub struct Search<'a> {
     steps: Vec<Step>,
     energy_change_j: f64,
     levels: Option<Levels>,
+    /// See [`Rest::complexity`].
+    complexity: f64,
     /// Longest displacement of a vertex in a step: half of the diagonal of the body, in m.
     reach: f64,
     /// Whether the last steps suggest that rest is near.
@@ -121,6 +122,7 @@ impl<'a> Search<'a> {
             steps: Vec::new(),
             energy_change_j: 0.0,
             levels: None,
+            complexity: 1.0,
             reach: 0.5 * diagonal(&body.start),
             near: false,
         };
@@ -168,7 +170,7 @@ impl<'a> Search<'a> {
             error: self.error(),
             steps: self.steps.clone(),
             energy_change_j: self.energy_change_j,
-            complexity: self.levels.as_ref().map_or(1.0, |levels| levels.multigrid.complexity()),
+            complexity: self.complexity,
         }
     }
 
@@ -232,6 +234,7 @@ impl<'a> Search<'a> {
             ),
             cost: None,
         });
+        self.complexity = levels.multigrid.complexity();
         let most = self.options.most_cycles;
         let mut solution = conjugate::solve(matrix, &levels.multigrid, &self.state.forces, tolerance, most);
         // Where nothing resists, the equations have no finite solution.
@@ -258,7 +261,8 @@ impl<'a> Search<'a> {
     /// larger one of the last two ratios counts, and the error of the equations of a step.
     fn estimate(&self, step: &Step, way: f64) -> f64 {
         let [.., before] = self.steps[..] else { return f64::INFINITY };
-        if step.length < 1.0 {
+        // A shortened step, or one whose equations were not solved, says nothing about the distance.
+        if step.length < 1.0 || step.cycles >= self.options.most_cycles {
             return f64::INFINITY;
         }
         let solved = SOLVED * TOLERANCES[usize::from(self.near)];
