@@ -49,16 +49,16 @@ struct Bottom {
 
 impl Multigrid {
     /// Builds the levels for a matrix with one node at each place, in m.
-    pub fn new(matrix: Blocks<f64, 3, 3>, places: &[Point3<f64>]) -> Self {
+    pub fn new(matrix: &Blocks<f64, 3, 3>, places: &[Point3<f64>]) -> Self {
         if matrix.height() <= BOTTOM {
-            return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(&matrix) };
+            return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix) };
         }
         let modes: Vec<SMatrix<f64, 3, RIGID>> = places.iter().map(rigid_modes).collect();
         let (fine, mut matrix, mut modes) = Level::new(matrix, &modes);
         let mut coarse = Vec::new();
         while matrix.height() > BOTTOM {
             let before = matrix.height();
-            let (level, next, next_modes) = Level::new(matrix, &modes);
+            let (level, next, next_modes) = Level::new(&matrix, &modes);
             coarse.push(level);
             (matrix, modes) = (next, next_modes);
             if matrix.height() * 10 > before * 9 {
@@ -242,12 +242,12 @@ impl<'a, const B: usize> Setup<'a, B> {
 impl<const B: usize> Level<B> {
     /// Builds a level for a matrix, and the matrix and modes of the next one.
     fn new(
-        matrix: Blocks<f64, B, B>,
+        matrix: &Blocks<f64, B, B>,
         modes: &[SMatrix<f64, B, RIGID>],
     ) -> (Self, Blocks<f64, RIGID, RIGID>, Vec<SMatrix<f64, RIGID, RIGID>>) {
-        let aggregates = Aggregates::of(&matrix);
+        let aggregates = Aggregates::of(matrix);
         let (tentative, next_modes) = tentative(&aggregates, modes);
-        let setup = Setup::new(&matrix);
+        let setup = Setup::new(matrix);
         let prolongation = setup.smoothed(&aggregates, &tentative);
         let restriction = prolongation.transposed();
         let mut next = restriction.product(&matrix.product(&prolongation));

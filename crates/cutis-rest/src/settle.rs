@@ -224,16 +224,21 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Solves the equations of a step. Builds the levels if there are none.
+    /// Solves the equations of a step with this matrix: near rest that of all second derivatives,
+    /// far from it that of the stretched constraints. Builds the levels if there are none.
     fn solve(&mut self, matrix: &Blocks<f64, 3, 3>) -> Solution {
         let tolerance = TOLERANCES[usize::from(self.near)];
-        let levels = self.levels.get_or_insert_with(|| Levels {
-            multigrid: Multigrid::new(
-                self.body.matrix(&self.state, Curvature::Stretched),
-                &self.body.places(&self.state),
-            ),
-            cost: None,
-        });
+        let build = || {
+            // Levels need a matrix that is never negative.
+            let places = self.body.places(&self.state);
+            let multigrid = if self.near {
+                Multigrid::new(&self.body.matrix(&self.state, Curvature::Stretched), &places)
+            } else {
+                Multigrid::new(matrix, &places)
+            };
+            Levels { multigrid, cost: None }
+        };
+        let levels = self.levels.get_or_insert_with(build);
         self.complexity = levels.multigrid.complexity();
         let most = self.options.most_cycles;
         let mut solution = conjugate::solve(matrix, &levels.multigrid, &self.state.forces, tolerance, most);
