@@ -16,8 +16,8 @@
 //!   count. They come from central differences of the gradients.
 //! - **Preconditioner.** Smoothed aggregation (Vaněk, Mandel and Brezina, Computing 56, 1996): see
 //!   `multigrid.rs`. It is built from `H` alone, so it knows every cut.
-//! - **Steps.** A line search lowers `U` in each step (Armijo). The equations are solved to 10 % far
-//!   from rest and to 1 % near it.
+//! - **Steps.** A line search lowers `U` in each step (Armijo). The equations are solved to 10 %
+//!   far from rest and to 1 % near it.
 #![forbid(unsafe_code)]
 
 mod aggregates;

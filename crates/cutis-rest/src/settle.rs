@@ -266,7 +266,7 @@ impl<'a> Search<'a> {
     /// larger one of the last two ratios counts, and the error of the equations of a step.
     fn estimate(&self, step: &Step, way: f64) -> f64 {
         let [.., before] = self.steps[..] else { return f64::INFINITY };
-        // A shortened step, or one whose equations were not solved, says nothing about the distance.
+        // A shortened step, or one whose equations were not solved, does not tell the distance.
         if step.length < 1.0 || step.cycles >= self.options.most_cycles {
             return f64::INFINITY;
         }
