@@ -1,6 +1,8 @@
 //! Groups of neighboring nodes that become the nodes of a coarser level.
 
-use crate::blocks::Blocks;
+use rayon::prelude::*;
+
+use crate::blocks::{Block, Blocks, ROWS};
 
 /// Couplings weaker than this share of the geometric mean of both diagonal blocks join no nodes.
 const WEAK: f64 = 0.02;
@@ -20,15 +22,15 @@ impl Aggregates {
     /// Computing 56, 1996). A node whose neighbors are all free forms an aggregate with them. The
     /// rest join the aggregate to which they couple most. Nodes with many neighbors come first,
     /// because larger aggregates make smaller levels.
-    pub fn of<const B: usize>(matrix: &Blocks<f64, B, B>) -> Self {
+    pub fn of<const B: usize>(matrix: &Blocks<B, B>) -> Self {
         let count = matrix.height();
-        let size = |row: usize| matrix.get(row, row).map_or(0.0, |block| block.norm());
-        let sizes: Vec<f64> = (0..count).map(size).collect();
+        let size = |row: usize| matrix.get(row, row).map_or(0.0, |block| norm(&block));
+        let sizes: Vec<f64> = (0..count).into_par_iter().with_min_len(ROWS).map(size).collect();
         let strong = |row: usize| {
             matrix.row(row).filter_map({
                 let sizes = &sizes;
                 move |(column, block)| {
-                    let strength = block.norm();
+                    let strength = norm(&block);
                     let is_strong = column != row && strength > WEAK * (sizes[row] * sizes[column]).sqrt();
                     is_strong.then_some((column, strength))
                 }
@@ -74,4 +76,9 @@ impl Aggregates {
         }
         Self { of, count: aggregates as usize }
     }
+}
+
+/// The Frobenius norm of a block.
+fn norm<const B: usize>(block: &Block<B, B>) -> f64 {
+    block.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt()
 }

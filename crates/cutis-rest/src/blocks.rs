@@ -1,42 +1,65 @@
-//! Sparse matrices of small dense blocks.
+//! Sparse matrices of small dense blocks, in single precision.
 
-use nalgebra::{RealField, SMatrix, SVector};
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 /// Rows that a thread takes at once.
 pub(crate) const ROWS: usize = 256;
 
+/// Numbers after the last block, so that a register can be read at the last column of a block.
+const PADDING: usize = 8;
+
+/// A block with `R` rows and `C` columns, column by column.
+pub(crate) type Block<const R: usize, const C: usize> = [[f64; R]; C];
+
 /// A sparse matrix of blocks with `R` rows and `C` columns each. The blocks of a row of blocks are
 /// in the order of their columns.
 #[derive(Clone, Debug)]
-pub(crate) struct Blocks<T, const R: usize, const C: usize> {
+pub(crate) struct Blocks<const R: usize, const C: usize> {
     /// Start of each row of blocks, and the end of the last one.
     pub starts: Vec<usize>,
     /// Column of each block.
     pub columns: Vec<u32>,
-    pub values: Vec<SMatrix<T, R, C>>,
     /// Number of columns of blocks.
     pub width: usize,
+    /// The blocks one after the other, each column by column, and some zeros.
+    values: Vec<f32>,
 }
 
-/// One row of blocks: columns and values.
-type Row<T, const R: usize, const C: usize> = Vec<(u32, SMatrix<T, R, C>)>;
+impl<const R: usize, const C: usize> Blocks<R, C> {
+    /// A matrix with zeros at these places.
+    pub fn zeros(starts: Vec<usize>, columns: Vec<u32>, width: usize) -> Self {
+        let values = vec![0.0; R * C * columns.len() + PADDING];
+        Self { starts, columns, width, values }
+    }
 
-impl<T: RealField + Copy, const R: usize, const C: usize> Blocks<T, R, C> {
-    /// A matrix from its rows. Each row is sorted by columns.
-    pub fn from_rows(rows: Vec<Row<T, R, C>>, width: usize) -> Self {
-        let count = rows.iter().map(Vec::len).sum();
-        let mut starts = Vec::with_capacity(rows.len() + 1);
-        let (mut columns, mut values) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        starts.push(0);
-        for row in rows {
-            for (column, value) in row {
-                columns.push(column);
-                values.push(value);
+    /// A matrix row by row: `row` adds the blocks of a row to the sums.
+    pub fn by_rows(height: usize, width: usize, row: impl Fn(&mut Sums<R, C>, usize) + Sync) -> Self {
+        let part = |sums: &mut Sums<R, C>, part: usize| {
+            let (mut ends, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+            for n in part * ROWS..((part + 1) * ROWS).min(height) {
+                row(sums, n);
+                sums.take(&mut columns, &mut values);
+                ends.push(columns.len());
             }
-            starts.push(columns.len());
+            (ends, columns, values)
+        };
+        let parts = 0..height.div_ceil(ROWS);
+        let parts: Vec<_> = parts.into_par_iter().map_init(|| Sums::new(width), part).collect();
+        let count = parts.iter().map(|(_, columns, _)| columns.len()).sum();
+        let mut starts = Vec::with_capacity(height + 1);
+        let mut columns = Vec::with_capacity(count);
+        let mut values = Vec::with_capacity(R * C * count + PADDING);
+        starts.push(0);
+        for (ends, of_part, numbers) in parts {
+            let before = columns.len();
+            starts.extend(ends.iter().map(|end| before + end));
+            columns.extend(of_part);
+            values.extend(numbers);
         }
-        Self { starts, columns, values, width }
+        values.resize(values.len() + PADDING, 0.0);
+        Self { starts, columns, width, values }
     }
 
     /// Number of rows of blocks.
@@ -44,131 +67,216 @@ impl<T: RealField + Copy, const R: usize, const C: usize> Blocks<T, R, C> {
         self.starts.len() - 1
     }
 
-    /// Columns and values of a row of blocks.
+    /// Number of numbers.
+    pub fn len(&self) -> usize {
+        R * C * self.columns.len()
+    }
+
+    /// Places of the blocks of a row.
     #[inline]
-    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, &SMatrix<T, R, C>)> {
-        let range = self.starts[row]..self.starts[row + 1];
-        self.columns[range.clone()].iter().map(|&column| column as usize).zip(&self.values[range])
+    pub fn places(&self, row: usize) -> Range<usize> {
+        self.starts[row]..self.starts[row + 1]
+    }
+
+    /// A block in double precision.
+    #[inline]
+    pub fn block(&self, place: usize) -> Block<R, C> {
+        let values = &self.values[R * C * place..][..R * C];
+        let mut block = [[0.0; R]; C];
+        for (to, &from) in block.as_flattened_mut().iter_mut().zip(values) {
+            *to = f64::from(from);
+        }
+        block
+    }
+
+    /// Columns and blocks of a row.
+    #[inline]
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, Block<R, C>)> {
+        self.places(row).map(|place| (self.columns[place] as usize, self.block(place)))
     }
 
     /// The block in a row and a column, if it is stored.
-    pub fn get(&self, row: usize, column: usize) -> Option<&SMatrix<T, R, C>> {
-        let range = self.starts[row]..self.starts[row + 1];
-        let found = self.columns[range.clone()].binary_search(&(column as u32)).ok()?;
-        Some(&self.values[range.start + found])
+    pub fn get(&self, row: usize, column: usize) -> Option<Block<R, C>> {
+        let places = self.places(row);
+        let found = self.columns[places.clone()].binary_search(&(column as u32)).ok()?;
+        Some(self.block(places.start + found))
+    }
+
+    /// Adds a block times a vector. The rest of the sum, beyond `R`, has no meaning.
+    #[inline(always)]
+    pub fn add_times<const L: usize, const M: usize>(&self, place: usize, x: &[f32; M], sum: &mut [f32; L]) {
+        let values = &self.values[R * C * place..][..R * (C - 1) + L];
+        for column in 0..C {
+            for row in 0..L {
+                sum[row] += values[R * column + row] * x[column];
+            }
+        }
     }
 
     /// One row of blocks times a vector.
-    #[inline]
-    pub fn row_times(&self, row: usize, x: &[SVector<T, C>]) -> SVector<T, R> {
-        self.row(row).fold(SVector::zeros(), |sum, (column, block)| sum + block * x[column])
+    #[inline(always)]
+    pub fn row_times<const L: usize, const M: usize>(&self, row: usize, x: &[[f32; M]]) -> [f32; L] {
+        let mut sum = [0.0; L];
+        for place in self.places(row) {
+            self.add_times(place, &x[self.columns[place] as usize], &mut sum);
+        }
+        sum[R..].fill(0.0);
+        sum
     }
 
-    /// The matrix times a vector.
-    pub fn times(&self, x: &[SVector<T, C>]) -> Vec<SVector<T, R>> {
-        (0..self.height()).into_par_iter().with_min_len(ROWS).map(|row| self.row_times(row, x)).collect()
-    }
-
-    /// The matrix times another one.
-    pub fn product<const D: usize>(&self, other: &Blocks<T, C, D>) -> Blocks<T, R, D> {
-        let scratch = || Sums::new(other.width);
-        let row = |sums: &mut Sums<T, R, D>, row: usize| {
-            for (middle, left) in self.row(row) {
-                for (column, right) in other.row(middle) {
-                    sums.add(column, left * right);
+    /// One row of transposed blocks times a vector, whose numbers beyond `R` are zeros.
+    #[inline(always)]
+    pub fn row_transposed_times<const L: usize, const M: usize>(
+        &self,
+        row: usize,
+        x: &[[f32; M]],
+    ) -> [f32; L] {
+        let mut products = [[0.0; M]; C];
+        for place in self.places(row) {
+            let values = &self.values[R * C * place..][..R * (C - 1) + M];
+            let x = &x[self.columns[place] as usize];
+            for (column, products) in products.iter_mut().enumerate() {
+                for n in 0..M {
+                    products[n] += values[R * column + n] * x[n];
                 }
             }
-            sums.take()
-        };
-        let rows = (0..self.height()).into_par_iter().with_min_len(ROWS).map_init(scratch, row).collect();
-        Blocks::from_rows(rows, other.width)
+        }
+        let mut sum = [0.0; L];
+        for (sum, products) in sum.iter_mut().zip(&products) {
+            *sum = products.iter().sum();
+        }
+        sum
     }
 
-    /// The transposed matrix.
-    pub fn transposed(&self) -> Blocks<T, C, R> {
-        let mut starts = vec![0; self.width + 1];
-        for &column in &self.columns {
-            starts[column as usize + 1] += 1;
-        }
-        for column in 0..self.width {
-            starts[column + 1] += starts[column];
-        }
-        let mut next = starts.clone();
-        let mut columns = vec![0; self.columns.len()];
-        let mut values = vec![SMatrix::zeros(); self.values.len()];
-        for row in 0..self.height() {
-            for (column, value) in self.row(row) {
-                let place = &mut next[column];
-                columns[*place] = row as u32;
-                values[*place] = value.transpose();
-                *place += 1;
+    /// The same matrix with each block transposed at its place.
+    pub fn with_transposed_blocks(&self) -> Blocks<C, R> {
+        let mut values = vec![0.0; self.values.len()];
+        let blocks = values.par_chunks_exact_mut(R * C).zip(self.values.par_chunks_exact(R * C));
+        blocks.with_min_len(ROWS).for_each(|(to, from)| {
+            for column in 0..C {
+                for row in 0..R {
+                    to[C * row + column] = from[R * column + row];
+                }
             }
+        });
+        Blocks { starts: self.starts.clone(), columns: self.columns.clone(), width: self.width, values }
+    }
+
+    /// The values of the rows, for threads that fill `rows` rows each.
+    pub fn parts_mut(&mut self, rows: usize) -> Vec<&mut [f32]> {
+        let mut rest = &mut self.values[..];
+        let mut parts = Vec::new();
+        let ends = self.starts[1..].chunks(rows).map(|ends| ends[ends.len() - 1]);
+        let mut start = 0;
+        for end in ends {
+            let (part, after) = std::mem::take(&mut rest).split_at_mut(R * C * (end - start));
+            parts.push(part);
+            (rest, start) = (after, end);
         }
-        Blocks { starts, columns, values, width: self.height() }
+        parts
     }
 }
 
-impl<const R: usize, const C: usize> Blocks<f64, R, C> {
-    /// The same matrix in single precision.
-    pub fn single(&self) -> Blocks<f32, R, C> {
-        let values = self.values.par_iter().with_min_len(ROWS).map(|value| value.map(|x| x as f32));
-        let (starts, columns, width) = (self.starts.clone(), self.columns.clone(), self.width);
-        Blocks { starts, columns, values: values.collect(), width }
+/// Adds `left · right`.
+#[inline(always)]
+pub(crate) fn add_product<const R: usize, const M: usize, const C: usize>(
+    to: &mut Block<R, C>,
+    left: &Block<R, M>,
+    right: &Block<M, C>,
+) {
+    for column in 0..C {
+        for middle in 0..M {
+            for row in 0..R {
+                to[column][row] += left[middle][row] * right[column][middle];
+            }
+        }
+    }
+}
+
+/// Adds `leftᵀ · right`.
+#[inline(always)]
+pub(crate) fn add_transposed_product<const R: usize, const M: usize, const C: usize>(
+    to: &mut Block<R, C>,
+    left: &Block<M, R>,
+    right: &Block<M, C>,
+) {
+    for column in 0..C {
+        for row in 0..R {
+            for middle in 0..M {
+                to[column][row] += left[row][middle] * right[column][middle];
+            }
+        }
     }
 }
 
 /// Sums of blocks by column, for one row at a time.
-pub(crate) struct Sums<T, const R: usize, const C: usize> {
+pub(crate) struct Sums<const R: usize, const C: usize> {
     /// For each column the place of its sum plus one. Zero if there is none.
     places: Vec<u32>,
-    sums: Row<T, R, C>,
+    /// The columns with a sum, and the place of the sum.
+    columns: Vec<(u32, u32)>,
+    sums: Vec<Block<R, C>>,
 }
 
-impl<T: RealField + Copy, const R: usize, const C: usize> Sums<T, R, C> {
-    pub fn new(width: usize) -> Self {
-        Self { places: vec![0; width], sums: Vec::new() }
+impl<const R: usize, const C: usize> Sums<R, C> {
+    fn new(width: usize) -> Self {
+        Self { places: vec![0; width], columns: Vec::new(), sums: Vec::new() }
     }
 
-    /// Adds a block to the sum of a column.
-    #[inline]
-    pub fn add(&mut self, column: usize, block: SMatrix<T, R, C>) {
-        match self.places[column] {
-            0 => {
-                self.sums.push((column as u32, block));
-                self.places[column] = self.sums.len() as u32;
+    /// The sum of a column.
+    #[inline(always)]
+    pub fn at(&mut self, column: usize) -> &mut Block<R, C> {
+        if self.places[column] == 0 {
+            self.columns.push((column as u32, self.sums.len() as u32));
+            self.sums.push([[0.0; R]; C]);
+            self.places[column] = self.sums.len() as u32;
+        }
+        &mut self.sums[self.places[column] as usize - 1]
+    }
+
+    /// Appends the sums in the order of their columns, and clears them.
+    fn take(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f32>) {
+        self.columns.sort_unstable();
+        for (column, place) in self.columns.drain(..) {
+            self.places[column as usize] = 0;
+            columns.push(column);
+            values.extend(self.sums[place as usize].as_flattened().iter().map(|&x| x as f32));
+        }
+        self.sums.clear();
+    }
+}
+
+/// The blocks of each column of a matrix, by row.
+pub(crate) struct Columns {
+    starts: Vec<usize>,
+    /// Row and place of each block.
+    blocks: Vec<(u32, u32)>,
+}
+
+impl Columns {
+    pub fn of<const R: usize, const C: usize>(matrix: &Blocks<R, C>) -> Self {
+        let mut starts = vec![0; matrix.width + 1];
+        for &column in &matrix.columns {
+            starts[column as usize + 1] += 1;
+        }
+        for column in 0..matrix.width {
+            starts[column + 1] += starts[column];
+        }
+        let mut next = starts.clone();
+        let mut blocks = vec![(0, 0); matrix.columns.len()];
+        for row in 0..matrix.height() {
+            for place in matrix.places(row) {
+                let at = &mut next[matrix.columns[place] as usize];
+                blocks[*at] = (row as u32, place as u32);
+                *at += 1;
             }
-            place => self.sums[place as usize - 1].1 += block,
         }
+        Self { starts, blocks }
     }
 
-    /// The sums in the order of their columns. Clears them.
-    pub fn take(&mut self) -> Row<T, R, C> {
-        for (column, _) in &self.sums {
-            self.places[*column as usize] = 0;
-        }
-        let mut row = std::mem::take(&mut self.sums);
-        row.sort_unstable_by_key(|(column, _)| *column);
-        row
+    /// Rows and places of the blocks of a column.
+    #[inline]
+    pub fn of_column(&self, column: usize) -> &[(u32, u32)] {
+        &self.blocks[self.starts[column]..self.starts[column + 1]]
     }
-}
-
-/// Entries that are summed in order before the sums of all parts are.
-const PART: usize = 4096;
-
-/// The inner product of two vectors. The order of the sum does not depend on the number of threads.
-pub(crate) fn dot<const N: usize>(a: &[SVector<f64, N>], b: &[SVector<f64, N>]) -> f64 {
-    let part = |(a, b): (&[SVector<f64, N>], &[SVector<f64, N>])| -> f64 {
-        a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
-    };
-    let parts: Vec<f64> = a.par_chunks(PART).zip(b.par_chunks(PART)).map(part).collect();
-    parts.iter().sum()
-}
-
-/// Adds a multiple of a vector to another one.
-pub(crate) fn add<T: RealField + Copy, const N: usize>(
-    to: &mut [SVector<T, N>],
-    factor: T,
-    x: &[SVector<T, N>],
-) {
-    to.par_iter_mut().with_min_len(PART).zip(x).for_each(|(to, x)| *to += x * factor);
 }

@@ -4,9 +4,11 @@ use cutis_coloring::{Incidence, Tuples};
 use cutis_constraints::Scalar;
 use cutis_solver::{Kind, Stiffness, System, Values};
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::RestError;
-use crate::energy::State;
+use crate::energy::{PART, State};
+use crate::matrix::is_curved;
 
 /// Mark of a vertex that cannot move.
 pub(crate) const FIXED: u32 = u32::MAX;
@@ -18,6 +20,10 @@ pub struct Body {
     pub(crate) free: Vec<u32>,
     /// For each vertex its place in `free`, or [`FIXED`].
     pub(crate) place: Vec<u32>,
+    /// For each free vertex the free ones that share a constraint with it, and itself, ascending.
+    /// The start of each list in `columns`, and the end of the last one.
+    pub(crate) starts: Vec<usize>,
+    pub(crate) columns: Vec<u32>,
     /// Weight and load of each free vertex in N.
     pub(crate) weights: Vec<Vector3<f64>>,
     /// Origin of the positions, in the caller's coordinates.
@@ -30,8 +36,10 @@ pub struct Body {
 pub(crate) struct Elements {
     pub kind: Kind<f64>,
     compliance: Values<f64>,
-    /// The constraints at each vertex.
-    pub incidence: Incidence,
+    /// Starts of the parts in `constraints`, and the end of the last one.
+    starts: Vec<usize>,
+    /// The constraints at the free vertices of each part, ascending.
+    constraints: Vec<u32>,
     /// Whether the value is curved as a function of a single vertex.
     pub curved: bool,
 }
@@ -41,6 +49,12 @@ impl Elements {
     #[inline]
     pub fn stiffness(&self, k: usize) -> f64 {
         1.0 / self.compliance.at(k)
+    }
+
+    /// The constraints at a part of the free vertices, [`PART`] of them.
+    #[inline]
+    pub fn of_part(&self, part: usize) -> &[u32] {
+        &self.constraints[self.starts[part]..self.starts[part + 1]]
     }
 
     /// The vertices of a constraint.
@@ -81,15 +95,17 @@ impl Body {
             return Err(RestError::NothingMoves { vertices: vertices.len() });
         }
         let start: Vec<Point3<f64>> = vertices.iter().map(|vertex| vertex.position()).collect();
-        let kinds = system.kinds().iter().map(|kind| elements(kind.clone(), &start));
-        Ok(Self {
-            kinds: kinds.collect::<Result<_, _>>()?,
-            free,
-            place,
-            weights,
-            origin: system.origin().coords,
-            start,
-        })
+        let mut kinds = Vec::new();
+        let mut incidences = Vec::new();
+        for kind in system.kinds() {
+            let tuples = Tuples { vertices: kind.indices(), arity: kind.arity() };
+            let incidence = Incidence::new(tuples, start.len())?;
+            kinds.push(elements(kind.clone(), &start, &free, &incidence)?);
+            incidences.push(incidence);
+        }
+        let (starts, columns) = neighbors(&kinds, &incidences, &free, &place);
+        let origin = system.origin().coords;
+        Ok(Self { kinds, free, place, starts, columns, weights, origin, start })
     }
 
     /// Places of the vertices that can move.
@@ -103,7 +119,12 @@ impl Body {
     }
 }
 
-fn elements(kind: Kind<f64>, start: &[Point3<f64>]) -> Result<Elements, RestError> {
+fn elements(
+    kind: Kind<f64>,
+    start: &[Point3<f64>],
+    free: &[u32],
+    incidence: &Incidence,
+) -> Result<Elements, RestError> {
     let Stiffness::Compliance(compliance) = kind.stiffness().clone() else {
         return Err(RestError::PbdStiffness { kind: kind.name() });
     };
@@ -113,9 +134,65 @@ fn elements(kind: Kind<f64>, start: &[Point3<f64>]) -> Result<Elements, RestErro
             return Err(RestError::Rigid { kind: kind.name(), constraint, compliance });
         }
     }
-    let tuples = Tuples { vertices: kind.indices(), arity: kind.arity() };
-    let incidence = Incidence::new(tuples, start.len())?;
-    let mut elements = Elements { kind, compliance, incidence, curved: false };
-    elements.curved = crate::hessian::is_curved(&elements, start);
+    let arity = kind.arity().max(1) as u32;
+    let of_part = |free: &[u32]| {
+        let places = free.iter().flat_map(|&v| incidence.of(v));
+        let mut constraints: Vec<u32> = places.map(|place| place / arity).collect();
+        constraints.sort_unstable();
+        constraints.dedup();
+        constraints
+    };
+    let (starts, constraints) = joined(free.par_chunks(PART).map(of_part).collect());
+    let mut elements = Elements { kind, compliance, starts, constraints, curved: false };
+    elements.curved = is_curved(&elements, start);
     Ok(elements)
+}
+
+/// See [`Body::starts`].
+fn neighbors(
+    kinds: &[Elements],
+    incidences: &[Incidence],
+    free: &[u32],
+    place: &[u32],
+) -> (Vec<usize>, Vec<u32>) {
+    let of_part = |free: &[u32]| -> (Vec<usize>, Vec<u32>) {
+        let (mut counts, mut columns, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        for &v in free {
+            row.clear();
+            row.push(place[v as usize]);
+            for (elements, incidence) in kinds.iter().zip(incidences) {
+                let arity = elements.kind.arity();
+                for &at in incidence.of(v) {
+                    row.extend(elements.vertices(at as usize / arity).iter().map(|&v| place[v as usize]));
+                }
+            }
+            row.sort_unstable();
+            row.dedup();
+            // Fixed vertices have the largest mark.
+            if row.last() == Some(&FIXED) {
+                row.pop();
+            }
+            counts.push(row.len());
+            columns.extend_from_slice(&row);
+        }
+        (counts, columns)
+    };
+    let parts: Vec<_> = free.par_chunks(PART).map(of_part).collect();
+    let mut starts = vec![0];
+    for count in parts.iter().flat_map(|(counts, _)| counts) {
+        starts.push(starts[starts.len() - 1] + count);
+    }
+    let (_, columns) = joined(parts.into_iter().map(|(_, columns)| columns).collect());
+    (starts, columns)
+}
+
+/// Lists one after the other: the start of each one, and the end of the last one.
+fn joined(lists: Vec<Vec<u32>>) -> (Vec<usize>, Vec<u32>) {
+    let mut starts = vec![0];
+    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
+    for list in lists {
+        all.extend(list);
+        starts.push(all.len());
+    }
+    (starts, all)
 }

@@ -1,9 +1,13 @@
 //! Conjugate gradients with a preconditioner.
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
-use crate::blocks::{Blocks, add, dot};
+use crate::blocks::ROWS;
+use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
+use crate::smoother::Operator;
+use crate::vectors::{PART, add, dot};
 
 /// An approximate solution.
 pub(crate) struct Solution {
@@ -14,66 +18,105 @@ pub(crate) struct Solution {
     pub indefinite: bool,
 }
 
-/// Iterations whose steps are added up. The length of a single step says little.
-const WINDOW: usize = 4;
-
 /// Solves `matrix · x = right` until the residual, in the norm of the preconditioner, is
-/// `tolerance` of that at zero, and the steps that are still to come, as the last ones suggest, are
+/// `tolerance` of that at zero, and the way that is still to come, as the last steps suggest, is
 /// `tolerance` of the length of `x`. The residual alone says little about the length where some
-/// forces are much stiffer than others.
-/// Ends early where the matrix is not positive definite.
+/// forces are much stiffer than others. Ends early where the matrix is not positive definite.
+///
+/// The vectors have single precision, which is enough for the tolerances of a Newton step.
 pub(crate) fn solve(
-    matrix: &Blocks<f64, 3, 3>,
-    multigrid: &Multigrid,
+    matrix: &Matrix,
+    multigrid: &mut Multigrid,
     right: &[Vector3<f64>],
     tolerance: f64,
     most_cycles: usize,
 ) -> Solution {
-    let mut x = vec![Vector3::zeros(); right.len()];
-    let mut residual = right.to_vec();
-    let mut z = multigrid.cycle(&residual);
+    let largest = right.iter().map(Vector3::amax).fold(0.0, f64::max);
+    let zero = vec![[0.0f32; 4]; right.len()];
+    let (mut x, mut z, mut product) = (zero.clone(), zero.clone(), zero);
+    // Single precision has a smaller range of exponents.
+    let scaled = |v: &Vector3<f64>| [v.x, v.y, v.z, 0.0].map(|x| (x / largest) as f32);
+    let mut residual: Vec<[f32; 4]> = right.par_iter().with_min_len(ROWS).map(scaled).collect();
+    multigrid.cycle(matrix, &residual, &mut z);
     let mut direction = z.clone();
     let mut energy = dot(&residual, &z);
     let first = energy;
     let (mut cycles, mut indefinite) = (1, false);
-    let mut lengths = Vec::new();
+    let mut steps = Steps::default();
     while cycles < most_cycles
         && energy > 0.0
-        && (energy > tolerance * tolerance * first || to_come(&lengths) > tolerance * dot(&x, &x).sqrt())
+        && (energy > tolerance * tolerance * first || steps.to_come() > tolerance * dot(&x, &x).sqrt())
     {
-        let product = matrix.times(&direction);
+        matrix.times(&direction, &mut product);
         let curvature = dot(&direction, &product);
         if curvature.is_nan() || curvature <= 0.0 {
             indefinite = true;
             break;
         }
         let length = energy / curvature;
-        add(&mut x, length, &direction);
-        lengths.push(length * dot(&direction, &direction).sqrt());
-        add(&mut residual, -length, &product);
-        z = multigrid.cycle(&residual);
+        add(&mut x, length as f32, &direction);
+        add(&mut residual, -length as f32, &product);
+        multigrid.cycle(matrix, &residual, &mut z);
         cycles += 1;
         let next = dot(&residual, &z);
         if next.is_nan() || next <= 0.0 {
             break;
         }
-        let ratio = next / energy;
+        let ratio = (next / energy) as f32;
         energy = next;
-        direction.iter_mut().zip(&z).for_each(|(direction, z)| *direction = z + *direction * ratio);
+        let (square, along) = turn(&mut direction, ratio, &z);
+        steps.push(length, square, along);
     }
-    if x.iter().all(|x| *x == Vector3::zeros()) {
+    if x.iter().all(|x| *x == [0.0; 4]) {
         x = z;
     }
-    Solution { x, cycles, indefinite }
+    let unscaled = |&[x, y, z, _]: &[f32; 4]| Vector3::new(x, y, z).map(|x| f64::from(x) * largest);
+    Solution { x: x.par_iter().with_min_len(ROWS).map(unscaled).collect(), cycles, indefinite }
 }
 
-/// Estimate of the sum of the steps after these. The sums over windows shrink by a constant ratio.
-fn to_come(lengths: &[f64]) -> f64 {
-    let Some((before, last)) = lengths.len().checked_sub(WINDOW).map(|start| lengths.split_at(start)) else {
-        return f64::INFINITY;
+/// Replaces a direction by `z + ratio · direction`. Returns the square of the old one, and its
+/// inner product with the new one.
+fn turn(direction: &mut [[f32; 4]], ratio: f32, z: &[[f32; 4]]) -> (f64, f64) {
+    let part = |(direction, z): (&mut [[f32; 4]], &[[f32; 4]])| {
+        let (mut square, mut along) = ([0.0; 4], [0.0; 4]);
+        for (direction, z) in direction.iter_mut().zip(z) {
+            for n in 0..4 {
+                let old = direction[n];
+                direction[n] = z[n] + ratio * old;
+                square[n] += f64::from(old) * f64::from(old);
+                along[n] += f64::from(old) * f64::from(direction[n]);
+            }
+        }
+        (square.iter().sum::<f64>(), along.iter().sum::<f64>())
     };
-    let last: f64 = last.iter().sum();
-    let before: f64 = before.iter().rev().take(WINDOW).sum();
-    let ratio = if before > 0.0 { (last / before).max(0.5) } else { 0.5 };
-    if ratio < 1.0 { last * ratio / (1.0 - ratio) } else { f64::INFINITY }
+    let parts: Vec<_> = direction.par_chunks_mut(PART).zip(z.par_chunks(PART)).map(part).collect();
+    parts.iter().fold((0.0, 0.0), |(square, along), part| (square + part.0, along + part.1))
+}
+
+/// The last steps of an iteration. The length of a single one says little, so they count in pairs.
+#[derive(Default)]
+struct Steps {
+    /// Square of the last step, and its length along the direction of the next one, over the factor
+    /// of that one.
+    last: Option<(f64, f64)>,
+    /// Lengths of the last pairs, the latest at the end.
+    pairs: Vec<f64>,
+}
+
+impl Steps {
+    /// Adds the step `length · d`, with the square of `d` and its product with the next direction.
+    fn push(&mut self, length: f64, square: f64, along: f64) {
+        let step = length * length * square;
+        if let Some((before, product)) = self.last {
+            self.pairs.push((step + before + 2.0 * length * product).max(0.0).sqrt());
+        }
+        self.last = Some((step, length * along));
+    }
+
+    /// Estimate of the length of all steps after these: pairs shrink by a constant ratio.
+    fn to_come(&self) -> f64 {
+        let [.., before, _, last] = self.pairs[..] else { return f64::INFINITY };
+        let ratio = (last / before).max(0.5);
+        if ratio < 1.0 { last * ratio / (1.0 - ratio) } else { f64::INFINITY }
+    }
 }

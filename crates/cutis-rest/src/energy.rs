@@ -1,23 +1,21 @@
 //! The energy of a body at one placement of its vertices, and the forces.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::Body;
-use crate::blocks::ROWS;
+use crate::body::Elements;
 
-/// Constraints that a thread evaluates at once, and whose energies are summed in order before the
-/// sums of all parts are.
-const PART: usize = 1024;
+/// Vertices or constraints that a thread takes at once. Sums of parts are added in order, so that a
+/// result does not depend on the number of threads.
+pub(crate) const PART: usize = 4096;
 
-/// The values and gradients of all constraints, and the forces.
+/// The values of all constraints, and the forces.
 pub(crate) struct State {
     /// Positions of all vertices.
     pub x: Vec<Point3<f64>>,
     /// For each kind `C` of each constraint.
-    pub values: Vec<Vec<f64>>,
-    /// For each kind `∇C` of each constraint, one vector per vertex.
-    pub gradients: Vec<Vec<Vector3<f64>>>,
+    values: Vec<Vec<f64>>,
     /// `−∇U` at each free vertex, in N.
     pub forces: Vec<Vector3<f64>>,
     /// Norm of the forces in N.
@@ -30,64 +28,95 @@ pub(crate) struct State {
     pub noise: f64,
 }
 
+/// Memory to evaluate a constraint.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    /// Positions of its vertices.
+    pub places: Vec<Point3<f64>>,
+    pub gradients: Vec<Vector3<f64>>,
+    /// Gradients at other positions.
+    pub ahead: Vec<Vector3<f64>>,
+    /// Second derivatives, see [`Scratch::differentiate`].
+    pub curvature: Vec<Matrix3<f64>>,
+}
+
+impl Scratch {
+    /// `C` and `∇C` of a constraint.
+    #[inline]
+    pub fn evaluate(&mut self, elements: &Elements, k: usize, x: &[Point3<f64>]) -> f64 {
+        let vertices = elements.vertices(k);
+        if self.places.len() != vertices.len() {
+            self.places.resize(vertices.len(), Point3::origin());
+            self.gradients.resize(vertices.len(), Vector3::zeros());
+        }
+        for (place, &v) in self.places.iter_mut().zip(vertices) {
+            *place = x[v as usize];
+        }
+        elements.kind.evaluate(k, &self.places, &mut self.gradients)
+    }
+
+    /// How much `C` changes if each coordinate changes by its own size.
+    fn reach(&self) -> f64 {
+        self.gradients.iter().zip(&self.places).map(|(g, x)| norm_1(g) * norm_1(&x.coords)).sum()
+    }
+}
+
 impl Body {
     /// Evaluates all constraints.
     pub(crate) fn at(&self, x: Vec<Point3<f64>>) -> State {
-        let (mut values, mut gradients) = (Vec::new(), Vec::new());
         let mut noise = 0.0;
+        let mut values = Vec::with_capacity(self.kinds.len());
         for elements in &self.kinds {
-            let (kind, arity) = (&elements.kind, elements.kind.arity().max(1));
-            let mut c = vec![0.0; kind.len()];
-            let mut g = vec![Vector3::zeros(); kind.len() * arity];
-            let parts = c.par_chunks_mut(PART).zip(g.par_chunks_mut(PART * arity)).enumerate();
-            let evaluate = |places: &mut Vec<Point3<f64>>,
-                            part: (usize, (&mut [f64], &mut [Vector3<f64>]))| {
-                let (part, (c, g)) = part;
+            let mut c = vec![0.0; elements.kind.len()];
+            let evaluate = |scratch: &mut Scratch, (part, c): (usize, &mut [f64])| -> f64 {
                 let mut noise = 0.0;
-                for (n, (c, g)) in c.iter_mut().zip(g.chunks_exact_mut(arity)).enumerate() {
+                for (n, c) in c.iter_mut().enumerate() {
                     let k = part * PART + n;
-                    for (place, &vertex) in places.iter_mut().zip(elements.vertices(k)) {
-                        *place = x[vertex as usize];
-                    }
-                    *c = kind.evaluate(k, places, g);
-                    let reach: f64 = g.iter().zip(&*places).map(|(g, x)| g.norm() * x.coords.norm()).sum();
-                    noise += c.abs() * elements.stiffness(k) * reach;
+                    *c = scratch.evaluate(elements, k, &x);
+                    noise += c.abs() * elements.stiffness(k) * scratch.reach();
                 }
                 noise
             };
-            let sums: Vec<f64> = parts.map_init(|| vec![Point3::origin(); arity], evaluate).collect();
+            let parts = c.par_chunks_mut(PART).enumerate();
+            let sums: Vec<f64> = parts.map_init(Scratch::default, evaluate).collect();
             noise += sums.iter().sum::<f64>();
             values.push(c);
-            gradients.push(g);
         }
-        let at_vertex = |(place, &vertex): (usize, &u32)| {
-            let (mut force, mut size) = (self.weights[place], self.weights[place].norm());
-            let mut rounding = 0.0;
-            for (elements, (c, g)) in self.kinds.iter().zip(values.iter().zip(&gradients)) {
-                let arity = elements.kind.arity();
-                for &at in elements.incidence.of(vertex) {
-                    let k = at as usize / arity;
-                    let (gradient, stiffness) = (g[at as usize], elements.stiffness(k));
-                    let part = gradient * (c[k] * stiffness);
-                    force -= part;
-                    size += part.norm();
-                    let reach: f64 = g[k * arity..][..arity]
-                        .iter()
-                        .zip(elements.vertices(k))
-                        .map(|(g, &v)| g.norm() * x[v as usize].coords.norm())
-                        .sum();
-                    rounding += gradient.norm() * reach * stiffness;
+        let mut forces = self.weights.clone();
+        let part = |scratch: &mut Scratch, (part, forces): (usize, &mut [Vector3<f64>])| {
+            let rows = part * PART..part * PART + forces.len();
+            let mut sizes: Vec<[f64; 2]> = forces.iter().map(|force| [force.norm(), 0.0]).collect();
+            for elements in &self.kinds {
+                for &k in elements.of_part(part) {
+                    let k = k as usize;
+                    let c = scratch.evaluate(elements, k, &x);
+                    let stiffness = elements.stiffness(k);
+                    let reach = scratch.reach() * stiffness;
+                    for (gradient, &v) in scratch.gradients.iter().zip(elements.vertices(k)) {
+                        let row = self.place[v as usize] as usize;
+                        if rows.contains(&row) {
+                            let n = row - rows.start;
+                            let size = gradient.norm();
+                            forces[n] -= gradient * (c * stiffness);
+                            sizes[n][0] += size * (c * stiffness).abs();
+                            sizes[n][1] += size * reach;
+                        }
+                    }
                 }
             }
-            (force, size, rounding)
+            let mut squares = [0.0; 3];
+            for (force, [size, rounding]) in forces.iter().zip(sizes) {
+                squares[0] += force.norm_squared();
+                squares[1] += size * size;
+                squares[2] += rounding * rounding;
+            }
+            squares
         };
-        let found: Vec<_> = self.free.par_iter().enumerate().with_min_len(ROWS).map(at_vertex).collect();
-        let norm = root_of_squares(found.iter().map(|(force, ..)| force.norm()));
-        let scale = root_of_squares(found.iter().map(|(_, size, _)| *size));
-        let floor = f64::EPSILON * root_of_squares(found.iter().map(|(.., rounding)| *rounding));
-        let noise = f64::EPSILON * noise;
-        let forces = found.into_iter().map(|(force, ..)| force).collect();
-        State { x, values, gradients, forces, norm, scale, floor, noise }
+        let parts = forces.par_chunks_mut(PART).enumerate().map_init(Scratch::default, part);
+        let parts: Vec<[f64; 3]> = parts.collect();
+        let root = |n: usize| parts.iter().map(|squares| squares[n]).sum::<f64>().sqrt();
+        let (norm, scale, floor) = (root(0), root(1), f64::EPSILON * root(2));
+        State { x, values, forces, norm, scale, floor, noise: f64::EPSILON * noise }
     }
 
     /// The energy at `to` minus that at `from`, constraint by constraint, so that it is as accurate
@@ -120,7 +149,8 @@ impl Body {
     }
 }
 
-/// The root of the sum of squares.
-fn root_of_squares(values: impl Iterator<Item = f64>) -> f64 {
-    values.map(|value| value * value).sum::<f64>().sqrt()
+/// The sum of the sizes of the coordinates.
+#[inline]
+fn norm_1(x: &Vector3<f64>) -> f64 {
+    x.x.abs() + x.y.abs() + x.z.abs()
 }

@@ -13,23 +13,28 @@
 //! - **Equations.** `H d = −∇U` with `H = Σ (∇C∇Cᵀ + C∇²C)/α`. Far from rest, the second
 //!   derivatives `∇²C` count only for stretched constraints of types whose value is curved in a
 //!   single vertex, such as lengths: the others could make `H` indefinite. Near rest all of them
-//!   count. They come from central differences of the gradients.
+//!   count. They come from differences of the gradients.
 //! - **Preconditioner.** Smoothed aggregation (Vaněk, Mandel and Brezina, Computing 56, 1996): see
-//!   `multigrid.rs`. It is built from `H` alone, so it knows every cut.
-//! - **Steps.** A line search lowers `U` in each step (Armijo). The equations are solved to 10 %
-//!   far from rest and to 1 % near it.
+//!   `multigrid.rs`. It is built from `H` alone, so it knows every cut. Matrix and cycles have
+//!   single precision, energies and forces double precision: see `matrix.rs`.
+//! - **Steps.** Each step lowers `U`, but a full one may raise it once: see `advance.rs`. The
+//!   equations are solved to 20 % far from rest and to 10 % near it.
 #![forbid(unsafe_code)]
 
+mod advance;
 mod aggregates;
 mod blocks;
 mod body;
 mod conjugate;
 mod energy;
 mod error;
-mod hessian;
+mod matrix;
 mod multigrid;
 mod options;
 mod settle;
+mod smoother;
+mod transfer;
+mod vectors;
 
 pub use body::Body;
 pub use error::RestError;

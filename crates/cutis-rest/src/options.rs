@@ -34,7 +34,7 @@ pub struct Step {
     pub moved_m: f64,
     /// Multigrid cycles.
     pub cycles: usize,
-    /// Length of the step relative to the full Newton step.
+    /// Length of the step relative to the full Newton step. Zero if the step was taken back.
     pub length: f64,
 }
 

@@ -2,49 +2,52 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::blocks::{Blocks, dot};
+use crate::advance::{Moved, Pending};
 use crate::conjugate::{self, Solution};
 use crate::energy::State;
-use crate::hessian::Curvature;
+use crate::matrix::{Curvature, Matrix};
 use crate::multigrid::Multigrid;
 use crate::{Body, Options, Rest, RestError, Step};
 
-/// Share of the decrease that the slope predicts, which a step must reach (Armijo).
-const DECREASE: f64 = 1e-4;
-/// Shortest step relative to a full one.
-const SHORTEST: f64 = 1e-9;
-/// Accuracy of the equations of a step, far from rest and near it.
-const TOLERANCES: [f64; 2] = [0.1, 0.01];
-/// Relative error of a displacement over the tolerance of its equations. With the springs of the
-/// demo it is up to 2.8.
-const SOLVED: f64 = 3.0;
+/// Accuracy of the equations of a step without the exact second derivatives, and with them.
+const TOLERANCES: [f64; 2] = [0.2, 0.1];
+/// Relative error of a displacement over the tolerance of its equations.
+const SOLVED: f64 = 2.5;
 /// Length of a step over the displacement from the start, below which the next step uses the exact
 /// second derivatives.
-const NEAR: f64 = 0.2;
+const NEAR: f64 = 0.003;
 /// The levels are built again if a step needs this many times the cycles of the step for which they
 /// were built.
-const STALE: f64 = 1.5;
+const STALE: f64 = 3.0;
 
 /// A search for the state of rest of a body, step by step.
 pub struct Search<'a> {
-    body: &'a Body,
+    pub(crate) body: &'a Body,
     options: Options,
     /// Positions of all vertices at the start, relative to the origin, in m.
     start: Vec<Point3<f64>>,
-    state: State,
+    pub(crate) state: State,
     /// Largest scale of the forces so far, in N.
     scale: f64,
     /// Estimate of the distance from rest, relative to the displacement from the start.
     error: f64,
-    steps: Vec<Step>,
-    energy_change_j: f64,
+    pub(crate) steps: Vec<Step>,
+    pub(crate) energy_change_j: f64,
     levels: Option<Levels>,
+    /// The matrix of the present step.
+    matrix: Matrix,
     /// See [`Rest::complexity`].
     complexity: f64,
     /// Longest displacement of a vertex in a step: half of the diagonal of the body, in m.
     reach: f64,
-    /// Whether the last steps suggest that rest is near.
+    /// Length of a step in m below which the exact second derivatives are tried, and whether the
+    /// last step was below.
+    near_m: f64,
     near: bool,
+    /// The state before a full step that raised the energy.
+    pub(crate) pending: Option<Pending>,
+    /// Whether full steps may raise the energy.
+    pub(crate) relaxed: bool,
 }
 
 /// A preconditioner that is kept for several steps.
@@ -122,9 +125,13 @@ impl<'a> Search<'a> {
             steps: Vec::new(),
             energy_change_j: 0.0,
             levels: None,
+            matrix: body.empty_matrix(),
             complexity: 1.0,
             reach: 0.5 * diagonal(&body.start),
+            near_m: f64::INFINITY,
             near: false,
+            pending: None,
+            relaxed: true,
         };
         if search.is_balanced() {
             search.error = 0.0;
@@ -134,7 +141,7 @@ impl<'a> Search<'a> {
 
     /// Whether the estimated error is small enough, or no force is left.
     pub fn is_at_rest(&self) -> bool {
-        self.error <= self.options.error || self.is_balanced()
+        self.pending.is_none() && (self.error <= self.options.error || self.is_balanced())
     }
 
     /// Whether the forces cancel as far as wanted, or to rounding.
@@ -184,64 +191,81 @@ impl<'a> Search<'a> {
         if self.steps.len() >= self.options.most_steps {
             return Err(failed);
         }
-        let (solution, next, length, change) = self.try_step().ok_or(failed)?;
-        self.energy_change_j += change;
+        let Trial { solution, exact, moved } = self.try_step().ok_or(failed)?;
+        let Moved { state, length, change, slope, rises, .. } = moved;
         let moved_m = (dot(&solution.x, &solution.x) / solution.x.len() as f64).sqrt() * length;
-        let step = Step { force, moved_m, cycles: solution.cycles, length };
-        let way = self.way(&next);
-        self.error = self.estimate(&step, way);
-        self.near = length == 1.0 && moved_m < NEAR * way && next.norm < self.state.norm;
-        self.scale = self.scale.max(next.scale);
-        self.state = next;
+        let step = Step { force: self.force(), moved_m, cycles: solution.cycles, length };
+        let way = self.way(&state);
+        self.error = if rises { f64::INFINITY } else { self.estimate(&step, exact, way) };
+        let shorter = length == 1.0 && moved_m < self.near_m.min(NEAR * way);
+        self.near = !rises && shorter && state.norm < self.state.norm;
+        self.scale = self.scale.max(state.scale);
+        self.energy_change_j += change;
+        let before = std::mem::replace(&mut self.state, state);
+        self.pending = rises.then_some(Pending { state: before, direction: solution.x, slope, change });
         self.steps.push(step);
         Ok(&self.steps[self.steps.len() - 1])
     }
 
     /// Solves for a step, and searches along it.
-    fn try_step(&mut self) -> Option<(Solution, State, f64, f64)> {
-        if self.near {
-            let matrix = self.body.matrix(&self.state, Curvature::All);
-            let solution = self.solve(&matrix);
-            if !solution.indefinite
-                && let Some((next, length, change)) = self.line_search(&solution.x)
-            {
-                return Some((solution, next, length, change));
-            }
-            self.near = false;
-        }
-        let matrix = self.body.matrix(&self.state, Curvature::Stretched);
+    fn try_step(&mut self) -> Option<Trial> {
+        let mut wasted = 0;
         loop {
+            let exact = self.near;
             let fresh = self.levels.is_none();
-            let solution = self.solve(&matrix);
-            if let Some((next, length, change)) = self.line_search(&solution.x) {
-                return Some((solution, next, length, change));
+            let curvature = if exact { Curvature::All } else { Curvature::Stretched };
+            let mut solution = self.solve(curvature);
+            wasted += solution.cycles;
+            if !(exact && solution.indefinite) {
+                if let Some(moved) = self.advance(&solution.x) {
+                    solution.cycles = wasted;
+                    return Some(Trial { solution, exact, moved });
+                }
+                if let Some((direction, moved)) = self.undo() {
+                    let solution = Solution { x: direction, cycles: wasted, indefinite: false };
+                    return Some(Trial { solution, exact: false, moved });
+                }
             }
-            // The direction may come from levels that are too old.
-            if fresh {
+            if exact {
+                // Not near enough. Wait until the steps are half as long.
+                self.near_m = 0.5 * self.steps.last().map_or(0.0, |step| step.moved_m);
+                self.near = false;
+            } else if !fresh {
+                // The direction may come from levels that are too old.
+                self.levels = None;
+            } else {
                 return None;
             }
-            self.levels = None;
         }
     }
 
-    /// Solves the equations of a step with this matrix: near rest that of all second derivatives,
-    /// far from it that of the stretched constraints. Builds the levels if there are none.
-    fn solve(&mut self, matrix: &Blocks<f64, 3, 3>) -> Solution {
-        let tolerance = TOLERANCES[usize::from(self.near)];
-        let build = || {
-            // Levels need a matrix that is never negative.
-            let places = self.body.places(&self.state);
-            let multigrid = if self.near {
-                Multigrid::new(&self.body.matrix(&self.state, Curvature::Stretched), &places)
-            } else {
-                Multigrid::new(matrix, &places)
-            };
-            Levels { multigrid, cost: None }
+    /// Solves the equations of a step with the second derivatives of some constraints. Builds the
+    /// levels if there are none.
+    fn solve(&mut self, curvature: Curvature) -> Solution {
+        let tolerance = TOLERANCES[usize::from(curvature == Curvature::All)];
+        let (body, x) = (self.body, &self.state.x);
+        let matrix = &mut self.matrix;
+        let levels = match &mut self.levels {
+            Some(levels) => {
+                body.fill(matrix, x, curvature);
+                levels.multigrid.update(matrix);
+                levels
+            }
+            none => {
+                // Levels need a matrix that is never negative.
+                body.fill(matrix, x, Curvature::Stretched);
+                let mut multigrid = Multigrid::new(matrix, &body.places(&self.state));
+                if curvature == Curvature::All {
+                    body.fill(matrix, x, curvature);
+                    multigrid.update(matrix);
+                }
+                none.insert(Levels { multigrid, cost: None })
+            }
         };
-        let levels = self.levels.get_or_insert_with(build);
-        self.complexity = levels.multigrid.complexity();
+        self.complexity = levels.multigrid.complexity(matrix);
         let most = self.options.most_cycles;
-        let mut solution = conjugate::solve(matrix, &levels.multigrid, &self.state.forces, tolerance, most);
+        let mut solution =
+            conjugate::solve(matrix, &mut levels.multigrid, &self.state.forces, tolerance, most);
         // Where nothing resists, the equations have no finite solution.
         let longest = solution.x.iter().map(Vector3::norm).fold(0.0, f64::max);
         if longest > self.reach && longest.is_finite() {
@@ -264,48 +288,27 @@ impl<'a> Search<'a> {
     /// Estimate of the distance from rest after a step, relative to the displacement `way` from the
     /// start. The steps shrink by a ratio `q`, so that `q/(1 − q)` of the last one is left. The
     /// larger one of the last two ratios counts, and the error of the equations of a step.
-    fn estimate(&self, step: &Step, way: f64) -> f64 {
+    fn estimate(&self, step: &Step, exact: bool, way: f64) -> f64 {
         let [.., before] = self.steps[..] else { return f64::INFINITY };
         // A shortened step, or one whose equations were not solved, does not tell the distance.
         if step.length < 1.0 || step.cycles >= self.options.most_cycles {
             return f64::INFINITY;
         }
-        let solved = SOLVED * TOLERANCES[usize::from(self.near)];
+        let solved = SOLVED * TOLERANCES[usize::from(exact)];
         let mut ratio = (step.moved_m / before.moved_m).max(solved);
         if let [.., earlier, before] = self.steps[..] {
             ratio = ratio.max(before.moved_m / earlier.moved_m);
         }
         if way > 0.0 && ratio < 1.0 { ratio / (1.0 - ratio) * step.moved_m / way } else { f64::INFINITY }
     }
+}
 
-    /// The first placement along a direction that is low enough, the length of the step, and the
-    /// change of the energy.
-    fn line_search(&self, direction: &[Vector3<f64>]) -> Option<(State, f64, f64)> {
-        let state = &self.state;
-        let slope = -dot(&state.forces, direction);
-        if !(slope < 0.0 && slope.is_finite()) {
-            return None;
-        }
-        let mut length = 1.0;
-        while length >= SHORTEST {
-            let next = self.body.moved(state, direction, length);
-            let change = self.body.difference(state, &next);
-            let end_slope = -dot(&next.forces, direction);
-            let noise = state.noise + next.noise;
-            // Where the change of the energy is below its rounding, the slope decides (Hager and
-            // Zhang, SIAM J. Optim. 16, 2005).
-            let hidden = change.abs() <= noise && end_slope <= (2.0 * DECREASE - 1.0) * slope;
-            let lower = change <= DECREASE * length * slope && change < -noise;
-            if change.is_finite() && end_slope.is_finite() && (lower || hidden) {
-                return Some((next, length, change));
-            }
-            // The minimum of the parabola through the known values, within bounds.
-            let parabola = -0.5 * slope * length * length / (change - slope * length);
-            let within = (0.1 * length)..=(0.5 * length);
-            length = if within.contains(&parabola) { parabola } else { 0.3 * length };
-        }
-        None
-    }
+/// A step before it is made.
+struct Trial {
+    solution: Solution,
+    /// Whether the equations have the exact second derivatives.
+    exact: bool,
+    moved: Moved,
 }
 
 /// Diagonal of the box around some places.
@@ -314,4 +317,9 @@ fn diagonal(places: &[Point3<f64>]) -> f64 {
     let (low, high) =
         places.iter().fold((first, first), |(low, high), place| (low.inf(place), high.sup(place)));
     (high - low).norm()
+}
+
+/// The inner product of two vectors.
+pub(crate) fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }

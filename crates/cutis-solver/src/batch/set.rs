@@ -94,7 +94,8 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
     fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64 {
         let params = self.params[k].as_ref();
         let params = <C::Params<f64> as Params<f64>>::from_fn(|j| params[j].to_f64());
-        let eval = C::eval(&std::array::from_fn(|i| x[i]), &params);
+        let x = x.as_array().expect("one position per vertex");
+        let eval = C::eval(x, &params);
         grad.copy_from_slice(&eval.grad);
         eval.c
     }

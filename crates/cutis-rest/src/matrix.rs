@@ -1,0 +1,239 @@
+//! The matrix of a Newton step.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::Body;
+use crate::blocks::{Block, Blocks};
+use crate::body::{Elements, FIXED};
+use crate::energy::{PART, Scratch};
+use crate::smoother::Operator;
+
+/// Constraints of a kind that are tried for curvature.
+const TRIED: usize = 16;
+
+/// The constraints whose second derivatives count.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Curvature {
+    /// All of them: the exact second derivatives of the energy.
+    All,
+    /// Stretched constraints of kinds that are curved in a single vertex, such as lengths. The
+    /// matrix is then semidefinite for all kinds of this project.
+    Stretched,
+}
+
+/// The matrix of a step in single precision, applied to differences between neighbors.
+///
+/// The blocks `A_ij` of a row nearly cancel, because a body that moves as a whole has no new
+/// forces. Rounding them would act like springs to fixed points. With `S_i = Σ_j A_ij` in double
+/// precision, `A x` at a node is `S_i x_i + Σ_j A_ij (x_j − x_i)`. Then rounding is relative to the
+/// strain and not to the displacement.
+pub(crate) struct Matrix {
+    blocks: Blocks<3, 3>,
+    /// `S_i`, with a zero after each column.
+    sums: Vec<[[f32; 4]; 3]>,
+}
+
+impl Matrix {
+    pub fn blocks(&self) -> &Blocks<3, 3> {
+        &self.blocks
+    }
+}
+
+impl Operator<3, 4> for Matrix {
+    fn nodes(&self) -> usize {
+        self.sums.len()
+    }
+
+    fn diagonal(&self, node: usize) -> Block<3, 3> {
+        let mut sum = [[0.0; 3]; 3];
+        for (to, from) in sum.iter_mut().zip(&self.sums[node]) {
+            for n in 0..3 {
+                to[n] = f64::from(from[n]);
+            }
+        }
+        for (column, block) in self.blocks.row(node) {
+            if column != node {
+                for (to, from) in sum.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
+                    *to -= from;
+                }
+            }
+        }
+        sum
+    }
+
+    #[inline(always)]
+    fn row_times(&self, node: usize, x: &[[f32; 4]]) -> [f32; 4] {
+        let own = x[node];
+        let mut sum = [0.0; 4];
+        for place in self.blocks.places(node) {
+            let other = &x[self.blocks.columns[place] as usize];
+            let mut difference = [0.0; 4];
+            for n in 0..4 {
+                difference[n] = other[n] - own[n];
+            }
+            self.blocks.add_times(place, &difference, &mut sum);
+        }
+        for (column, x) in self.sums[node].iter().zip(own) {
+            for n in 0..4 {
+                sum[n] += column[n] * x;
+            }
+        }
+        sum[3] = 0.0;
+        sum
+    }
+}
+
+impl Body {
+    /// A matrix of zeros with a block for each pair of vertices that share a constraint.
+    pub(crate) fn empty_matrix(&self) -> Matrix {
+        let count = self.free.len();
+        let (starts, columns) = (self.starts.clone(), self.columns.clone());
+        Matrix { blocks: Blocks::zeros(starts, columns, count), sums: vec![[[0.0; 4]; 3]; count] }
+    }
+
+    /// Writes `Σ (∇C∇Cᵀ + C∇²C)/α`, with the second term of some constraints, at positions `x` of
+    /// all vertices.
+    pub(crate) fn fill(&self, matrix: &mut Matrix, x: &[Point3<f64>], curvature: Curvature) {
+        let Matrix { blocks, sums } = matrix;
+        let parts: Vec<_> =
+            blocks.parts_mut(PART).into_iter().zip(sums.chunks_mut(PART)).enumerate().collect();
+        let scratch = || (Scratch::default(), Vec::new());
+        parts.into_par_iter().for_each_init(scratch, |(scratch, work), (part, (values, sums))| {
+            let rows = part * PART..part * PART + sums.len();
+            self.rows(rows.clone(), x, curvature, scratch, work);
+            for (to, from) in values.iter_mut().zip(work.as_flattened().as_flattened()) {
+                *to = *from as f32;
+            }
+            let start = self.starts[rows.start];
+            for (row, sum) in rows.zip(sums) {
+                let mut whole = [[0.0; 3]; 3];
+                for block in &work[self.starts[row] - start..self.starts[row + 1] - start] {
+                    let whole = whole.as_flattened_mut().iter_mut();
+                    whole.zip(block.as_flattened()).for_each(|(to, x)| *to += x);
+                }
+                *sum = whole.map(|[x, y, z]: [f64; 3]| [x as f32, y as f32, z as f32, 0.0]);
+            }
+        });
+    }
+
+    /// The blocks of some rows in double precision, which start a part.
+    fn rows(
+        &self,
+        rows: Range<usize>,
+        x: &[Point3<f64>],
+        curvature: Curvature,
+        scratch: &mut Scratch,
+        to: &mut Vec<Block<3, 3>>,
+    ) {
+        let (starts, columns) = (&self.starts, &self.columns);
+        let start = starts[rows.start];
+        to.clear();
+        to.resize(starts[rows.end] - start, [[0.0; 3]; 3]);
+        for elements in &self.kinds {
+            for &k in elements.of_part(rows.start / PART) {
+                let k = k as usize;
+                let vertices = elements.vertices(k);
+                let c = scratch.evaluate(elements, k, x);
+                let stiffness = elements.stiffness(k);
+                let counts = match curvature {
+                    Curvature::All => c != 0.0,
+                    Curvature::Stretched => elements.curved && c > 0.0,
+                };
+                for (own, &vertex) in vertices.iter().enumerate() {
+                    let row = self.place[vertex as usize] as usize;
+                    if !rows.contains(&row) {
+                        continue;
+                    }
+                    if counts {
+                        scratch.differentiate(elements, k, own);
+                    }
+                    let columns = &columns[starts[row]..starts[row + 1]];
+                    let to = &mut to[starts[row] - start..starts[row + 1] - start];
+                    let left = scratch.gradients[own] * stiffness;
+                    for (b, &other) in vertices.iter().enumerate() {
+                        let column = self.place[other as usize];
+                        if column == FIXED {
+                            continue;
+                        }
+                        let smaller = columns.iter().map(|&c| u32::from(c < column));
+                        let block = &mut to[smaller.sum::<u32>() as usize];
+                        add_outer(block, &left, &scratch.gradients[b]);
+                        if counts {
+                            add(block, c * stiffness, &scratch.curvature[b]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Adds `left · rightᵀ`.
+#[inline(always)]
+fn add_outer(to: &mut Block<3, 3>, left: &Vector3<f64>, right: &Vector3<f64>) {
+    for column in 0..3 {
+        for row in 0..3 {
+            to[column][row] += left[row] * right[column];
+        }
+    }
+}
+
+/// Adds a multiple of a matrix.
+#[inline(always)]
+fn add(to: &mut Block<3, 3>, factor: f64, matrix: &Matrix3<f64>) {
+    for column in 0..3 {
+        for row in 0..3 {
+            to[column][row] += factor * matrix[(row, column)];
+        }
+    }
+}
+
+impl Scratch {
+    /// Forward differences of the gradients over the position of one vertex, after
+    /// [`evaluate`](Self::evaluate): `∂²C/∂x_own∂x_b` for each vertex `b`.
+    fn differentiate(&mut self, elements: &Elements, k: usize, own: usize) {
+        let Self { places, gradients, ahead, curvature } = self;
+        curvature.clear();
+        curvature.resize(places.len(), Matrix3::zeros());
+        let first = places[0];
+        let extent = places.iter().map(|place| (place - first).norm_squared()).fold(0.0, f64::max).sqrt();
+        let step = f64::EPSILON.sqrt() * extent;
+        if step.is_nan() || step <= 0.0 {
+            return;
+        }
+        ahead.resize(places.len(), Vector3::zeros());
+        for axis in 0..3 {
+            let place = places[own][axis];
+            let moved = place + step;
+            places[own][axis] = moved;
+            elements.kind.evaluate(k, places, ahead);
+            places[own][axis] = place;
+            let scale = 1.0 / (moved - place);
+            for (curvature, (ahead, at)) in curvature.iter_mut().zip(ahead.iter().zip(&*gradients)) {
+                for column in 0..3 {
+                    curvature[(axis, column)] = (ahead[column] - at[column]) * scale;
+                }
+            }
+        }
+    }
+}
+
+/// Whether the value of some constraint of a kind is curved as a function of a single vertex.
+/// Lengths are, volumes are not.
+pub(crate) fn is_curved(elements: &Elements, x: &[Point3<f64>]) -> bool {
+    let mut scratch = Scratch::default();
+    let count = elements.kind.len();
+    (0..count).step_by(count.div_ceil(TRIED).max(1)).any(|k| {
+        scratch.evaluate(elements, k, x);
+        let size = scratch.gradients.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let first = scratch.places[0];
+        let extent = scratch.places.iter().map(|place| (place - first).norm()).fold(0.0, f64::max);
+        (0..scratch.places.len()).any(|own| {
+            scratch.differentiate(elements, k, own);
+            scratch.curvature[own].norm() * extent > 1e-3 * size
+        })
+    })
+}

@@ -1,0 +1,101 @@
+//! The way between two levels: prolongation from the rigid motions of the aggregates.
+
+use nalgebra::{Point3, SMatrix};
+use rayon::prelude::*;
+
+use crate::aggregates::Aggregates;
+use crate::blocks::{Block, Blocks, ROWS, add_product};
+use crate::multigrid::RIGID;
+
+/// Displacements of a node in each rigid motion of the body.
+pub(crate) type Modes<const B: usize> = Block<B, RIGID>;
+
+/// Displacements of a node when the body moves along and turns around each axis.
+pub(crate) fn rigid_modes(place: &Point3<f64>) -> Modes<3> {
+    let [x, y, z] = place.coords.into();
+    let (i, o) = (1.0, 0.0);
+    [[i, o, o], [o, i, o], [o, o, i], [o, -z, y], [z, o, -x], [-y, x, o]]
+}
+
+/// The prolongation that moves each aggregate as a rigid body, as one block per node, and the modes
+/// of the next level. The columns of an aggregate are orthonormal. Those of modes that it does not
+/// have, because it has few nodes, are zero.
+pub(crate) fn tentative<const B: usize>(
+    aggregates: &Aggregates,
+    modes: &[Modes<B>],
+) -> (Vec<Modes<B>>, Vec<Modes<RIGID>>) {
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); aggregates.count];
+    for (node, &aggregate) in aggregates.of.iter().enumerate() {
+        members[aggregate as usize].push(node as u32);
+    }
+    let found: Vec<_> =
+        members.par_iter().with_min_len(ROWS / 8).map(|nodes| orthonormal(nodes, modes)).collect();
+    let mut of_nodes = vec![[[0.0; B]; RIGID]; modes.len()];
+    for (nodes, (blocks, _)) in members.iter().zip(&found) {
+        for (&node, block) in nodes.iter().zip(blocks) {
+            of_nodes[node as usize] = std::array::from_fn(|n| block.column(n).into_owned().into());
+        }
+    }
+    (of_nodes, found.into_iter().map(|(_, factor)| factor.into()).collect())
+}
+
+/// Orthonormal columns for the modes of some nodes, and the factors of the modes in them.
+fn orthonormal<const B: usize>(
+    nodes: &[u32],
+    modes: &[Modes<B>],
+) -> (Vec<SMatrix<f64, B, RIGID>>, SMatrix<f64, RIGID, RIGID>) {
+    let mut blocks: Vec<SMatrix<f64, B, RIGID>> =
+        nodes.iter().map(|&n| SMatrix::from(modes[n as usize])).collect();
+    let mut factor = SMatrix::<f64, RIGID, RIGID>::zeros();
+    for column in 0..RIGID {
+        let norm = |blocks: &[SMatrix<f64, B, RIGID>]| {
+            blocks.iter().map(|block| block.column(column).norm_squared()).sum::<f64>().sqrt()
+        };
+        let whole = norm(&blocks);
+        // Twice, because rounding leaves a part of the other columns.
+        for _ in 0..2 {
+            for before in 0..column {
+                let along: f64 =
+                    blocks.iter().map(|block| block.column(before).dot(&block.column(column))).sum();
+                factor[(before, column)] += along;
+                for block in &mut blocks {
+                    let part = block.column(before) * along;
+                    let mut own = block.column_mut(column);
+                    own -= part;
+                }
+            }
+        }
+        let left = norm(&blocks);
+        let exists = left > 1e-6 * whole;
+        factor[(column, column)] = if exists { left } else { 0.0 };
+        let scale = if exists { 1.0 / left } else { 0.0 };
+        blocks.iter_mut().for_each(|block| block.column_mut(column).scale_mut(scale));
+    }
+    (blocks, factor)
+}
+
+/// The prolongation after one step of damped Jacobi (Vaněk, Mandel and Brezina, Computing 56,
+/// 1996). `inverse` is that of each diagonal block, and `largest` the largest eigenvalue of the
+/// matrix times these.
+pub(crate) fn smoothed<const B: usize>(
+    matrix: &Blocks<B, B>,
+    inverse: impl Fn(usize) -> Block<B, B> + Sync,
+    largest: f32,
+    aggregates: &Aggregates,
+    tentative: &[Modes<B>],
+) -> Blocks<B, RIGID> {
+    let damping = -4.0 / 3.0 / f64::from(largest);
+    Blocks::by_rows(tentative.len(), aggregates.count, |sums, row| {
+        let own = sums.at(aggregates.of[row] as usize);
+        for (to, from) in own.as_flattened_mut().iter_mut().zip(tentative[row].as_flattened()) {
+            *to += from;
+        }
+        let mut factor = inverse(row);
+        factor.as_flattened_mut().iter_mut().for_each(|x| *x *= damping);
+        for (column, block) in matrix.row(row) {
+            let mut step = [[0.0; B]; B];
+            add_product(&mut step, &factor, &block);
+            add_product(sums.at(aggregates.of[column] as usize), &step, &tentative[column]);
+        }
+    })
+}

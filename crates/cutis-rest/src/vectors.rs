@@ -1,0 +1,36 @@
+//! Vectors of the multigrid levels: some unknowns per node, in single precision.
+//!
+//! A node has `L` numbers: its unknowns, and zeros up to the length of a SIMD register.
+
+use rayon::prelude::*;
+
+/// The unknowns of a node on each level, with zeros to a multiple of four.
+pub(crate) type Vector<const L: usize> = Vec<[f32; L]>;
+
+/// Nodes that a thread takes at once. Sums of parts are added in order, so that a result does not
+/// depend on the number of threads.
+pub(crate) const PART: usize = 4096;
+
+/// The inner product of two vectors.
+pub(crate) fn dot<const L: usize>(a: &[[f32; L]], b: &[[f32; L]]) -> f64 {
+    let part = |(a, b): (&[[f32; L]], &[[f32; L]])| -> f64 {
+        let mut sums = [0.0; L];
+        for (a, b) in a.iter().zip(b) {
+            for n in 0..L {
+                sums[n] += f64::from(a[n]) * f64::from(b[n]);
+            }
+        }
+        sums.iter().sum()
+    };
+    let parts: Vec<f64> = a.par_chunks(PART).zip(b.par_chunks(PART)).map(part).collect();
+    parts.iter().sum()
+}
+
+/// Adds a multiple of a vector to another one.
+pub(crate) fn add<const L: usize>(to: &mut [[f32; L]], factor: f32, x: &[[f32; L]]) {
+    to.par_iter_mut().with_min_len(PART).zip(x).for_each(|(to, x)| {
+        for n in 0..L {
+            to[n] += factor * x[n];
+        }
+    });
+}
