@@ -18,6 +18,7 @@ pub mod patch;
 pub mod peers;
 pub mod pictures;
 pub mod region;
+pub mod rest;
 pub mod sheet;
 pub mod speed;
 pub mod stability;
@@ -42,6 +43,7 @@ mod tests {
             (crate::patch::PAGE, &crate::patch::TABLES),
             ("peers", &crate::peers::TABLES),
             ("region", &crate::region::TABLES),
+            ("rest", &crate::rest::TABLES),
             ("speed", &crate::speed::TABLES),
             ("stability", &crate::stability::TABLES),
             ("tuning", &crate::tuning::TABLES),

@@ -7,7 +7,7 @@ use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
     accuracy, at_rest, cantilever, chainmail, closing, instructions, main_job, mutations, parity, patch,
-    peers, pictures, region, speed, stability, tuning, wound,
+    peers, pictures, region, rest, speed, stability, tuning, wound,
 };
 
 /// A study and its options.
@@ -27,6 +27,7 @@ enum Study {
     Peers(peers::Options),
     Pictures(pictures::Options),
     Region(region::Options),
+    Rest(rest::Options),
     Speed(speed::Options),
     Stability(stability::Options),
     Tuning(tuning::Options),
@@ -49,6 +50,7 @@ impl Study {
             Self::Peers(options) => peers::run(options, out),
             Self::Pictures(options) => pictures::run(options, out),
             Self::Region(options) => region::run(options, out),
+            Self::Rest(options) => rest::run(options, out),
             Self::Speed(options) => speed::run(options, out),
             Self::Stability(options) => stability::run(options, out),
             Self::Tuning(options) => tuning::run(options, out),

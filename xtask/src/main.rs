@@ -49,6 +49,7 @@ usage: cargo xtask COMMAND
       instructions    instructions of the inner loops per constraint, with limits; needs Valgrind
       main-job        the main job on the phantom and on real scans, with and without skin tension
       region          cost and error of a region of interest and of a graded lattice
+      rest            the search for the state of rest on bodies of all sizes, and frames of the demo
       tuning          `cutis tune` on the demo, compared with a full run
       peers           the speed of other programs on the same beam; needs PyPI the first time
       pictures        the main job on real scans with the paper's skin tension and with the membrane

@@ -1,0 +1,242 @@
+//! Searches for the state of rest, step by step.
+
+use std::time::Instant;
+
+use anyhow::Context;
+use cutis::rest::{Body, Options, Search};
+use cutis::{Override, Scene, SceneSystem};
+use nalgebra::Point3;
+use serde::Serialize;
+
+use crate::kit::{Checks, Failure, Table, number, optional, percent, scene};
+use crate::main_job::volume;
+
+/// Error at which a body counts as at rest.
+pub const AT_REST: f64 = 0.01;
+/// Stated error at which a search of the demo ends. Its result is the reference for all steps.
+const EXACT: f64 = 1e-6;
+/// Stated error at which the other searches end.
+const FINE: f64 = 1e-3;
+/// Lattice spacings of the whole demo without a region, mm.
+const SPACINGS_MM: [f64; 5] = [8.0, 5.0, 4.0, 2.4, 1.45];
+/// Growth of the number of cycles over all sizes that counts as small.
+const GROWTH: f64 = 1.5;
+
+/// A search, as far as a table needs it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Found {
+    name: String,
+    /// Vertices that can move, and all constraints.
+    free: usize,
+    constraints: usize,
+    /// Time to prepare the constraints, s.
+    pub prepared_s: f64,
+    pub steps: Vec<StepOf>,
+    /// True error at the first step with a stated error of at most [`AT_REST`].
+    true_error: Option<f64>,
+    /// Largest memory of the process until now, 10⁹ bytes.
+    peak_gb: Option<f64>,
+    complexity: f64,
+}
+
+/// The search after a step.
+#[derive(Clone, Debug, Serialize)]
+pub struct StepOf {
+    /// Time from the start, s, and all cycles until now.
+    pub s: f64,
+    cycles: usize,
+    /// Error that the search states. Infinite before it is known.
+    stated: f64,
+    /// Distance from the reference. `None` without one.
+    pub error: Option<f64>,
+}
+
+/// A search with its system and the state of rest.
+pub struct Demo {
+    pub system: SceneSystem,
+    pub rest: Vec<Point3<f64>>,
+    pub found: Found,
+}
+
+impl Found {
+    /// The first step with a stated error of at most `error`.
+    fn at(&self, error: f64) -> Option<&StepOf> {
+        self.steps.iter().find(|step| step.stated <= error)
+    }
+
+    /// Time and cycles until the body counts as at rest.
+    pub fn seconds(&self) -> Option<f64> {
+        self.at(AT_REST).map(|step| self.prepared_s + step.s)
+    }
+
+    pub fn is_abdomen(&self) -> bool {
+        self.name.starts_with("abdomen")
+    }
+}
+
+/// A scene with some keys set.
+fn built(name: &str, set: &[String]) -> Result<SceneSystem, Failure> {
+    let overrides: Vec<Override> = set
+        .iter()
+        .map(|text| {
+            let (key, value) = text.split_once('=').context("no value")?;
+            Ok(Override { key: key.to_owned(), value: value.to_owned() })
+        })
+        .collect::<Result<_, Failure>>()?;
+    Ok(cutis::build_system(&Scene::load(&scene(name), &overrides)?)?)
+}
+
+/// The demo, with the distance from rest after each step.
+pub fn demo() -> Result<Demo, Failure> {
+    let system = built("demo", &[])?;
+    let start = Instant::now();
+    let body = Body::of(&system.system, system.settings.gravity_m_s2)?;
+    let prepared_s = start.elapsed().as_secs_f64();
+    let mut search = Search::new(&body, &Options { error: EXACT, ..Options::default() })?;
+    let mut positions = Vec::new();
+    let mut found = follow("demo".into(), &system, &body, prepared_s, &mut search, |search, _| {
+        positions.push(search.positions());
+    })?;
+    let rest = search.positions();
+    let start = system.system.to_f64().positions();
+    for (step, x) in found.steps.iter_mut().zip(&positions) {
+        step.error = Some(distance(x, &rest, &start));
+    }
+    found.true_error = found.at(AT_REST).and_then(|step| step.error);
+    Ok(Demo { system, rest, found })
+}
+
+/// The demo, and the abdomen in its region and whole.
+pub fn bodies(demo: Found, most: usize) -> Result<Vec<Found>, Failure> {
+    let mut found = vec![demo];
+    for region in [None, Some("lattice.region=whole")] {
+        let Some(mut set) = volume(Some("abdomen_ts_122x101x112.nii.gz")) else { break };
+        set.extend(region.map(str::to_owned));
+        let name = if region.is_some() { "abdomen, whole" } else { "abdomen" };
+        found.extend(one(name, "abdomen-incision", &set, most)?);
+    }
+    Ok(found)
+}
+
+/// The whole demo on lattices from coarse to fine.
+pub fn sizes(most: usize) -> Result<Vec<Found>, Failure> {
+    let mut found = Vec::new();
+    for spacing in SPACINGS_MM {
+        let set = [format!("lattice.spacing_mm={spacing:?}"), "lattice.region=whole".to_owned()];
+        found.extend(one(&format!("{spacing} mm"), "demo", &set, most)?);
+    }
+    Ok(found)
+}
+
+/// A search until the stated error is small. `None` if the body has too many vertices.
+fn one(name: &str, scene: &str, set: &[String], most: usize) -> Result<Option<Found>, Failure> {
+    let system = built(scene, set)?;
+    let start = Instant::now();
+    let body = Body::of(&system.system, system.settings.gravity_m_s2)?;
+    let prepared_s = start.elapsed().as_secs_f64();
+    if body.free_count() > most {
+        return Ok(None);
+    }
+    let mut search = Search::new(&body, &Options { error: FINE, ..Options::default() })?;
+    let mut early = None;
+    let mut found = follow(name.into(), &system, &body, prepared_s, &mut search, |search, stated| {
+        if stated <= AT_REST && early.is_none() {
+            early = Some(search.positions());
+        }
+    })?;
+    let start = system.system.to_f64().positions();
+    found.true_error = early.map(|x| distance(&x, &search.positions(), &start));
+    Ok(Some(found))
+}
+
+/// Makes steps until the search ends. `after` does not count as time.
+fn follow(
+    name: String,
+    system: &SceneSystem,
+    body: &Body,
+    prepared_s: f64,
+    search: &mut Search<'_>,
+    mut after: impl FnMut(&Search<'_>, f64),
+) -> Result<Found, Failure> {
+    let (mut s, mut cycles) = (0.0, 0);
+    let mut steps = Vec::new();
+    while !search.is_at_rest() {
+        let start = Instant::now();
+        cycles += search.step().with_context(|| name.clone())?.cycles;
+        s += start.elapsed().as_secs_f64();
+        let stated = search.error();
+        after(search, stated);
+        steps.push(StepOf { s, cycles, stated, error: None });
+    }
+    let constraints = system.system.kinds().iter().map(|kind| kind.len()).sum();
+    let (free, complexity) = (body.free_count(), search.rest().complexity);
+    Ok(Found { name, free, constraints, prepared_s, steps, true_error: None, peak_gb: peak_gb(), complexity })
+}
+
+/// Largest memory of this process until now in 10⁹ bytes. `None` if the system does not tell.
+fn peak_gb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? * 1024.0 / 1e9)
+}
+
+/// The distance from rest over the displacement from the start, both as roots of mean squares.
+pub fn distance(x: &[Point3<f64>], rest: &[Point3<f64>], start: &[Point3<f64>]) -> f64 {
+    let square = |a: &[Point3<f64>]| a.iter().zip(rest).map(|(a, b)| (a - b).norm_squared()).sum::<f64>();
+    (square(x) / square(start)).sqrt()
+}
+
+/// Checks that the stated errors hold, and that the cycles hardly grow.
+pub fn check(bodies: &[Found], sizes: &[Found], checks: &mut Checks) {
+    for found in bodies.iter().chain(sizes) {
+        let (name, error) = (&found.name, found.true_error.unwrap_or(f64::INFINITY));
+        let what = format!("{name}: {} from rest where 1 % is stated", percent(error));
+        checks.add(what, error <= AT_REST);
+        let line = format!("{name}: the first step is farther away");
+        checks.control(line, found.steps.first().is_some_and(|step| step.stated > AT_REST));
+    }
+    let cycles: Vec<f64> =
+        sizes.iter().filter_map(|found| Some(found.at(AT_REST)?.cycles as f64)).collect();
+    let growth = cycles.iter().copied().fold(0.0, f64::max) / cycles.first().copied().unwrap_or(1.0);
+    checks.add(
+        format!("the cycles grow {growth:.2} times over all sizes, at most {GROWTH}"),
+        growth <= GROWTH,
+    );
+}
+
+/// A row per body.
+pub fn table(found: &[Found]) -> Table {
+    let mut table = Table::new([
+        "body",
+        "vertices that move",
+        "constraints",
+        "prepared, s",
+        "to 1 %: s",
+        "steps",
+        "cycles",
+        "true error",
+        "to 0.1 %: s",
+        "cycles",
+        "largest memory until then, GB",
+    ]);
+    for found in found {
+        let count = |error: f64| found.steps.iter().take_while(|step| step.stated > error).count() + 1;
+        let [rough, fine] = [AT_REST, FINE].map(|error| found.at(error));
+        let seconds = |step: Option<&StepOf>| optional(step, |step| number(found.prepared_s + step.s));
+        let cycles = |step: Option<&StepOf>| optional(step, |step| step.cycles.to_string());
+        table.add([
+            found.name.clone(),
+            found.free.to_string(),
+            found.constraints.to_string(),
+            number(found.prepared_s),
+            seconds(rough),
+            count(AT_REST).to_string(),
+            cycles(rough),
+            optional(found.true_error, percent),
+            seconds(fine),
+            cycles(fine),
+            optional(found.peak_gb, |gb| format!("{gb:.2}")),
+        ]);
+    }
+    table
+}
