@@ -18,7 +18,7 @@ const DECREASE: f64 = 1e-4;
 /// step may stay if the next one makes up for it.
 const RISE: f64 = 10.0;
 /// Shortest step relative to a full one.
-const SHORTEST: f64 = 1e-9;
+const SHORTEST: f64 = 1e-4;
 
 /// A placement along a direction.
 pub(crate) struct Moved {

@@ -95,8 +95,9 @@ impl Body {
     }
 
     /// Writes `Σ (∇C∇Cᵀ + C∇²C)/α`, with the second term of some constraints, at positions `x` of
-    /// all vertices.
-    pub(crate) fn fill(&self, matrix: &mut Matrix, x: &[Point3<f64>], curvature: Curvature) {
+    /// all vertices. Adds `shift` times the blocks on the diagonal (Levenberg and Marquardt): it
+    /// shortens steps, and holds a body that nothing else holds.
+    pub(crate) fn fill(&self, matrix: &mut Matrix, x: &[Point3<f64>], curvature: Curvature, shift: f64) {
         let Matrix { blocks, sums } = matrix;
         let parts: Vec<_> =
             blocks.parts_mut(PART).into_iter().zip(sums.chunks_mut(PART)).enumerate().collect();
@@ -110,9 +111,12 @@ impl Body {
             let start = self.starts[rows.start];
             for (row, sum) in rows.zip(sums) {
                 let mut whole = [[0.0; 3]; 3];
-                for block in &work[self.starts[row] - start..self.starts[row + 1] - start] {
+                let columns = &self.columns[self.starts[row]..self.starts[row + 1]];
+                let blocks = &work[self.starts[row] - start..self.starts[row + 1] - start];
+                for (&column, block) in columns.iter().zip(blocks) {
+                    let factor = if column as usize == row { 1.0 + shift } else { 1.0 };
                     let whole = whole.as_flattened_mut().iter_mut();
-                    whole.zip(block.as_flattened()).for_each(|(to, x)| *to += x);
+                    whole.zip(block.as_flattened()).for_each(|(to, x)| *to += factor * x);
                 }
                 *sum = whole.map(|[x, y, z]: [f64; 3]| [x as f32, y as f32, z as f32, 0.0]);
             }

@@ -56,7 +56,7 @@ impl Multigrid {
     /// Builds the levels for a matrix with one node at each place, in m.
     pub fn new(matrix: &Matrix, places: &[Point3<f64>]) -> Self {
         if matrix.nodes() <= BOTTOM {
-            return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix.blocks()) };
+            return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix, matrix.blocks()) };
         }
         let modes: Vec<Modes<3>> = places.iter().map(transfer::rigid_modes).collect();
         let (fine, mut matrix, mut modes) = Level::new(matrix, matrix.blocks(), &modes);
@@ -70,14 +70,14 @@ impl Multigrid {
                 break;
             }
         }
-        Self { fine: Some(fine), coarse, bottom: Bottom::new(&matrix) }
+        Self { fine: Some(fine), coarse, bottom: Bottom::new::<RIGID, LANES>(&matrix, &matrix) }
     }
 
     /// Adapts the smoother of the finest level to another matrix. The other levels stay.
     pub fn update(&mut self, matrix: &Matrix) {
         match &mut self.fine {
             Some(fine) => fine.smoother.update(matrix),
-            None => self.bottom = Bottom::new(matrix.blocks()),
+            None => self.bottom = Bottom::new(matrix, matrix.blocks()),
         }
     }
 
@@ -189,11 +189,14 @@ fn hold_missing_modes(block: &mut [[f64; RIGID]; RIGID]) {
 }
 
 impl Bottom {
-    fn new<const B: usize>(matrix: &Blocks<B, B>) -> Self {
+    fn new<const B: usize, const L: usize>(operator: &impl Operator<B, L>, matrix: &Blocks<B, B>) -> Self {
         let size = B * matrix.height();
         let mut dense = DMatrix::zeros(size, size);
         for row in 0..matrix.height() {
-            for (column, block) in matrix.row(row) {
+            for (column, mut block) in matrix.row(row) {
+                if column == row {
+                    block = operator.diagonal(row);
+                }
                 for (j, of_column) in block.iter().enumerate() {
                     for (i, &value) in of_column.iter().enumerate() {
                         dense[(B * row + i, B * column + j)] = value;
@@ -211,7 +214,7 @@ impl Bottom {
             if factor.is_some() || shift > 1.0 {
                 break factor;
             }
-            shift = if shift == 0.0 { 1e-12 } else { 100.0 * shift };
+            shift = if shift == 0.0 { 1e-9 } else { 100.0 * shift };
         };
         Self { factor }
     }

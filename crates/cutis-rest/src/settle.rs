@@ -16,6 +16,12 @@ const SOLVED: f64 = 2.5;
 /// Length of a step over the displacement from the start, below which the next step uses the exact
 /// second derivatives.
 const NEAR: f64 = 0.003;
+/// Length of a step below which the next one has a larger shift.
+const SHORT: f64 = 0.1;
+/// The first shift, the smallest one, and the largest one.
+const FIRST_SHIFT: f64 = 1e-4;
+const LEAST_SHIFT: f64 = 1e-7;
+const MOST_SHIFT: f64 = 1e6;
 /// The levels are built again if a step needs this many times the cycles of the step for which they
 /// were built.
 const STALE: f64 = 3.0;
@@ -44,6 +50,8 @@ pub struct Search<'a> {
     /// last step was below.
     near_m: f64,
     near: bool,
+    /// Shift of the matrix, see [`Body::fill`].
+    shift: f64,
     /// The state before a full step that raised the energy.
     pub(crate) pending: Option<Pending>,
     /// Whether full steps may raise the energy.
@@ -130,6 +138,7 @@ impl<'a> Search<'a> {
             reach: 0.5 * diagonal(&body.start),
             near_m: f64::INFINITY,
             near: false,
+            shift: 0.0,
             pending: None,
             relaxed: true,
         };
@@ -196,9 +205,18 @@ impl<'a> Search<'a> {
         let moved_m = (dot(&solution.x, &solution.x) / solution.x.len() as f64).sqrt() * length;
         let step = Step { force: self.force(), moved_m, cycles: solution.cycles, length };
         let way = self.way(&state);
-        self.error = if rises { f64::INFINITY } else { self.estimate(&step, exact, way) };
+        // A shift shortens steps, so that they do not tell the distance.
+        let tells = !rises && self.shift == 0.0;
+        self.error = if tells { self.estimate(&step, exact, way) } else { f64::INFINITY };
         let shorter = length == 1.0 && moved_m < self.near_m.min(NEAR * way);
         self.near = !rises && shorter && state.norm < self.state.norm;
+        self.shift = match length {
+            1.0 if rises => self.shift,
+            1.0 if self.shift > LEAST_SHIFT => 0.1 * self.shift,
+            1.0 => 0.0,
+            length if length < SHORT => self.raised_shift(),
+            _ => self.shift,
+        };
         self.scale = self.scale.max(state.scale);
         self.energy_change_j += change;
         let before = std::mem::replace(&mut self.state, state);
@@ -233,10 +251,17 @@ impl<'a> Search<'a> {
             } else if !fresh {
                 // The direction may come from levels that are too old.
                 self.levels = None;
+            } else if self.shift < MOST_SHIFT {
+                self.shift = self.raised_shift();
             } else {
                 return None;
             }
         }
+    }
+
+    /// The next larger shift.
+    fn raised_shift(&self) -> f64 {
+        (10.0 * self.shift).max(FIRST_SHIFT)
     }
 
     /// Solves the equations of a step with the second derivatives of some constraints. Builds the
@@ -247,16 +272,16 @@ impl<'a> Search<'a> {
         let matrix = &mut self.matrix;
         let levels = match &mut self.levels {
             Some(levels) => {
-                body.fill(matrix, x, curvature);
+                body.fill(matrix, x, curvature, self.shift);
                 levels.multigrid.update(matrix);
                 levels
             }
             none => {
                 // Levels need a matrix that is never negative.
-                body.fill(matrix, x, Curvature::Stretched);
+                body.fill(matrix, x, Curvature::Stretched, self.shift);
                 let mut multigrid = Multigrid::new(matrix, &body.places(&self.state));
                 if curvature == Curvature::All {
-                    body.fill(matrix, x, curvature);
+                    body.fill(matrix, x, curvature, self.shift);
                     multigrid.update(matrix);
                 }
                 none.insert(Levels { multigrid, cost: None })
