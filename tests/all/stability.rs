@@ -1,7 +1,7 @@
 //! The quick part of the stability study: stiff and extreme cases meet their requirements at three
 //! length scales.
 
-use cutis_studies::stability::{self, Effort, Failure, SCALES, Trial, case::Case, cases};
+use cutis_studies::stability::{self, Effort, Failure, Outcome, SCALES, Trial, case::Case, cases};
 use cutis_test_kit::gpu;
 
 /// Runs cases and fails with a list of all trials that do not meet their requirements.
@@ -29,6 +29,24 @@ fn extreme_cases_end_as_expected() {
 fn extreme_cases_end_as_expected_in_double_precision() {
     let cases = cases::all(Effort::Quick);
     check(|keep| stability::run_reference(&cases, &[1e-3], keep));
+}
+
+/// Every body comes to rest from its first placement, or a typed error says why not.
+#[test]
+fn extreme_bodies_come_to_rest_or_say_why_not() {
+    let cases = cases::all(Effort::Normal);
+    let (mut at_rest, mut named) = (0, 0);
+    check(|keep| {
+        stability::run_rest(&cases, &SCALES, &mut |trial| {
+            match trial.outcome {
+                Outcome::Settled => at_rest += 1,
+                _ => named += 1,
+            }
+            keep(trial)
+        })
+    });
+    // Most of the bodies have a state of rest.
+    assert!(at_rest > 8 * named, "{at_rest} at rest, {named} not");
 }
 
 /// One case of each sort, because a software adapter is slow. The scale is the one at which an

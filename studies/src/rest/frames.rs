@@ -34,7 +34,7 @@ pub fn measure(demo: &Demo, checks: &mut Checks) -> Result<Vec<Frames>, Failure>
     let mut all = Vec::new();
     for (substeps, iterations) in SETTINGS {
         let settings =
-            Settings { formulation: Formulation::Vbd, substeps, iterations, ..demo.system.settings.clone() };
+            Settings { formulation: Formulation::Vbd, substeps, iterations, ..demo.system.settings };
         let mut solver = SolverCpu::new(demo.system.system.clone(), settings, None)?;
         let (mut s, mut points) = (0.0, Vec::new());
         while s < LIMIT_S {
@@ -48,7 +48,10 @@ pub fn measure(demo: &Demo, checks: &mut Checks) -> Result<Vec<Frames>, Failure>
     }
     let nearest = all.iter().flat_map(|frames| &frames.points).map(|[_, e]| *e).fold(f64::INFINITY, f64::min);
     checks.control(
-        format!("the frames come as near as {} in {LIMIT_S} s, so that both end in one state", percent(nearest)),
+        format!(
+            "the frames come as near as {} in {LIMIT_S} s, so that both end in one state",
+            percent(nearest)
+        ),
         nearest < 0.5,
     );
     Ok(all)

@@ -1,5 +1,5 @@
-//! How long it takes to find out where a wound ends up: the search for the state of rest, and frames
-//! with the settings of the scenes.
+//! How long it takes to find out where a wound ends up: the search for the state of rest, and
+//! frames with the settings of the scene.
 
 mod frames;
 mod search;
@@ -49,7 +49,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let bodies_table = search::table(&bodies).markdown();
     writeln!(out, "{bodies_table}")?;
     let sizes = search::sizes(most)?;
-    let sizes_table = search::table(&sizes).markdown();
+    let sizes_table = search::table(&sizes).markdown() + "\n" + &search::growth(&sizes);
     writeln!(out, "{sizes_table}")?;
     search::check(&bodies, &sizes, &mut checks);
     checks.print(out)?;

@@ -13,6 +13,7 @@ pub mod input_validation;
 pub mod membrane;
 mod options;
 pub mod run;
+pub mod settle;
 mod tables;
 mod trial;
 
@@ -34,7 +35,17 @@ use case::Case;
 /// The length scales.
 pub const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
 /// Tables of the page.
-pub const TABLES: [&str; 6] = ["provenance", "backends", "formulations", "worst", "known", "refused"];
+pub const TABLES: [&str; 9] = [
+    "provenance",
+    "backends",
+    "formulations",
+    "worst",
+    "known",
+    "refused",
+    "rest-provenance",
+    "rest",
+    "rest-named",
+];
 /// Cases in the table of the worst ones.
 const WORST: usize = 12;
 
@@ -45,6 +56,9 @@ const WORST: usize = 12;
 /// There is no adapter, unless the options allow that or do not ask for a GPU. A file cannot be
 /// written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    if options.rest {
+        return search(options, out);
+    }
     let page =
         (options.write || options.out.is_some()).then(|| Page::open("stability", &TABLES)).transpose()?;
     let mut provenance = Provenance::start(&options.command());
@@ -96,6 +110,32 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     Ok(failed == 0)
 }
 
+/// Searches for the states of rest. Returns whether every trial met its requirement.
+fn search(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    let page = options.write.then(|| Page::open("stability", &TABLES)).transpose()?;
+    let provenance = Provenance::start(&options.command());
+    let mut cases = cases::all(options.effort());
+    cases.retain(|case| options.case.as_ref().is_none_or(|part| case.name.contains(part.as_str())));
+    let scales: Vec<f64> = options.scale.map_or(SCALES.to_vec(), |scale| vec![scale]);
+    let mut trials = Vec::new();
+    run_rest(&cases, &scales, &mut |trial: Trial| {
+        writeln!(out, "{}", tables::line(&trial))?;
+        trials.push(trial);
+        Ok(())
+    })?;
+    ensure!(!trials.is_empty(), "no case was run");
+    let failed = tables::failures(&trials);
+    writeln!(out, "\n{} rows, {failed} failed", trials.len())?;
+    if let Some(mut page) = page.filter(|_| failed == 0) {
+        let scale = |trial: &Trial| trial.scale.map(|scale| format!("{scale:e}"));
+        page.set("rest-provenance", &provenance.markdown())?;
+        page.set("rest", &tables::ends(&trials, scale).markdown())?;
+        page.set("rest-named", &tables::named(&trials).markdown())?;
+        page.save(&results())?;
+    }
+    Ok(failed == 0)
+}
+
 /// Receives a finished trial.
 pub type Sink<'a> = &'a mut dyn FnMut(Trial) -> Result<(), Failure>;
 
@@ -119,6 +159,21 @@ pub fn run_cpu(cases: &[Case], scales: &[f64], sink: Sink<'_>) -> Result<(), Fai
         Ok(Box::new(SolverCpu::new(system, settings, Some(1))?))
     };
     each(cases, scales, sink, |case, scale| run::run(case, scale, "cpu f32", &make))
+}
+
+/// Searches for the states of rest of the bodies that vertex block descent moves in the cases.
+///
+/// # Errors
+/// `sink` fails.
+pub fn run_rest(cases: &[Case], scales: &[f64], sink: Sink<'_>) -> Result<(), Failure> {
+    for case in cases {
+        for &scale in scales {
+            if let Some(trial) = settle::run(case, scale) {
+                sink(trial)?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Runs the cases on a GPU.

@@ -29,6 +29,9 @@ pub struct Options {
     /// Continue without a GPU if there is no adapter.
     #[arg(long)]
     pub allow_no_gpu: bool,
+    /// Search for the states of rest of the bodies in place of running frames.
+    #[arg(long, conflicts_with_all = ["backend", "adapter", "allow_no_gpu", "out", "json"])]
+    pub rest: bool,
     /// Only this length scale.
     #[arg(long)]
     pub scale: Option<f64>,
@@ -70,7 +73,12 @@ pub enum Effort {
 impl Options {
     /// The command line, as the page names it.
     pub fn command(&self) -> String {
-        let flags = [(self.quick, " --quick"), (self.full, " --full"), (self.write, " --write")];
+        let flags = [
+            (self.quick, " --quick"),
+            (self.full, " --full"),
+            (self.rest, " --rest"),
+            (self.write, " --write"),
+        ];
         let flags = flags.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag);
         "stability".to_owned() + &flags.collect::<String>()
     }

@@ -16,7 +16,7 @@ use super::trial::{Outcome, Trial};
 pub type Make<'a, T> = &'a dyn Fn(System<T>, Settings) -> Result<Box<dyn Solver<T>>, Failure>;
 
 /// Error over rest size from which a degenerate element is named.
-const VIOLATED: f64 = 0.01;
+pub(super) const VIOLATED: f64 = 0.01;
 /// Share of the energy that a body at rest may still have.
 const AT_REST: f64 = 1e-6;
 

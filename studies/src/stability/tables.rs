@@ -1,8 +1,8 @@
 //! Lines on the terminal, and summary tables of the page.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::trial::Trial;
+use super::trial::{Outcome, Trial};
 use crate::kit::{Table, larger, number, optional};
 
 /// The trial as one line of text.
@@ -131,6 +131,37 @@ pub fn known_failures(trials: &[Trial]) -> Table {
             optional(worst, |trial| trial.outcome.note().to_owned()),
             trials[0].known_failure.unwrap_or_default().to_owned(),
         ]);
+    }
+    table
+}
+
+/// Number of trials by outcome for each length scale.
+pub fn ends(trials: &[Trial], scale: impl Fn(&Trial) -> Option<String>) -> Table {
+    let mut table = Table::new(["scale", "trials", "at rest", "a typed error", "failed", "wall, s"]);
+    let scales: BTreeSet<String> = trials.iter().filter_map(&scale).collect();
+    for name in scales {
+        let of_scale: Vec<&Trial> =
+            trials.iter().filter(|trial| scale(trial).as_deref() == Some(&name)).collect();
+        let count =
+            |wanted: &str| of_scale.iter().filter(|trial| trial.outcome.to_string() == wanted).count();
+        let [settled, named, failed] = ["settled", "named", "FAILED"].map(|wanted| count(wanted).to_string());
+        let wall: f64 = of_scale.iter().map(|trial| trial.wall_s).sum();
+        table.add([name, of_scale.len().to_string(), settled, named, failed, number(wall)]);
+    }
+    table
+}
+
+/// The cases that ended with a typed error, and the error at the first scale that has one.
+pub fn named(trials: &[Trial]) -> Table {
+    let mut by_case: BTreeMap<&str, Vec<&Trial>> = BTreeMap::new();
+    for trial in trials.iter().filter(|trial| matches!(trial.outcome, Outcome::Named(_))) {
+        by_case.entry(&trial.case).or_default().push(trial);
+    }
+    let mut table = Table::new(["case", "scales", "error"]);
+    for (case, trials) in by_case {
+        let scales: Vec<String> =
+            trials.iter().filter_map(|trial| Some(format!("{:e}", trial.scale?))).collect();
+        table.add([case.to_owned(), scales.join(", "), trials[0].outcome.note().to_owned()]);
     }
     table
 }
