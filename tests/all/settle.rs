@@ -68,8 +68,28 @@ fn the_report_states_the_error() {
     let run = Run::of(&small(&[REST]));
     let rest = run.report.rest.clone().unwrap();
     assert!(rest.error > 0.0 && rest.error <= 1e-3 && !rest.steps.is_empty(), "{rest:?}");
-    assert!(String::from_utf8(run.bytes("report.html")).unwrap().contains("At rest, with an estimated"));
+    assert_eq!(rest.steps.last().unwrap().error, Some(rest.error));
+    let html = String::from_utf8(run.bytes("report.html")).unwrap();
+    assert!(html.contains("At rest, with an estimated") && html.contains("Search for the state of rest"));
     assert!(Run::of(&small(&[("run.frames", "2")])).report.rest.is_none());
+}
+
+/// A search ends at the error that the scene allows, near the exact state.
+#[test]
+fn a_larger_error_ends_earlier() {
+    let with = |error: &str| {
+        let run = Run::of(&small(&[("run", &format!("{{ frames = 0, until = 'rest', error = {error} }}"))]));
+        let opening = run.report.wound.as_ref().unwrap().final_mm;
+        (run.report.rest.unwrap(), opening)
+    };
+    let ((rough, rough_mm), (fine, fine_mm)) = (with("0.05"), with("1e-3"));
+    assert!(rough.error <= 0.05 && fine.error <= 1e-3, "{rough:?} and {fine:?}");
+    assert!(rough.steps.len() < fine.steps.len(), "{} and {} steps", rough.steps.len(), fine.steps.len());
+    assert!((rough_mm / fine_mm - 1.0).abs() < 0.05, "{rough_mm} and {fine_mm} mm");
+    for error in ["0.0", "1.1", "nan"] {
+        let wrong = Scene::load(&folder().join(SMALL), &overrides(&[("run.error", error)])).unwrap_err();
+        assert!(matches!(&wrong, Error::SceneKey { key, .. } if key == "run.error"), "{wrong}");
+    }
 }
 
 /// A body that is at rest in the scan does not move by one bit, on any lattice.

@@ -6,10 +6,10 @@ use nalgebra::Point3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Largest error of the displacement relative to the displacement from the start, as the search
-    /// estimates it. From 0 to below 1.
+    /// estimates it. From 0 to 1.
     pub error: f64,
     /// Relative force at which a body counts as at rest in any case, see [`Rest::force`]. From 0 to
-    /// below 1.
+    /// 1.
     pub force: f64,
     /// Largest number of Newton steps.
     pub most_steps: usize,
@@ -36,6 +36,9 @@ pub struct Step {
     pub cycles: usize,
     /// Length of the step relative to the full Newton step. Zero if the step was taken back.
     pub length: f64,
+    /// Estimate of the distance from rest after the step, see [`Rest::error`]. Infinite before it
+    /// is known.
+    pub error: f64,
 }
 
 /// A body at rest.

@@ -115,8 +115,8 @@ impl<'a> Search<'a> {
 
     fn at(body: &'a Body, x: Vec<Point3<f64>>, options: &Options) -> Result<Self, RestError> {
         for (what, value) in [("error", options.error), ("force", options.force)] {
-            if !(0.0..1.0).contains(&value) {
-                return Err(RestError::Value { what, value, expected: "a number from 0 to below 1" });
+            if !(0.0..=1.0).contains(&value) {
+                return Err(RestError::Value { what, value, expected: "a number from 0 to 1" });
             }
         }
         let state = body.at(x.clone());
@@ -203,11 +203,14 @@ impl<'a> Search<'a> {
         let Trial { solution, exact, moved } = self.try_step().ok_or(failed)?;
         let Moved { state, length, change, slope, rises, .. } = moved;
         let moved_m = (dot(&solution.x, &solution.x) / solution.x.len() as f64).sqrt() * length;
-        let step = Step { force: self.force(), moved_m, cycles: solution.cycles, length };
         let way = self.way(&state);
+        let mut step =
+            Step { force: self.force(), moved_m, cycles: solution.cycles, length, error: f64::INFINITY };
         // A shift shortens steps, so that they do not tell the distance.
-        let tells = !rises && self.shift == 0.0;
-        self.error = if tells { self.estimate(&step, exact, way) } else { f64::INFINITY };
+        if !rises && self.shift == 0.0 {
+            step.error = self.estimate(&step, exact, way);
+        }
+        self.error = step.error;
         let shorter = length == 1.0 && moved_m < self.near_m.min(NEAR * way);
         self.near = !rises && shorter && state.norm < self.state.norm;
         self.shift = match length {

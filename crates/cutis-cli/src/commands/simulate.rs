@@ -10,19 +10,39 @@ use super::pretty;
 use crate::args::Change;
 use crate::terminal::{Terminal, print};
 
+/// Error of the state of rest in the demo.
+const DEMO_ERROR: &str = "0.01";
+
 pub(crate) fn demo(out: &Path, change: &Change, json: bool) -> Result<(), Error> {
-    let loaded = change.applied(cutis::demo(&change.overrides(None))?);
+    let loaded = match change.frames {
+        Some(_) => change.applied(cutis::demo(&change.overrides(None))?),
+        None => settled(&[("run.until", "rest"), ("run.error", DEMO_ERROR)], change, cutis::demo)?,
+    };
     finish(&loaded, RunOptions { out: out.into(), resume: false }, json)
 }
 
 pub(crate) fn settle(scene: &Path, out: Option<PathBuf>, change: &Change, json: bool) -> Result<(), Error> {
-    let mut overrides = change.overrides(None);
-    overrides.push(Override { key: "run.until".into(), value: "rest".into() });
-    let mut loaded = change.applied(Scene::load(scene, &overrides)?);
-    if change.frames.is_none() && !loaded.scene.moves_over_time() {
-        loaded.scene.run.frames = 0;
-    }
+    let loaded = settled(&[], change, |overrides| {
+        let until = Override { key: "run.until".into(), value: "rest".into() };
+        Scene::load(scene, &[overrides, &[until]].concat())
+    })?;
     finish(&loaded, RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume: false }, json)
+}
+
+/// A scene with keys that the user may change, and without frames unless something happens over
+/// time.
+fn settled(
+    keys: &[(&str, &str)],
+    change: &Change,
+    load: impl Fn(&[Override]) -> Result<LoadedScene, Error>,
+) -> Result<LoadedScene, Error> {
+    let given = |&(key, value): &(&str, &str)| Override { key: key.into(), value: value.into() };
+    let mut overrides: Vec<Override> = keys.iter().map(given).collect();
+    overrides.extend(change.overrides(None));
+    if !load(&overrides)?.scene.moves_over_time() {
+        overrides.insert(0, given(&("run.frames", "0")));
+    }
+    Ok(change.applied(load(&overrides)?))
 }
 
 pub(crate) fn run(
@@ -51,19 +71,19 @@ fn finish(loaded: &LoadedScene, options: RunOptions, json: bool) -> Result<(), E
 
 fn summary(report: &Report, out: &Path) -> String {
     let sizes = &report.sizes;
-    let mut lines = vec![
-        format!(
-            "{} vertices, {} edges, {} tetrahedra, {} skin triangles",
-            sizes.vertices, sizes.edges, sizes.tets, sizes.skin_triangles
-        ),
-        format!(
+    let mut lines = vec![format!(
+        "{} vertices, {} edges, {} tetrahedra, {} skin triangles",
+        sizes.vertices, sizes.edges, sizes.tets, sizes.skin_triangles
+    )];
+    if report.frames.count > 0 {
+        lines.push(format!(
             "{} frames on {} ({}): {:.1} ms each",
             report.frames.count,
             place(&report.backend),
             report.backend.reason,
             report.frames.ms_mean
-        ),
-    ];
+        ));
+    }
     lines.extend(report.rest.iter().map(|rest| rest.summary()));
     lines.extend(report.tension_summary());
     lines.extend(report.model_summary());

@@ -114,7 +114,7 @@ pub(crate) trait Simulation {
     ///
     /// # Errors
     /// [`Error::Rest`] if there is none, [`Error::Request`] for a model without energies.
-    fn settle(&mut self) -> Result<Rest, Error> {
+    fn settle(&mut self, _error: f64) -> Result<Rest, Error> {
         let why = "this model has no energy that ends in a state of rest";
         Err(Error::Request { what: "run.until = \"rest\"".into(), why: why.into() })
     }

@@ -8,6 +8,7 @@ use base64::Engine;
 use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
 
 use super::report::{MaterialRow, Report, Wound};
+use super::rest_report::RestReport;
 use super::step_report::StepReport;
 use crate::run::files::{self, RunFolder};
 use crate::run::frames::FrameRow;
@@ -40,8 +41,9 @@ pub(crate) fn write(
     figures: &[Figure],
     folder: &RunFolder,
 ) -> Result<(), Error> {
-    let plots: Vec<String> =
-        opening_plot(rows).into_iter().chain(force_plot(rows)).chain(handle_plot(rows)).collect();
+    let over_time = [opening_plot(rows), force_plot(rows), handle_plot(rows)];
+    let search = report.rest.as_ref().and_then(rest_plot);
+    let plots: Vec<String> = over_time.into_iter().chain([search]).flatten().collect();
     let scene = toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string());
     files::write(&folder.html(), page(report, figures, &plots, &scene).as_bytes())
 }
@@ -89,6 +91,24 @@ fn handle_plot(rows: &[FrameRow]) -> Option<String> {
     };
     let curves: Vec<(String, Vec<[f64; 2]>)> = (0..handles).map(curve).collect();
     Some(line_plot("Force of the handles", "force / N", &curves))
+}
+
+/// A plot of the search for the state of rest; none if it made no step.
+fn rest_plot(rest: &RestReport) -> Option<String> {
+    let mut cycles = 0.0;
+    let (mut forces, mut errors) = (Vec::new(), Vec::new());
+    for step in &rest.steps {
+        forces.push([cycles, step.force]);
+        cycles += step.cycles as f64;
+        errors.extend(step.error.map(|error| [cycles, error]));
+    }
+    forces.push([cycles, rest.force]);
+    let curves = [("forces left, of all forces", forces), ("estimated distance from rest", errors)];
+    let series: Vec<Series<'_>> =
+        curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Dots }).collect();
+    let [x, y] = [("multigrid cycles", Scale::Linear), ("share", Scale::Log)];
+    let axis = |(label, scale)| Axis { label, scale };
+    (!rest.steps.is_empty()).then(|| line_chart("Search for the state of rest", axis(x), axis(y), &series))
 }
 
 /// A plot of curves over time.
@@ -139,7 +159,7 @@ fn summary(report: &Report) -> String {
         _ => format!("{}, {} threads", report.machine.cpu, backend.threads),
     };
     let mut text = format!(
-        "<p>{} vertices, {} edges, {} tetrahedra and {} skin triangles; {} frames on <b>{}</b> ({}; {}), {:.1} ms per frame.</p>",
+        "<p>{} vertices, {} edges, {} tetrahedra and {} skin triangles; {} frames on <b>{}</b> ({}; {})",
         s.vertices,
         s.edges,
         s.tets,
@@ -148,8 +168,11 @@ fn summary(report: &Report) -> String {
         escape(&backend.name),
         escape(&backend.reason),
         escape(&machine),
-        report.frames.ms_mean
     );
+    if report.frames.count > 0 {
+        let _ = write!(text, ", {:.1} ms per frame", report.frames.ms_mean);
+    }
+    text.push_str(".</p>");
     if let Some(rest) = &report.rest {
         let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&rest.summary())));
     }

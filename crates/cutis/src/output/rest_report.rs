@@ -25,6 +25,9 @@ pub struct RestStep {
     pub moved_mm: f64,
     /// Multigrid cycles.
     pub cycles: usize,
+    /// Estimate of the distance from the equilibrium after the step, over the displacement to it.
+    /// None before it is known.
+    pub error: Option<f64>,
 }
 
 impl RestReport {
@@ -34,6 +37,7 @@ impl RestReport {
             force: step.force,
             moved_mm: 1e3 * step.moved_m,
             cycles: step.cycles,
+            error: step.error.is_finite().then_some(step.error),
         };
         Self { error: rest.error, force: rest.force, ms: 0.0, steps: rest.steps.iter().map(step).collect() }
     }

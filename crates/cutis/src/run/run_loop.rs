@@ -73,7 +73,7 @@ impl RunLoop<'_> {
         at: &mut Position,
     ) -> Result<RunResult, Error> {
         let lips = Lips::new(self.gapes);
-        let RunSection { frames, until, checkpoint_every: every } = *self.run;
+        let RunSection { frames, until, error, checkpoint_every: every } = *self.run;
         let row = |simulation: &mut dyn Simulation, frame, ms| {
             let time_s = simulation.time_s();
             let sutures = suture_forces(self.sutures, &simulation.thread_forces()?);
@@ -102,7 +102,7 @@ impl RunLoop<'_> {
         let mut rest = None;
         if until == RunEnd::Rest {
             let start = Instant::now();
-            let mut found = RestReport::of(&simulation.settle()?);
+            let mut found = RestReport::of(&simulation.settle(error)?);
             found.ms = start.elapsed().as_secs_f64() * 1e3;
             let row = row(simulation, frames, found.ms)?;
             rest = Some((found, row));

@@ -92,6 +92,7 @@ impl Scene {
         self.validate_materials(&check)?;
         model::validate(self, &check)?;
         self.validate_solver(&check)?;
+        self.validate_run(&check)?;
         self.validate_cuts(&check)?;
         self.validate_handles(&check)
     }
@@ -185,5 +186,10 @@ impl Scene {
         check.require(s.threads <= 1024, "solver.threads", s.threads, why)?;
         check.point("solver.gravity_m_s2", s.gravity_m_s2)?;
         check.not_negative("solver.damping_per_s", s.damping_per_s)
+    }
+
+    fn validate_run(&self, check: &Check<'_>) -> Result<(), Error> {
+        let error = self.run.error;
+        check.require(error > 0.0 && error <= 1.0, "run.error", error, "must be above 0 and at most 1")
     }
 }

@@ -18,9 +18,6 @@ use crate::run::checkpoint::Checkpoint;
 /// Relative error above which a degenerate constraint is reported.
 const COLLAPSED: f64 = 0.01;
 
-/// Largest estimated error of a state of rest, relative to the displacement to it.
-const SETTLED: f64 = 1e-3;
-
 /// Relative force at which a body is at rest in any case. Loads and parameters have single
 /// precision: they leave about 3e-6 in a body that is at rest in the scan.
 const BALANCED: f64 = 1e-5;
@@ -201,7 +198,7 @@ impl Simulation for SolverRun<'_> {
         Ok(forces.map(|(n, force)| if waits(n) { 0.0 } else { force }).collect())
     }
 
-    fn settle(&mut self) -> Result<Rest, Error> {
+    fn settle(&mut self, error: f64) -> Result<Rest, Error> {
         self.cut()?;
         self.grab()?;
         self.tighten()?;
@@ -209,7 +206,7 @@ impl Simulation for SolverRun<'_> {
         let gravity = solver.settings().gravity_m_s2;
         let frame = solver.simulation().clock().frame;
         let body = cutis_rest::Body::of(solver.system()?, gravity)?;
-        let options = cutis_rest::Options { error: SETTLED, force: BALANCED, ..Default::default() };
+        let options = cutis_rest::Options { error, force: BALANCED, ..Default::default() };
         let rest = body.settle(&options, &mut |_| ())?;
         let positions: Vec<Point3<f32>> = rest.positions.iter().map(|x| x.cast()).collect();
         let velocities = vec![Vector3::zeros(); positions.len()];

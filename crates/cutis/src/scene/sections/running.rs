@@ -78,7 +78,7 @@ pub enum RunEnd {
 }
 
 /// How long to run.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSection {
     /// Number of frames.
@@ -86,13 +86,17 @@ pub struct RunSection {
     /// Where the run ends: `frames` after the frames, or `rest` in the state of rest that the body
     /// would reach after them. The state of rest is computed without the motion to it.
     pub until: RunEnd,
+    /// Largest error of the state of rest: its distance from the true one over the displacement, as
+    /// the search for it estimates both. The search also ends where the forces cancel to single
+    /// precision.
+    pub error: f64,
     /// Frames between checkpoints, from which `--resume` continues; 0 writes none.
     pub checkpoint_every: u32,
 }
 
 impl Default for RunSection {
     fn default() -> Self {
-        Self { frames: 60, until: RunEnd::default(), checkpoint_every: 0 }
+        Self { frames: 60, until: RunEnd::default(), error: 1e-3, checkpoint_every: 0 }
     }
 }
 
