@@ -4,7 +4,7 @@
 //! those of PBD and vertex block descent, carry a force by one element per color and iteration. So
 //! their number of iterations grows with the resolution. [`Body::settle`] finds the minimum by
 //! Newton's method. Conjugate gradients solve its equations, with a multigrid cycle as
-//! preconditioner. The number of cycles hardly grows with the resolution.
+//! preconditioner. The number of cycles grows slowly with the resolution.
 //!
 //! The energies are those of a [`System`](cutis_solver::System). All types of constraints count,
 //! through their values and gradients. The result has the same bits for any number of threads.
@@ -17,7 +17,8 @@
 //! - **Preconditioner.** Smoothed aggregation (Vaněk, Mandel and Brezina, Computing 56, 1996): see
 //!   `multigrid.rs`. It is built from `H` alone, so it knows every cut. Matrix and cycles have
 //!   single precision, energies and forces double precision: see `matrix.rs`.
-//! - **Steps.** Each step lowers `U`, but a full one may raise it once: see `advance.rs`. The
+//! - **Steps.** Each step lowers `U`, but a full one may raise it once: see `advance.rs`. Where no
+//!   step lowers it, a shift is added to the diagonal (Levenberg and Marquardt). The
 //!   equations are solved to 20 % far from rest and to 10 % near it.
 #![forbid(unsafe_code)]
 
