@@ -1,5 +1,7 @@
 //! A body as energies: constraints, weights and loads.
 
+use std::sync::Arc;
+
 use cutis_coloring::{Incidence, Tuples};
 use cutis_constraints::Scalar;
 use cutis_solver::{Kind, Stiffness, System, Values};
@@ -35,7 +37,9 @@ pub struct Body {
 /// The constraints of one kind.
 pub(crate) struct Elements {
     pub kind: Kind<f64>,
-    compliance: Values<f64>,
+    compliance: Arc<Values<f64>>,
+    /// The constraints that count, ascending. `None` if all do.
+    all: Option<Vec<u32>>,
     /// Starts of the parts in `constraints`, and the end of the last one.
     starts: Vec<usize>,
     /// The constraints at the free vertices of each part, ascending.
@@ -49,6 +53,23 @@ impl Elements {
     #[inline]
     pub fn stiffness(&self, k: usize) -> f64 {
         1.0 / self.compliance.at(k)
+    }
+
+    /// Number of constraints that count.
+    pub fn count(&self) -> usize {
+        self.all.as_ref().map_or(self.kind.len(), Vec::len)
+    }
+
+    /// One of the constraints that count.
+    #[inline]
+    pub fn nth(&self, n: usize) -> usize {
+        self.all.as_ref().map_or(n, |all| all[n] as usize)
+    }
+
+    /// The same kind with other lists.
+    pub fn with(&self, starts: Vec<usize>, constraints: Vec<u32>, all: Option<Vec<u32>>) -> Self {
+        let Self { kind, compliance, curved, .. } = self;
+        Self { kind: kind.clone(), compliance: compliance.clone(), all, starts, constraints, curved: *curved }
     }
 
     /// The constraints at a part of the free vertices, [`PART`] of them.
@@ -113,6 +134,16 @@ impl Body {
         self.free.iter().map(|&v| state.x[v as usize]).collect()
     }
 
+    /// Places of the free vertices that share a constraint with that at a place, and itself.
+    pub(crate) fn row(&self, place: usize) -> &[u32] {
+        &self.columns[self.starts[place]..self.starts[place + 1]]
+    }
+
+    /// Whether a vertex cannot move.
+    pub(crate) fn is_fixed(&self, vertex: usize) -> bool {
+        self.place[vertex] == FIXED
+    }
+
     /// Number of vertices that can move.
     pub fn free_count(&self) -> usize {
         self.free.len()
@@ -143,7 +174,8 @@ fn elements(
         constraints
     };
     let (starts, constraints) = joined(free.par_chunks(PART).map(of_part).collect());
-    let mut elements = Elements { kind, compliance, starts, constraints, curved: false };
+    let compliance = Arc::new(compliance);
+    let mut elements = Elements { kind, compliance, all: None, starts, constraints, curved: false };
     elements.curved = is_curved(&elements, start);
     Ok(elements)
 }

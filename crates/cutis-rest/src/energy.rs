@@ -14,7 +14,7 @@ pub(crate) const PART: usize = 4096;
 pub(crate) struct State {
     /// Positions of all vertices.
     pub x: Vec<Point3<f64>>,
-    /// For each kind `C` of each constraint.
+    /// For each kind `C` of each constraint that counts.
     values: Vec<Vec<f64>>,
     /// `−∇U` at each free vertex, in N.
     pub forces: Vec<Vector3<f64>>,
@@ -26,6 +26,13 @@ pub(crate) struct State {
     pub floor: f64,
     /// Change of the energy that rounding alone can cause, in J.
     pub noise: f64,
+}
+
+impl State {
+    /// Whether all forces are finite.
+    pub fn is_finite(&self) -> bool {
+        self.norm.is_finite() && self.noise.is_finite()
+    }
 }
 
 /// Memory to evaluate a constraint.
@@ -67,11 +74,11 @@ impl Body {
         let mut noise = 0.0;
         let mut values = Vec::with_capacity(self.kinds.len());
         for elements in &self.kinds {
-            let mut c = vec![0.0; elements.kind.len()];
+            let mut c = vec![0.0; elements.count()];
             let evaluate = |scratch: &mut Scratch, (part, c): (usize, &mut [f64])| -> f64 {
                 let mut noise = 0.0;
                 for (n, c) in c.iter_mut().enumerate() {
-                    let k = part * PART + n;
+                    let k = elements.nth(part * PART + n);
                     *c = scratch.evaluate(elements, k, &x);
                     noise += c.abs() * elements.stiffness(k) * scratch.reach();
                 }
@@ -127,7 +134,7 @@ impl Body {
             let part = |(part, (from, to)): (usize, (&[f64], &[f64]))| -> f64 {
                 let pairs = from.iter().zip(to).enumerate();
                 let change = |(n, (from, to)): (usize, (&f64, &f64))| {
-                    0.5 * (to - from) * (to + from) * elements.stiffness(part * PART + n)
+                    0.5 * (to - from) * (to + from) * elements.stiffness(elements.nth(part * PART + n))
                 };
                 pairs.map(change).sum()
             };

@@ -29,6 +29,8 @@ mod body;
 mod conjugate;
 mod energy;
 mod error;
+mod follow;
+mod local;
 mod matrix;
 mod multigrid;
 mod options;

@@ -85,18 +85,28 @@ impl Body {
         options: &Options,
         progress: &mut dyn FnMut(&Step),
     ) -> Result<Rest, RestError> {
-        let (found, expected) = (positions.len(), self.start.len());
-        if found != expected {
-            return Err(RestError::Length { found, expected });
-        }
+        let from = self.local(positions)?;
         let mut x = self.start.clone();
         for &v in &self.free {
-            x[v as usize] = positions[v as usize] - self.origin;
+            x[v as usize] = from[v as usize];
         }
         self.finish(Search::at(self, x, options)?, progress)
     }
 
-    fn finish(&self, mut search: Search<'_>, progress: &mut dyn FnMut(&Step)) -> Result<Rest, RestError> {
+    /// Positions of all vertices relative to the origin.
+    pub(crate) fn local(&self, positions: &[Point3<f64>]) -> Result<Vec<Point3<f64>>, RestError> {
+        let (found, expected) = (positions.len(), self.start.len());
+        if found != expected {
+            return Err(RestError::Length { found, expected });
+        }
+        Ok(positions.iter().map(|position| position - self.origin).collect())
+    }
+
+    pub(crate) fn finish(
+        &self,
+        mut search: Search<'_>,
+        progress: &mut dyn FnMut(&Step),
+    ) -> Result<Rest, RestError> {
         while !search.is_at_rest() {
             progress(search.step()?);
         }
@@ -113,7 +123,7 @@ impl<'a> Search<'a> {
         Self::at(body, body.start.clone(), options)
     }
 
-    fn at(body: &'a Body, x: Vec<Point3<f64>>, options: &Options) -> Result<Self, RestError> {
+    pub(crate) fn at(body: &'a Body, x: Vec<Point3<f64>>, options: &Options) -> Result<Self, RestError> {
         for (what, value) in [("error", options.error), ("force", options.force)] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(RestError::Value { what, value, expected: "a number from 0 to 1" });
@@ -146,6 +156,13 @@ impl<'a> Search<'a> {
             search.error = 0.0;
         }
         Ok(search)
+    }
+
+    /// Goes on from a placement whose fixed vertices are elsewhere.
+    pub(crate) fn begin_at(&mut self, state: State) {
+        self.scale = state.scale;
+        self.state = state;
+        self.error = if self.is_balanced() { 0.0 } else { f64::INFINITY };
     }
 
     /// Whether the estimated error is small enough, or no force is left.
@@ -222,10 +239,26 @@ impl<'a> Search<'a> {
         };
         self.scale = self.scale.max(state.scale);
         self.energy_change_j += change;
+        let state = self.relax(state, &solution.x, length, rises);
         let before = std::mem::replace(&mut self.state, state);
         self.pending = rises.then_some(Pending { state: before, direction: solution.x, slope, change });
         self.steps.push(step);
         Ok(&self.steps[self.steps.len() - 1])
+    }
+
+    /// Brings the vertices to rest that moved much farther than the others in a step.
+    fn relax(&mut self, state: State, step: &[Vector3<f64>], length: f64, rises: bool) -> State {
+        if rises || length < 1.0 {
+            return state;
+        }
+        let Some(x) = self.body.relaxed(&state.x, step) else { return state };
+        let relaxed = self.body.at(x);
+        let change = self.body.difference(&state, &relaxed);
+        if !(change < 0.0 && relaxed.is_finite()) {
+            return state;
+        }
+        self.energy_change_j += change;
+        relaxed
     }
 
     /// Solves for a step, and searches along it.
@@ -235,7 +268,9 @@ impl<'a> Search<'a> {
             let exact = self.near;
             let fresh = self.levels.is_none();
             let curvature = if exact { Curvature::All } else { Curvature::Stretched };
-            let mut solution = self.solve(curvature);
+            let forces = std::mem::take(&mut self.state.forces);
+            let mut solution = self.solve(&forces, curvature);
+            self.state.forces = forces;
             wasted += solution.cycles;
             if !(exact && solution.indefinite) {
                 if let Some(moved) = self.advance(&solution.x) {
@@ -267,9 +302,9 @@ impl<'a> Search<'a> {
         (10.0 * self.shift).max(FIRST_SHIFT)
     }
 
-    /// Solves the equations of a step with the second derivatives of some constraints. Builds the
-    /// levels if there are none.
-    fn solve(&mut self, curvature: Curvature) -> Solution {
+    /// Solves the equations of a step under these forces, with the second derivatives of some
+    /// constraints. Builds the levels if there are none.
+    pub(crate) fn solve(&mut self, forces: &[Vector3<f64>], curvature: Curvature) -> Solution {
         let tolerance = TOLERANCES[usize::from(curvature == Curvature::All)];
         let (body, x) = (self.body, &self.state.x);
         let matrix = &mut self.matrix;
@@ -292,8 +327,7 @@ impl<'a> Search<'a> {
         };
         self.complexity = levels.multigrid.complexity(matrix);
         let most = self.options.most_cycles;
-        let mut solution =
-            conjugate::solve(matrix, &mut levels.multigrid, &self.state.forces, tolerance, most);
+        let mut solution = conjugate::solve(matrix, &mut levels.multigrid, forces, tolerance, most);
         // Where nothing resists, the equations have no finite solution.
         let longest = solution.x.iter().map(Vector3::norm).fold(0.0, f64::max);
         if longest > self.reach && longest.is_finite() {
@@ -340,7 +374,7 @@ struct Trial {
 }
 
 /// Diagonal of the box around some places.
-fn diagonal(places: &[Point3<f64>]) -> f64 {
+pub(crate) fn diagonal(places: &[Point3<f64>]) -> f64 {
     let first = places.first().copied().unwrap_or_default();
     let (low, high) =
         places.iter().fold((first, first), |(low, high), place| (low.inf(place), high.sup(place)));

@@ -2,7 +2,8 @@
 
 use cutis_newton::{Problem, relative_rms};
 use cutis_rest::{Body, Options, Rest};
-use nalgebra::Point3;
+use cutis_solver::{Settings, Solver, SolverReference};
+use nalgebra::{Point3, Vector3};
 
 use crate::blocks::{EDGE, GRAVITY_M_S2, Make};
 
@@ -99,6 +100,34 @@ fn a_body_at_rest_does_not_move() {
     let system = Make::default().system();
     let rest = Body::of(&system, [0.0; 3]).unwrap().settle(&Options::default(), &mut |_| ()).unwrap();
     assert_eq!((rest.positions, rest.steps.len(), rest.error), (system.positions(), 0, 0.0));
+}
+
+/// The top of a block moves by half of the edge at once. The block follows, and rests where it also
+/// rests after twenty small moves. Control: the search that only the top has left takes more steps.
+#[test]
+fn a_body_follows_vertices_that_are_moved_far() {
+    let system = Make { size: 7, ..Make::default() }.system();
+    let at_rest = Body::of(&system, [0.0; 3]).unwrap().settle(&EXACT, &mut |_| ()).unwrap().positions;
+    let moved = |share: f64| {
+        let mut solver = SolverReference::new(system.clone(), Settings::default()).unwrap();
+        let top = |x: &Point3<f64>| x.z > EDGE - 1e-3;
+        let by = Vector3::new(0.4 * EDGE, 0.0, 0.3 * EDGE) * share;
+        let place = |x: &Point3<f64>| if top(x) { x + by } else { *x };
+        let positions: Vec<Point3<f64>> = system.positions().iter().map(place).collect();
+        solver.restore(&positions, &vec![Vector3::zeros(); positions.len()], 0).unwrap();
+        solver.system().unwrap().clone()
+    };
+    let body = |share| Body::of(&moved(share), [0.0; 3]).unwrap();
+    let followed = body(1.0).settle_after(&at_rest, &EXACT, &mut |_| ()).unwrap();
+    let mut slowly = at_rest.clone();
+    for n in 1..=20 {
+        slowly = body(f64::from(n) / 20.0).settle_after(&slowly, &EXACT, &mut |_| ()).unwrap().positions;
+    }
+    let error = relative_rms(&followed.positions, &slowly, &at_rest);
+    assert!(error < 1e-6, "{error}");
+    let torn = body(1.0).settle_from(&at_rest, &EXACT, &mut |_| ());
+    let steps = torn.map(|rest| rest.steps.len()).unwrap_or(usize::MAX);
+    assert!(followed.steps.len() < steps, "{} and {steps} steps", followed.steps.len());
 }
 
 /// A body far from its rest shape, turned inside out in a part, comes to rest or says that it did

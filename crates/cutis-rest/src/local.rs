@@ -1,0 +1,168 @@
+//! Local relaxation between the steps of a search.
+//!
+//! A lip that folds or slides moves far in steps that do not shrink, while the rest of the body
+//! waits: each of these steps costs as much as one of the whole body. So vertices that moved much
+//! farther than the others come to rest by themselves, with all others held (nonlinear elimination:
+//! Lanzkron, Rose and Wilkes, SIAM J. Sci. Comput. 17, 1996). This lowers the energy of the body.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::body::{Elements, FIXED};
+use crate::energy::PART;
+use crate::{Body, Options, Search};
+
+/// A vertex moved far if it moved by this many times the root of the mean square.
+const FAR: f64 = 10.0;
+/// Rings of neighbors that come along.
+const RINGS: usize = 3;
+/// Largest share of the vertices.
+const MOST: f64 = 0.05;
+/// When the vertices are at rest.
+const OPTIONS: Options = Options { error: 0.1, force: 1e-6, most_steps: 40, most_cycles: 100 };
+
+impl Body {
+    /// Brings the vertices to rest that moved much farther than the others in a step, from
+    /// positions `x` of all vertices. Returns the new positions. `None` if there are none, too
+    /// many, or none that come to rest.
+    pub(crate) fn relaxed(&self, x: &[Point3<f64>], step: &[Vector3<f64>]) -> Option<Vec<Point3<f64>>> {
+        let chosen = self.far(step);
+        if chosen.is_empty() || chosen.len() as f64 > MOST * self.free.len() as f64 {
+            return None;
+        }
+        let part = self.part(&chosen, x);
+        let mut search = Search::new(&part, &OPTIONS).ok()?;
+        while !search.is_at_rest() && search.step().is_ok() {}
+        Some(search.state.x)
+    }
+
+    /// Places of the vertices that moved far, and of their neighbors, ascending.
+    fn far(&self, step: &[Vector3<f64>]) -> Vec<u32> {
+        let mean = step.iter().map(Vector3::norm_squared).sum::<f64>() / step.len() as f64;
+        let far = |place: &u32| step[*place as usize].norm_squared() > FAR * FAR * mean;
+        let mut chosen: Vec<u32> = (0..step.len() as u32).filter(far).collect();
+        for _ in 0..RINGS {
+            let rings = chosen.iter().flat_map(|&place| self.row(place as usize));
+            let mut next: Vec<u32> = rings.copied().collect();
+            next.sort_unstable();
+            next.dedup();
+            chosen = next;
+        }
+        chosen
+    }
+
+    /// The part of a body in which only the vertices at some places can move.
+    fn part(&self, chosen: &[u32], x: &[Point3<f64>]) -> Self {
+        let free: Vec<u32> = chosen.iter().map(|&place| self.free[place as usize]).collect();
+        let mut place = vec![FIXED; self.place.len()];
+        for (n, &v) in free.iter().enumerate() {
+            place[v as usize] = n as u32;
+        }
+        let kinds = self.kinds.iter().map(|elements| elements.of_vertices(chosen, &free, &place)).collect();
+        let (mut starts, mut columns) = (vec![0], Vec::new());
+        for &row in chosen {
+            let inside = self.row(row as usize).iter().map(|&n| place[self.free[n as usize] as usize]);
+            columns.extend(inside.filter(|&column| column != FIXED));
+            starts.push(columns.len());
+        }
+        let weights = chosen.iter().map(|&place| self.weights[place as usize]).collect();
+        Self { kinds, free, place, starts, columns, weights, origin: self.origin, start: x.to_vec() }
+    }
+}
+
+impl Elements {
+    /// The constraints at some vertices, which are at places `chosen` of the whole body and at
+    /// `place` of the part.
+    fn of_vertices(&self, chosen: &[u32], free: &[u32], place: &[u32]) -> Self {
+        let mut parts: Vec<usize> = chosen.iter().map(|&place| place as usize / PART).collect();
+        parts.dedup();
+        let inside = |&k: &u32| self.vertices(k as usize).iter().any(|&v| place[v as usize] != FIXED);
+        let mut all: Vec<u32> =
+            parts.iter().flat_map(|&part| self.of_part(part)).copied().filter(inside).collect();
+        all.sort_unstable();
+        all.dedup();
+        let (mut starts, mut constraints) = (vec![0], Vec::new());
+        for first in (0..free.len()).step_by(PART) {
+            let own = first as u32..(first + PART) as u32;
+            let touches =
+                |&k: &u32| self.vertices(k as usize).iter().any(|&v| own.contains(&place[v as usize]));
+            constraints.extend(all.iter().copied().filter(touches));
+            starts.push(constraints.len());
+        }
+        self.with(starts, constraints, Some(all))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cutis_constraints::{Distance, DistanceMaterial};
+    use cutis_solver::{Stiffness, System, SystemBuilder};
+    use cutis_test_kit::Kuhn;
+
+    use super::*;
+
+    /// A block of springs whose bottom is held.
+    fn block() -> System<f64> {
+        let Kuhn { positions, tets, .. } = Kuhn::new([10, 10, 60], 0.01);
+        let mut edges: Vec<[u32; 2]> = tets
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]])
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let inverse_mass = |x: &Point3<f64>| if x.z < 0.005 { 0.0 } else { 1e3 };
+        let inverse_masses: Vec<f64> = positions.iter().map(inverse_mass).collect();
+        let colors = cutis_coloring::greedy(&edges, positions.len()).unwrap();
+        SystemBuilder::<f64>::new(&positions, &inverse_masses)
+            .unwrap()
+            .add_from_rest::<Distance, 2>(
+                &edges,
+                &DistanceMaterial::default(),
+                Stiffness::compliance(1e-2),
+                &colors,
+            )
+            .unwrap()
+            .build()
+    }
+
+    /// One vertex is far from its place. It returns with its neighbors, and the others stay.
+    #[test]
+    fn only_the_vertices_that_moved_far_come_to_rest() {
+        let body = Body::of(&block(), [0.0; 3]).unwrap();
+        let center = body.free.len() / 2;
+        let mut step = vec![Vector3::zeros(); body.free.len()];
+        step[center] = Vector3::new(0.0, 0.003, 0.0);
+        let mut x = body.start.clone();
+        x[body.free[center] as usize] += step[center];
+        let chosen = body.far(&step);
+        assert!(chosen.len() > 20 && chosen.binary_search(&(center as u32)).is_ok(), "{}", chosen.len());
+        let part = body.part(&chosen, &x);
+        let (whole, own) = (body.at(x.clone()), part.at(x.clone()));
+        for (&place, force) in chosen.iter().zip(&own.forces) {
+            assert!((whole.forces[place as usize] - force).norm() <= 1e-12 * whole.norm, "{place}");
+        }
+        // The part knows the change of the energy that its vertices cause.
+        let back = |&v: &u32| body.start[v as usize] - x[v as usize];
+        let moves: Vec<Vector3<f64>> = part.free.iter().map(back).collect();
+        let [of_part, of_whole] = [
+            part.difference(&own, &part.moved(&own, &moves, 1.0)),
+            body.difference(&whole, &body.at(body.start.clone())),
+        ];
+        assert!((of_part / of_whole - 1.0).abs() < 1e-9 && of_part < 0.0, "{of_part} and {of_whole} J");
+        let found = body.relaxed(&x, &step).unwrap();
+        let farthest = |from: &[Point3<f64>]| {
+            from.iter().zip(&body.start).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+        };
+        assert!(farthest(&found) < 0.2 * farthest(&x), "{:e} m", farthest(&found));
+        let moved = |v: &usize| found[*v] != x[*v];
+        assert!((0..x.len()).filter(moved).all(|v| part.place[v] != FIXED));
+    }
+
+    /// Nothing is relaxed if all vertices move alike.
+    #[test]
+    fn an_even_step_has_no_far_vertices() {
+        let body = Body::of(&block(), [0.0; 3]).unwrap();
+        assert!(body.far(&vec![Vector3::new(1.0, 0.0, 0.0); body.free.len()]).is_empty());
+        assert!(body.far(&vec![Vector3::zeros(); body.free.len()]).is_empty());
+    }
+}
