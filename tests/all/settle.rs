@@ -139,6 +139,36 @@ fn a_sutured_wound_settles_closed() {
     assert!((force / expected - 1.0).abs() < 0.02, "{force} and {expected} N");
 }
 
+/// A wound is cut, a hook pulls on its lip, and sutures close it. The body settles after each of
+/// them. Each state is that in which frames with the same steps come to rest. The steps are far
+/// apart, so that the hook grabs tissue that is at rest in the frames too.
+#[test]
+fn what_is_done_later_settles_one_after_the_other() {
+    let hook = "[{ at_mm = [46, 92, 0], radius_mm = 14, move_mm = [20, 8, 0], at_s = 1.5, over_s = 0.2 }]";
+    let sew = "[{ wound = 0, every_mm = 10, bite_mm = 10, at_s = 2.0, tighten_s = 0.3 }]";
+    let report = |set: &[(&str, &str)]| {
+        let cut = CUT.replace("depth_mm", "at_s = 0.1, depth_mm");
+        let own = [("incision", &*cut), ("solver.substeps", "2"), ("solver.iterations", "8")];
+        Run::of(&small(&[&own[..], &[("handle", hook)], set].concat())).report
+    };
+    let settled = report(&[REST, ("suture", sew)]);
+    let done: Vec<String> = settled.stops.iter().map(|stop| stop.done.concat()).collect();
+    assert_eq!(done, ["", "incision[0]", "handle[0]", "suture[0]"]);
+    assert_eq!(settled.stops[0].steps, 0, "the scan is at rest");
+    let [_, cut_mm, pulled_mm, closed_mm] = [0, 1, 2, 3].map(|n| settled.stops[n].mid_mm[0]);
+    assert!((pulled_mm - cut_mm).abs() > 0.1 * cut_mm, "the hook does nothing: {pulled_mm} mm");
+    assert!((closed_mm - pulled_mm).abs() > 0.1 * cut_mm, "the sutures do nothing: {closed_mm} mm");
+    let long = ("run", "{ frames = 140, until = 'rest' }");
+    let [pulled, closed] = [report(&[long]), report(&[long, ("suture", sew)])];
+    for (found_mm, expected) in [(pulled_mm, &pulled), (closed_mm, &closed)] {
+        let expected_mm = expected.wound.as_ref().unwrap().mid_mm;
+        assert!((found_mm - expected_mm).abs() < 0.01 * cut_mm, "{found_mm} and {expected_mm} mm");
+    }
+    let [force, expected] = [settled.stops[2].handles_n[0], pulled.handles[0].force_n];
+    assert!((force / expected - 1.0).abs() < 0.01, "{force} and {expected} N");
+    assert_eq!(settled.rest.unwrap().ms, settled.stops[3].ms);
+}
+
 #[test]
 fn models_without_energies_are_refused() {
     for (name, set) in

@@ -33,8 +33,6 @@ pub struct Search<'a> {
     /// Positions of all vertices at the start, relative to the origin, in m.
     start: Vec<Point3<f64>>,
     pub(crate) state: State,
-    /// Largest scale of the forces so far, in N.
-    scale: f64,
     /// Estimate of the distance from rest, relative to the displacement from the start.
     error: f64,
     pub(crate) steps: Vec<Step>,
@@ -137,7 +135,6 @@ impl<'a> Search<'a> {
             body,
             options: *options,
             start: x,
-            scale: state.scale,
             state,
             error: f64::INFINITY,
             steps: Vec::new(),
@@ -160,7 +157,6 @@ impl<'a> Search<'a> {
 
     /// Goes on from a placement whose fixed vertices are elsewhere.
     pub(crate) fn begin_at(&mut self, state: State) {
-        self.scale = state.scale;
         self.state = state;
         self.error = if self.is_balanced() { 0.0 } else { f64::INFINITY };
     }
@@ -172,12 +168,12 @@ impl<'a> Search<'a> {
 
     /// Whether the forces cancel as far as wanted, or to rounding.
     fn is_balanced(&self) -> bool {
-        self.state.norm <= (self.options.force * self.scale).max(self.state.floor)
+        self.state.norm <= (self.options.force * self.state.scale).max(self.state.floor)
     }
 
     /// Relative force, see [`Rest::force`].
     pub fn force(&self) -> f64 {
-        if self.state.norm > 0.0 { self.state.norm / self.scale } else { 0.0 }
+        if self.state.norm > 0.0 { self.state.norm / self.state.scale } else { 0.0 }
     }
 
     /// Estimate of the distance from rest over the displacement from the start. Infinite before it
@@ -237,7 +233,6 @@ impl<'a> Search<'a> {
             length if length < SHORT => self.raised_shift(),
             _ => self.shift,
         };
-        self.scale = self.scale.max(state.scale);
         self.energy_change_j += change;
         let state = self.relax(state, &solution.x, length, rises);
         let before = std::mem::replace(&mut self.state, state);

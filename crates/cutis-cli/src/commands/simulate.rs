@@ -29,19 +29,15 @@ pub(crate) fn settle(scene: &Path, out: Option<PathBuf>, change: &Change, json: 
     finish(&loaded, RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume: false }, json)
 }
 
-/// A scene with keys that the user may change, and without frames unless something happens over
-/// time.
+/// A scene with keys that the user may change, and without frames.
 fn settled(
     keys: &[(&str, &str)],
     change: &Change,
     load: impl Fn(&[Override]) -> Result<LoadedScene, Error>,
 ) -> Result<LoadedScene, Error> {
     let given = |&(key, value): &(&str, &str)| Override { key: key.into(), value: value.into() };
-    let mut overrides: Vec<Override> = keys.iter().map(given).collect();
+    let mut overrides: Vec<Override> = [("run.frames", "0")].iter().chain(keys).map(given).collect();
     overrides.extend(change.overrides(None));
-    if !load(&overrides)?.scene.moves_over_time() {
-        overrides.insert(0, given(&("run.frames", "0")));
-    }
     Ok(change.applied(load(&overrides)?))
 }
 
@@ -83,6 +79,9 @@ fn summary(report: &Report, out: &Path) -> String {
             report.backend.reason,
             report.frames.ms_mean
         ));
+    }
+    if report.stops.len() > 1 {
+        lines.extend(report.stops.iter().map(|stop| stop.summary()));
     }
     lines.extend(report.rest.iter().map(|rest| rest.summary()));
     lines.extend(report.tension_summary());

@@ -43,7 +43,7 @@ pub(super) fn sizes(body: &Body, fixed: usize) -> Sizes {
 
 /// Warnings about handles that are still moving when the last frame ends.
 pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> {
-    let run_s = f64::from(scene.run.frames) * scene.solver.dt_s;
+    let run_s = f64::from(scene.most_frames()) * scene.solver.dt_s;
     let handles = scene.handle.iter().enumerate();
     // The sum of the frames may fall short of the handle's time by rounding.
     let late = move |handle: &HandleSection| handle.at_s + handle.over_s > run_s * (1.0 + 1e-9);
@@ -60,7 +60,7 @@ pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> 
 
 /// Warnings about cuts that have not reached their end when the last frame begins.
 pub(super) fn unfinished_cuts(scene: &Scene, cuts: &GrowingCuts) -> Vec<String> {
-    let last_s = f64::from(scene.run.frames.saturating_sub(1)) * scene.solver.dt_s;
+    let last_s = scene.last_frame_s();
     let incisions = scene.incision.iter().enumerate().filter(|(_, section)| section.width_mm.is_none());
     let incisions = incisions.map(|(n, _)| format!("incision[{n}]"));
     let underminings = (0..scene.undermining.len()).map(|n| format!("undermining[{n}]"));
@@ -77,7 +77,7 @@ pub(super) fn unfinished_cuts(scene: &Scene, cuts: &GrowingCuts) -> Vec<String> 
 
 /// Warnings about sutures that have not been tightened when the last frame begins.
 pub(super) fn unfinished_sutures(scene: &Scene) -> impl Iterator<Item = String> {
-    let last_s = f64::from(scene.run.frames.saturating_sub(1)) * scene.solver.dt_s;
+    let last_s = scene.last_frame_s();
     let sutures = scene.suture.iter().enumerate();
     sutures.filter(move |(_, suture)| suture.at_s + suture.tighten_s > last_s).map(move |(n, suture)| {
         let tight_s = suture.at_s + suture.tighten_s;

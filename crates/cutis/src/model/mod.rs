@@ -10,7 +10,7 @@ pub(crate) mod constraints;
 mod costs;
 mod scene_system;
 
-use cutis_rest::Rest;
+use cutis_rest::{Rest, Step};
 use cutis_solver::StepProfile;
 use nalgebra::Point3;
 
@@ -110,11 +110,13 @@ pub(crate) trait Simulation {
         Ok(Vec::new())
     }
 
-    /// Puts the body into the state of rest that it would reach from its present state.
+    /// Does what is done to the body until the first frame that begins at `time_s` or later, and
+    /// puts it into the state of rest that it then reaches, to an estimated error. The clock goes
+    /// on to that frame, or stays where it is. `progress` receives each step of the search.
     ///
     /// # Errors
     /// [`Error::Rest`] if there is none, [`Error::Request`] for a model without energies.
-    fn settle(&mut self, _error: f64) -> Result<Rest, Error> {
+    fn settle(&mut self, _time_s: f64, _error: f64, _progress: &mut dyn FnMut(&Step)) -> Result<Rest, Error> {
         let why = "this model has no energy that ends in a state of rest";
         Err(Error::Request { what: "run.until = \"rest\"".into(), why: why.into() })
     }

@@ -8,7 +8,7 @@ use base64::Engine;
 use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
 
 use super::report::{MaterialRow, Report, Wound};
-use super::rest_report::RestReport;
+use super::rest_report::{RestReport, StopReport};
 use super::step_report::StepReport;
 use crate::run::files::{self, RunFolder};
 use crate::run::frames::FrameRow;
@@ -194,8 +194,40 @@ fn summary(report: &Report) -> String {
     text
 }
 
+/// A table of states of rest; empty if there are less than two.
+fn states_of_rest(stops: &[StopReport]) -> String {
+    let [first, _, ..] = stops else { return String::new() };
+    let mut out =
+        String::from("<h2>States of rest, one after the other</h2><table><tr><th>time</th><th>after</th>");
+    let names = |out: &mut String, what: &str, unit: &str, count: usize| {
+        for n in 0..count {
+            let number = if count > 1 { format!(" {n}") } else { String::new() };
+            let _ = write!(out, "<th>{what}{number}, {unit}</th>");
+        }
+    };
+    names(&mut out, "opening", "mm", first.mid_mm.len());
+    names(&mut out, "suture", "N", first.sutures_n.len());
+    names(&mut out, "handle", "N", first.handles_n.len());
+    out.push_str("<th>error</th><th>cycles</th></tr>");
+    for stop in stops {
+        let _ = write!(out, "<tr><td>{} s</td><td>{}</td>", stop.time_s, escape(&stop.done.join(", ")));
+        for value in [&stop.mid_mm, &stop.sutures_n, &stop.handles_n].into_iter().flatten() {
+            let _ = write!(out, "<td class=\"n\">{value:.2}</td>");
+        }
+        let _ = write!(
+            out,
+            "<td class=\"n\">{:.2} %</td><td class=\"n\">{}</td></tr>",
+            100.0 * stop.error,
+            stop.cycles
+        );
+    }
+    out.push_str("</table>");
+    out
+}
+
 fn tables(report: &Report) -> String {
     let mut out = timeline(&report.steps);
+    out.push_str(&states_of_rest(&report.stops));
     out.push_str("<h2>Time and memory per stage</h2><table>");
     for stage in &report.stages {
         let _ = write!(

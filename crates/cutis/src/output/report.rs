@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::ScanTension;
 use crate::model::constraints::kinds::report_name;
-use crate::output::rest_report::RestReport;
+use crate::output::rest_report::{RestReport, StopReport};
 use crate::output::step_report::{HandleReport, StepReport};
 use crate::output::suture_report::SutureReport;
 use crate::run::files;
@@ -67,6 +67,10 @@ pub struct Report {
     /// are those in it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rest: Option<RestReport>,
+    /// The states of rest one after the other: after the frames, and after each thing that is done
+    /// to the body later. The last one is `rest`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stops: Vec<StopReport>,
     /// What is done to the body, in the order of time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<StepReport>,

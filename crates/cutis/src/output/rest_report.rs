@@ -30,26 +30,87 @@ pub struct RestStep {
     pub error: Option<f64>,
 }
 
+/// A state of rest between the things that are done to the body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StopReport {
+    /// Time in the scene, s.
+    pub time_s: f64,
+    /// What was done since the state before, as `steps` names it. Empty in the first state.
+    pub done: Vec<String>,
+    /// Mean opening of each wound, mm.
+    pub mean_mm: Vec<f64>,
+    /// Opening of each wound in its middle, mm.
+    pub mid_mm: Vec<f64>,
+    /// Sum of the forces in the threads of each suture, N.
+    pub sutures_n: Vec<f64>,
+    /// Size of the force of each handle, N.
+    pub handles_n: Vec<f64>,
+    /// Estimate of the distance from the equilibrium over the displacement to it from the state
+    /// before.
+    pub error: f64,
+    /// Newton steps.
+    pub steps: usize,
+    /// Multigrid cycles.
+    pub cycles: usize,
+    /// Wall time, ms.
+    pub ms: f64,
+}
+
+impl StopReport {
+    /// One line for people.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let done =
+            if self.done.is_empty() { "before".into() } else { format!("after {}", self.done.join(", ")) };
+        let list = |values: &[f64], unit: &str| {
+            let values: Vec<String> = values.iter().map(|value| format!("{value:.2} {unit}")).collect();
+            values.join(", ")
+        };
+        let parts = [
+            ("openings", list(&self.mid_mm, "mm")),
+            ("sutures", list(&self.sutures_n, "N")),
+            ("handles", list(&self.handles_n, "N")),
+        ];
+        let parts: Vec<String> = parts
+            .iter()
+            .filter(|(_, values)| !values.is_empty())
+            .map(|(name, values)| format!("{name} {values}"))
+            .collect();
+        format!(
+            "{} s, {done}: {} (error {:.2} %, {:.1} s)",
+            self.time_s,
+            parts.join("; "),
+            100.0 * self.error,
+            1e-3 * self.ms
+        )
+    }
+}
+
 impl RestReport {
-    /// The report of a search whose time is not known yet.
-    pub(crate) fn of(rest: &cutis_rest::Rest) -> Self {
+    /// The report of a search that took `ms`.
+    pub(crate) fn of(rest: &cutis_rest::Rest, ms: f64) -> Self {
         let step = |step: &cutis_rest::Step| RestStep {
             force: step.force,
             moved_mm: 1e3 * step.moved_m,
             cycles: step.cycles,
             error: step.error.is_finite().then_some(step.error),
         };
-        Self { error: rest.error, force: rest.force, ms: 0.0, steps: rest.steps.iter().map(step).collect() }
+        Self { error: rest.error, force: rest.force, ms, steps: rest.steps.iter().map(step).collect() }
+    }
+
+    /// Multigrid cycles of all steps.
+    pub(crate) fn cycles(&self) -> usize {
+        self.steps.iter().map(|step| step.cycles).sum()
     }
 
     /// One line for people.
     #[must_use]
     pub fn summary(&self) -> String {
-        let cycles: usize = self.steps.iter().map(|step| step.cycles).sum();
         format!(
-            "at rest, with an estimated error of {:.2} % of the displacement: {} steps, {cycles} multigrid cycles, {:.1} s",
+            "at rest, with an estimated error of {:.2} % of the displacement: {} steps, {} multigrid cycles, {:.1} s",
             100.0 * self.error,
             self.steps.len(),
+            self.cycles(),
             1e-3 * self.ms
         )
     }

@@ -13,6 +13,7 @@ mod peak_memory;
 pub(crate) mod prepare;
 mod run_loop;
 mod simulate;
+mod stops;
 mod summary;
 mod timing;
 

@@ -4,10 +4,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use cutis_mesh::{Gape, WoundGape};
+use cutis_rest::Step;
 use cutis_solver::SolverError;
 
+use super::clock::Clock;
 use super::files::RunFolder;
 use super::frames::FrameRow;
+use super::stops::{SEARCH, SearchBar, Settled, Stop};
 use super::timing::{PartTimes, Timing};
 use crate::backend::{DeviceMeter, DevicePositions};
 use crate::model::{Simulation, SimulationEnd};
@@ -23,6 +26,8 @@ pub(super) struct RunLoop<'a> {
     pub(super) gapes: &'a [Gape],
     /// Number of sutures whose forces are known.
     pub(super) sutures: usize,
+    /// When something that is done to the body ends, in the order of time.
+    pub(super) stops: Vec<Stop>,
     /// Frame of the checkpoint from which the run resumes.
     pub(super) resumed: Option<u32>,
     pub(super) timing: Timing,
@@ -36,8 +41,8 @@ pub(super) struct RunResult {
     /// The state before the first frame, then one row per frame.
     pub(super) rows: Vec<FrameRow>,
     pub(super) end: SimulationEnd,
-    /// The body at rest after the frames, if the run ends there.
-    pub(super) rest: Option<(RestReport, FrameRow)>,
+    /// The states of rest after the frames, if the run ends there.
+    pub(super) settled: Option<Settled>,
     /// The final positions on the GPU, if the simulation ran there and an output needs them.
     pub(super) on_device: Option<DevicePositions>,
     pub(super) times: PartTimes,
@@ -54,34 +59,93 @@ impl RunLoop<'_> {
         u64::from(self.run.frames.saturating_sub(self.done()))
     }
 
-    /// Runs the frames. It reads the lips of the wounds after each frame, and the whole state at a
-    /// checkpoint and at the end.
+    /// Runs the frames on `place`, which is `cpu` or `gpu`, and then finds the states of rest. It
+    /// reads the lips of the wounds after each frame, and the whole state at a checkpoint and at
+    /// the end.
     pub(super) fn run(
         &self,
         simulation: &mut dyn Simulation,
-        progress: &dyn Progress,
+        place: &'static str,
+        clock: &mut Clock<'_>,
     ) -> Result<RunResult, Error> {
         let saved = self.resumed.map(|frame| (frame, self.folder.checkpoint()));
         let mut at = Position { frame: self.done(), saved };
-        self.frames(simulation, progress, &mut at).map_err(|error| at.name(error))
+        let lips = Lips::new(self.gapes);
+        let mut times = PartTimes::new(self.timing);
+        let mut rows = vec![self.row(simulation, &lips, self.done(), 0.0)?];
+        let until = self.run.until;
+        if until == RunEnd::Frames || self.count() > 0 {
+            let frames = |progress: &dyn Progress| {
+                let later = self.frames(simulation, &lips, &mut times, progress, &mut at);
+                later.map_err(|error| at.name(error))
+            };
+            rows.extend(clock.stage_on(place, "simulate", self.count(), frames)?);
+        }
+        let mut settled = None;
+        if until == RunEnd::Rest {
+            settled = Some(self.settle(simulation, &lips, clock)?);
+        }
+        let end = simulation.end()?;
+        let on_device = if self.resamples { simulation.positions_on_device() } else { None };
+        if rows.len() > 1 {
+            self.time_extra_frame(simulation, &mut times);
+        }
+        Ok(RunResult { rows, settled, end, on_device, times })
+    }
+
+    /// Finds the state of rest after each thing that is still to be done to the body.
+    fn settle(
+        &self,
+        simulation: &mut dyn Simulation,
+        lips: &Lips<'_>,
+        clock: &mut Clock<'_>,
+    ) -> Result<Settled, Error> {
+        let now_s = simulation.time_s();
+        let stops: Vec<&Stop> = self.stops.iter().filter(|stop| stop.time_s > now_s).collect();
+        let times_s: Vec<f64> = [now_s].into_iter().chain(stops.iter().map(|stop| stop.time_s)).collect();
+        let total = SEARCH * times_s.len() as u64;
+        clock.stage("search for the state of rest", total, |progress| {
+            let mut settled = Settled::default();
+            for (n, &time_s) in times_s.iter().enumerate() {
+                let start = Instant::now();
+                let mut bar = SearchBar::new(self.run.error);
+                let before = SEARCH * n as u64;
+                let mut advance = |step: &Step| progress.advance(before + bar.after(step));
+                let rest = simulation.settle(time_s, self.run.error, &mut advance)?;
+                let ms = start.elapsed().as_secs_f64() * 1e3;
+                let row = self.row(simulation, lips, self.run.frames, ms)?;
+                let done = n.checked_sub(1).map(|n| stops[n].done.clone()).unwrap_or_default();
+                settled.add(RestReport::of(&rest, ms), row, done);
+                progress.advance(before + SEARCH);
+            }
+            Ok(settled)
+        })
+    }
+
+    /// The state of the wounds, sutures and handles.
+    fn row(
+        &self,
+        simulation: &mut dyn Simulation,
+        lips: &Lips<'_>,
+        frame: u32,
+        ms: f64,
+    ) -> Result<FrameRow, Error> {
+        let time_s = simulation.time_s();
+        let sutures = suture_forces(self.sutures, &simulation.thread_forces()?);
+        let handles = simulation.handle_forces()?;
+        Ok(FrameRow { frame, time_s, ms, gapes: lips.measure(simulation)?, sutures, handles })
     }
 
     fn frames(
         &self,
         simulation: &mut dyn Simulation,
+        lips: &Lips<'_>,
+        times: &mut PartTimes,
         progress: &dyn Progress,
         at: &mut Position,
-    ) -> Result<RunResult, Error> {
-        let lips = Lips::new(self.gapes);
-        let RunSection { frames, until, error, checkpoint_every: every } = *self.run;
-        let row = |simulation: &mut dyn Simulation, frame, ms| {
-            let time_s = simulation.time_s();
-            let sutures = suture_forces(self.sutures, &simulation.thread_forces()?);
-            let handles = simulation.handle_forces()?;
-            Ok::<_, Error>(FrameRow { frame, time_s, ms, gapes: lips.measure(simulation)?, sutures, handles })
-        };
-        let mut rows = vec![row(simulation, self.done(), 0.0)?];
-        let mut times = PartTimes::new(self.timing);
+    ) -> Result<Vec<FrameRow>, Error> {
+        let RunSection { frames, checkpoint_every: every, .. } = *self.run;
+        let mut rows = Vec::new();
         for frame in self.done() + 1..=frames {
             at.frame = frame;
             let start = Instant::now();
@@ -92,27 +156,14 @@ impl RunLoop<'_> {
                 simulation.step()?;
             }
             let ms = start.elapsed().as_secs_f64() * 1e3;
-            rows.push(row(simulation, frame, ms)?);
+            rows.push(self.row(simulation, lips, frame, ms)?);
             if every > 0 && (frame % every == 0 || frame == frames) {
                 simulation.save(frame)?.write(&self.folder.checkpoint(), &self.fingerprint)?;
                 at.saved = Some((frame, self.folder.checkpoint()));
             }
             progress.advance(u64::from(frame - self.done()));
         }
-        let mut rest = None;
-        if until == RunEnd::Rest {
-            let start = Instant::now();
-            let mut found = RestReport::of(&simulation.settle(error)?);
-            found.ms = start.elapsed().as_secs_f64() * 1e3;
-            let row = row(simulation, frames, found.ms)?;
-            rest = Some((found, row));
-        }
-        let end = simulation.end()?;
-        let on_device = if self.resamples { simulation.positions_on_device() } else { None };
-        if rows.len() > 1 {
-            self.time_extra_frame(simulation, &mut times);
-        }
-        Ok(RunResult { rows, rest, end, on_device, times })
+        Ok(rows)
     }
 
     /// Times the parts of one more frame, if they are not timed in every frame. The state is no
@@ -144,10 +195,10 @@ struct Position {
 
 impl Position {
     /// Adds frame and checkpoint to the error of a device.
-    fn name(self, error: Error) -> Error {
+    fn name(&self, error: Error) -> Error {
         match error {
             Error::Solver(source @ SolverError::Device { .. }) => {
-                Error::Stopped { frame: self.frame, saved: self.saved, source }
+                Error::Stopped { frame: self.frame, saved: self.saved.clone(), source }
             }
             other => other,
         }

@@ -7,6 +7,7 @@ use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
 use super::files::{self, RunFolder};
 use super::run_loop::{RunLoop, RunResult};
+use super::stops::Stop;
 use super::timing::Timing;
 use crate::backend::{Chosen, DeviceMeter};
 use crate::body::{Body, Membrane};
@@ -63,6 +64,7 @@ pub(super) fn simulate(
         fingerprint,
         gapes: &body.cut.gapes,
         sutures: if scene.solver.formulation == Formulation::Pbd { 0 } else { body.stitches.len() },
+        stops: Stop::all(&plan.steps, scene),
         resumed,
         timing: match (scene.output.report, simulation.parts_are_sequential()) {
             (false, _) => Timing::No,
@@ -72,8 +74,7 @@ pub(super) fn simulate(
         resamples: scene.output.volume || scene.output.pictures,
         device: device.as_ref(),
     };
-    let frames = |progress: &dyn Progress| run_loop.run(&mut *simulation, progress);
-    let result = clock.stage_on(backend.place(), "simulate", run_loop.count(), frames)?;
+    let result = run_loop.run(&mut *simulation, backend.place(), clock)?;
     // This frees the simulation's memory on the GPU for the stages that follow.
     drop(simulation);
     warn(&mut plan, &result.end.warnings, clock.progress);

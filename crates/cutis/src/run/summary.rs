@@ -6,6 +6,7 @@ use super::clock::Clock;
 use super::files;
 use super::frames::{FrameRow, earlier_frames, frame_times, frames_csv};
 use super::simulate::{Setup, Simulated, warn};
+use super::stops::Settled;
 use crate::Error;
 use crate::backend::DeviceMeter;
 use crate::body::Body;
@@ -29,7 +30,8 @@ pub(super) fn report(
     let Setup { loaded, options, folder, source, body } = *setup;
     let Simulated { mut plan, device, resumed, result } = simulated;
     let (rows, end) = (result.rows, result.end);
-    let (settling, settled) = result.rest.unzip();
+    let Settled { stops, last } = result.settled.unwrap_or_default();
+    let (settling, settled) = last.unzip();
     let last = settled.as_ref().or(rows.last());
     let wounds = wounds(body, last);
     let rest = &body.mesh.positions;
@@ -60,6 +62,7 @@ pub(super) fn report(
         stages: clock.stages,
         frames: frame_times(&rows),
         rest: settling,
+        stops,
         wound: wounds.first().cloned(),
         wounds,
         steps: plan.steps,

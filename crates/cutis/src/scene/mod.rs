@@ -117,14 +117,15 @@ impl Scene {
         incisions.chain(self.excision.iter().map(|excision| excision.name.as_deref()))
     }
 
-    /// Whether something happens over time: cuts that grow or come later, sutures, handles.
-    pub fn moves_over_time(&self) -> bool {
-        let later = |at_s: f64, speed_mm_s: Option<f64>| at_s > 0.0 || speed_mm_s.is_some();
-        !self.handle.is_empty()
-            || !self.suture.is_empty()
-            || self.incision.iter().any(|cut| later(cut.at_s, cut.speed_mm_s))
-            || self.undermining.iter().any(|cut| later(cut.at_s, cut.speed_mm_s))
-            || self.excision.iter().any(|cut| later(cut.at_s, None))
+    /// Number of frames in which something may be done to the body. A run that ends at rest goes on
+    /// until all is done.
+    pub(crate) fn most_frames(&self) -> u32 {
+        if self.run.until == RunEnd::Rest { u32::MAX } else { self.run.frames }
+    }
+
+    /// Time in s at which the last one of these frames begins.
+    pub(crate) fn last_frame_s(&self) -> f64 {
+        f64::from(self.most_frames().saturating_sub(1)) * self.solver.dt_s
     }
 
     /// Whether something cuts the body.

@@ -66,10 +66,10 @@ impl Scene {
         check.require(straight, &key, format!("{count} points"), why)
     }
 
-    /// A cut after the last frame would never be made.
+    /// A cut after the last frame would never be made, unless the run ends at rest.
     fn validate_time(&self, check: &Check<'_>, key: &str, at_s: f64) -> Result<(), Error> {
         check.not_negative(key, at_s)?;
-        let last = f64::from(self.run.frames.saturating_sub(1)) * self.solver.dt_s;
+        let last = self.last_frame_s();
         let why = format!("must not lie after the beginning of the last frame, at {last} s (run.frames)");
         check.require(at_s <= last || at_s == 0.0, key, at_s, &why)
     }

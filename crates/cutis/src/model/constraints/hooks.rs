@@ -1,6 +1,6 @@
 //! Handles that grab tissue while the body moves: when they do, and where the tissue is then.
 
-use cutis_solver::{Clock, Handle, Settings};
+use cutis_solver::{Clock, Handle, Settings, System};
 use nalgebra::{Point3, Vector3};
 
 use crate::model::first_frame;
@@ -10,6 +10,16 @@ use crate::scene::HandleSection;
 pub(super) fn handle(section: &HandleSection, grabbed: &[u32], at_s: f64) -> Handle {
     let move_m = (Vector3::from(section.move_mm) / 1000.0).into();
     Handle { vertices: grabbed.to_vec(), move_m, at_s, over_s: section.over_s }
+}
+
+/// Places the vertices of all handles of a system where they are at a time in s.
+pub(super) fn place(system: &System<f32>, time_s: f64, positions: &mut [Point3<f32>]) {
+    for handle in system.handles() {
+        let path = handle.path(time_s) + system.origin().coords;
+        for (&vertex, start) in handle.vertices().iter().zip(handle.start()) {
+            positions[vertex as usize] = start + path;
+        }
+    }
 }
 
 /// The handles of a scene that do not hold tissue from the start, in the order of the scene.

@@ -1,17 +1,17 @@
 //! A simulation by a solver of constraints.
 
-use cutis_rest::Rest;
+use cutis_rest::{Rest, Step};
 use cutis_solver::{Change, Formulation, StepProfile, System};
 use nalgebra::{Point3, Vector3};
 
-use super::hooks::Hooks;
+use super::hooks::{self, Hooks};
 use super::start::StartedSolver;
 use super::threads::Threads;
 use super::wound::GrowingWound;
 use crate::Error;
 use crate::backend::DevicePositions;
 use crate::body::GrowingCuts;
-use crate::model::{ModelInput, Simulation, SimulationEnd};
+use crate::model::{ModelInput, Simulation, SimulationEnd, first_frame};
 use crate::output::report::KindResidual;
 use crate::run::checkpoint::Checkpoint;
 
@@ -82,6 +82,19 @@ impl<'a> SolverRun<'a> {
         }
         let handles = self.hooks.iter_mut().flat_map(|hooks| hooks.grab(frame, &positions)).collect();
         Ok(self.solver.solver().change(&Change { states, handles, ..Change::default() })?)
+    }
+
+    /// Lets the time pass until the first frame that begins at `time_s` or later, while nothing
+    /// moves. Returns the frame.
+    fn wait_until(&mut self, time_s: f64) -> Result<u64, Error> {
+        let solver = self.solver.solver();
+        let now = solver.simulation().clock().frame;
+        let frame = first_frame(time_s, solver.settings().dt_s).max(now);
+        if frame > now {
+            let positions = solver.positions()?;
+            solver.restore(&positions, &vec![Vector3::zeros(); positions.len()], frame)?;
+        }
+        Ok(frame)
     }
 
     /// Pulls the threads as far as they are tightened at the present time.
@@ -198,18 +211,24 @@ impl Simulation for SolverRun<'_> {
         Ok(forces.map(|(n, force)| if waits(n) { 0.0 } else { force }).collect())
     }
 
-    fn settle(&mut self, error: f64) -> Result<Rest, Error> {
+    fn settle(&mut self, time_s: f64, error: f64, progress: &mut dyn FnMut(&Step)) -> Result<Rest, Error> {
+        let frame = self.wait_until(time_s)?;
         self.cut()?;
         self.grab()?;
         self.tighten()?;
         let solver = self.solver.solver();
         let gravity = solver.settings().gravity_m_s2;
-        let frame = solver.simulation().clock().frame;
+        let before = solver.positions()?;
+        let velocities = vec![Vector3::zeros(); before.len()];
+        let mut placed = before.clone();
+        let time_s = solver.time_s();
+        hooks::place(solver.system()?, time_s, &mut placed);
+        solver.restore(&placed, &velocities, frame)?;
         let body = cutis_rest::Body::of(solver.system()?, gravity)?;
         let options = cutis_rest::Options { error, force: BALANCED, ..Default::default() };
-        let rest = body.settle(&options, &mut |_| ())?;
+        let before: Vec<Point3<f64>> = before.iter().map(|x| x.cast()).collect();
+        let rest = body.settle_after(&before, &options, progress)?;
         let positions: Vec<Point3<f32>> = rest.positions.iter().map(|x| x.cast()).collect();
-        let velocities = vec![Vector3::zeros(); positions.len()];
         solver.restore(&positions, &velocities, frame)?;
         Ok(rest)
     }

@@ -73,7 +73,7 @@ pub enum RunEnd {
     /// After the frames.
     #[default]
     Frames,
-    /// In the state of rest after the frames.
+    /// In the state of rest after the frames, and after all that is done to the body later.
     Rest,
 }
 
@@ -84,7 +84,9 @@ pub struct RunSection {
     /// Number of frames.
     pub frames: u32,
     /// Where the run ends: `frames` after the frames, or `rest` in the state of rest that the body
-    /// would reach after them. The state of rest is computed without the motion to it.
+    /// would reach after them. The state of rest is computed without the motion to it. What is to
+    /// be done to the body later than the frames is done one after the other, each from the state
+    /// of rest before it to the next one.
     pub until: RunEnd,
     /// Largest error of the state of rest: its distance from the true one over the displacement, as
     /// the search for it estimates both. The search also ends where the forces cancel to single
