@@ -29,7 +29,7 @@ pub struct Options {
 }
 
 /// Tables of the page.
-pub const TABLES: [&str; 5] = ["provenance", "bodies", "sizes", "frames", "checks"];
+pub const TABLES: [&str; 6] = ["provenance", "bodies", "sizes", "stiffnesses", "frames", "checks"];
 
 /// Measures everything. Returns whether all checks hold.
 ///
@@ -51,15 +51,19 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let sizes = search::sizes(most)?;
     let sizes_table = search::table(&sizes).markdown() + "\n" + &search::growth(&sizes);
     writeln!(out, "{sizes_table}")?;
-    search::check(&bodies, &sizes, &mut checks);
+    let stiffnesses = search::stiffnesses(most)?;
+    let stiffness_table = search::table(&stiffnesses).markdown() + "\n" + &search::spread(&stiffnesses);
+    writeln!(out, "{stiffness_table}")?;
+    search::check(&[&bodies, &sizes, &stiffnesses], &mut checks);
     checks.print(out)?;
     if let Some(path) = &options.json {
-        let figures = json!({"provenance": provenance, "bodies": bodies, "sizes": sizes, "frames": frames});
+        let figures = json!({"provenance": provenance, "bodies": bodies, "sizes": sizes, "stiffnesses": stiffnesses, "frames": frames});
         write_json(path, &figures)?;
     }
     if let Some(mut page) = page.filter(|_| checks.pass()) {
         page.set("bodies", &bodies_table)?;
         page.set("sizes", &sizes_table)?;
+        page.set("stiffnesses", &stiffness_table)?;
         page.set("frames", &frames_table)?;
         page.set("provenance", &provenance.markdown())?;
         page.set("checks", &checks.summary())?;

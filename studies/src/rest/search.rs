@@ -20,6 +20,13 @@ const FINE: f64 = 1e-3;
 /// Lattice spacings of the whole demo without a region, mm.
 const SPACINGS_MM: [f64; 5] = [7.0, 5.0, 4.0, 3.0, 2.4];
 
+/// Tensions of the skin, N/m, and its modulus over its tension.
+const TENSIONS_N_PER_M: [f64; 3] = [5.0, 30.0, 150.0];
+const MODULUS_OVER_TENSION: f64 = 10.0;
+/// Young's modulus of the one tissue, Pa, and its bulk moduli over this.
+const YOUNG_PA: f64 = 5e3;
+const BULK_OVER_YOUNG: [f64; 3] = [1.0, 10.0, 100.0];
+
 /// A search, as far as a table needs it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Found {
@@ -121,6 +128,41 @@ pub fn sizes(most: usize) -> Result<Vec<Found>, Failure> {
     Ok(found)
 }
 
+/// The demo with one tissue, from soft to nearly incompressible, under skin from slack to tight.
+/// Also the usual tissues with bone a thousand times as stiff as fat.
+pub fn stiffnesses(most: usize) -> Result<Vec<Found>, Failure> {
+    let mut found = Vec::new();
+    let region = "lattice.region={ around_mm = 105 }".to_owned();
+    for tension in TENSIONS_N_PER_M {
+        for ratio in BULK_OVER_YOUNG {
+            let modulus = MODULUS_OVER_TENSION * tension;
+            let skin = format!(
+                "constraints.membrane={{ tension_along_n_per_m = {tension:?}, tension_across_n_per_m = {tension:?}, \
+                 modulus_along_n_per_m = {modulus:?}, modulus_across_n_per_m = {modulus:?} }}"
+            );
+            let bulk = ratio * YOUNG_PA;
+            let tissue = format!(
+                "materials=[{{ name = 'tissue', youngs_modulus_pa = {YOUNG_PA:?}, bulk_modulus_pa = {bulk:?} }}]"
+            );
+            let name = format!("skin {tension} N/m, K/E {ratio}");
+            found.extend(one(&name, "demo", &[skin, tissue, region.clone()], most)?);
+        }
+    }
+    let contrast = "materials=[{ name = 'bone', hu = [150, 5000], youngs_modulus_pa = 2e6, bulk_modulus_pa = 1e7 }, \
+                    { name = 'fat', hu = [-2000, -20], youngs_modulus_pa = 2e3, bulk_modulus_pa = 2e4 }, \
+                    { name = 'muscle', youngs_modulus_pa = 1e4, bulk_modulus_pa = 1e5 }]";
+    let free = "fixed.bone_above_hu=4000.0".to_owned();
+    found.extend(one("bone and fat 1000:1, bone free", "demo", &[contrast.to_owned(), free, region], most)?);
+    Ok(found)
+}
+
+/// The most cycles to 1 % over the least.
+pub fn spread(found: &[Found]) -> String {
+    let cycles = found.iter().filter_map(|found| found.at(AT_REST)).map(|step| step.cycles as f64);
+    let (least, most) = cycles.fold((f64::INFINITY, 0.0_f64), |(low, high), n| (low.min(n), high.max(n)));
+    format!("The most cycles to 1 % are {:.2} times the least.\n", most / least)
+}
+
 /// A search until the stated error is small. `None` if the body has too many vertices.
 fn one(name: &str, scene: &str, set: &[String], most: usize) -> Result<Option<Found>, Failure> {
     let system = built(scene, set)?;
@@ -180,8 +222,8 @@ pub fn distance(x: &[Point3<f64>], rest: &[Point3<f64>], start: &[Point3<f64>]) 
 }
 
 /// Checks that the stated errors hold.
-pub fn check(bodies: &[Found], sizes: &[Found], checks: &mut Checks) {
-    for found in bodies.iter().chain(sizes) {
+pub fn check(all: &[&[Found]], checks: &mut Checks) {
+    for found in all.iter().copied().flatten() {
         let (name, error) = (&found.name, found.true_error.unwrap_or(f64::INFINITY));
         let what = format!("{name}: {} from rest where 1 % is stated", percent(error));
         checks.add(what, error <= AT_REST);
