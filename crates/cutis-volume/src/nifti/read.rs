@@ -2,37 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::convert::{Converter, VoxelType};
 use super::header::Header;
 use super::placement;
-use super::source::{Observer, PORTION, Source};
-use crate::{Grid, Volume, VolumeError};
-
-/// A volume read from a file, with facts about the file.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    /// The voxels with their grid and their scaling to HU.
-    pub volume: Volume,
-    /// Statistics of the HU in the file, before any conversion.
-    pub stats: HuStats,
-    /// Voxel type in the file by its NumPy name, such as `int16` or `float32`.
-    pub dtype: &'static str,
-    /// Unusual properties of the file and how they were interpreted.
-    pub warnings: Vec<String>,
-}
-
-/// Statistics of all voxels that are not NaN.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HuStats {
-    /// Lowest value in HU. NaN if every voxel is NaN.
-    pub min: f64,
-    /// Highest value in HU. NaN if every voxel is NaN.
-    pub max: f64,
-    /// Sum of the values in HU.
-    pub sum: f64,
-    /// Number of NaN voxels. They become air (−1024 HU).
-    pub nan_count: u64,
-}
+use crate::voxels::{Layout, Observer, Source, VoxelType, again, decode};
+use crate::{Loaded, VolumeError};
 
 /// Reads a NIfTI-1 or NIfTI-2 file in either byte order, compressed or not, with integer or real
 /// voxels.
@@ -89,7 +62,7 @@ fn read_files(path: &Path, mut observer: Option<&mut Observer<'_>>) -> Result<Lo
     let pair = pair(path)?;
     let header_path = pair.as_ref().map_or(path, |(header, _)| header);
     let mut source = Source::open(header_path, again(&mut observer))?;
-    let header = source.header()?;
+    let header = header(&mut source)?;
     match &pair {
         None if !header.single_file => {
             return Err(wrong_magic(header_path, "n+1 or n+2 (voxels in the same file)"));
@@ -106,16 +79,23 @@ fn read_files(path: &Path, mut observer: Option<&mut Observer<'_>>) -> Result<Lo
     load(source, header_path, &header)
 }
 
-/// Borrows the observer again, for one file.
-fn again<'a>(observer: &'a mut Option<&mut Observer<'_>>) -> Option<&'a mut Observer<'a>> {
-    match observer {
-        Some(observer) => Some(&mut **observer),
-        None => None,
+/// Reads the header at the beginning of a file.
+fn header(source: &mut Source<'_>) -> Result<Header, VolumeError> {
+    let mut bytes = vec![0; 4];
+    let reason = "it is shorter than a header";
+    let short = VolumeError::NotNifti { path: source.path.clone(), reason };
+    if source.fill(&mut bytes)? < 4 {
+        return Err(short);
     }
+    let len = Header::len(&source.path, [bytes[0], bytes[1], bytes[2], bytes[3]])?;
+    bytes.resize(len, 0);
+    if source.fill(&mut bytes[4..])? < len - 4 {
+        return Err(short);
+    }
+    Header::decode(&source.path, &bytes)
 }
 
-fn load(mut source: Source<'_>, header_path: &Path, header: &Header) -> Result<Loaded, VolumeError> {
-    let path = source.path.clone();
+fn load(source: Source<'_>, header_path: &Path, header: &Header) -> Result<Loaded, VolumeError> {
     let mut warnings = Vec::new();
     let dtype = VoxelType::from_code(header.datatype).map_err(|dtype| VolumeError::VoxelType {
         path: header_path.into(),
@@ -125,68 +105,15 @@ fn load(mut source: Source<'_>, header_path: &Path, header: &Header) -> Result<L
     let affine = placement::affine(header_path, header, &mut warnings)?;
     let scaling = scaling(header_path, header, &mut warnings)?;
 
-    let too_large = || VolumeError::TooLarge { path: path.clone(), shape: header.shape };
-    let count = header.shape.iter().try_fold(1u64, |count, &n| count.checked_mul(n)).ok_or_else(too_large)?;
-    let bytes = count.checked_mul(dtype.bytes() as u64).ok_or_else(too_large)?;
-    let voxels = usize::try_from(count).map_err(|_| too_large())?;
-    source.expect(header.voxel_offset, bytes)?;
-    source.skip_to(header.voxel_offset, bytes)?;
-
-    let mut converter = Converter::new(dtype, header.big_endian, scaling);
-    let mut reserved = 0usize;
-    let mut buffer = vec![0; PORTION.min(bytes as usize)];
-    let mut done = 0u64;
-    while done < bytes {
-        let wanted = PORTION.min((bytes - done) as usize);
-        let got = source.fill(&mut buffer[..wanted])?;
-        done += got as u64;
-        if got < wanted {
-            return Err(VolumeError::Truncated { path, expected_bytes: bytes, found_bytes: done });
-        }
-        let received = (done / dtype.bytes() as u64) as usize;
-        if received > reserved {
-            // The size of an uncompressed file is known to suffice. For a compressed file, the
-            // reserved memory grows with the voxels received, so that a header with wrong sizes
-            // cannot make the program allocate too much.
-            let capacity =
-                if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
-            if !converter.reserve(capacity) {
-                return Err(too_large());
-            }
-            reserved = capacity;
-        }
-        converter.push(&buffer[..wanted]);
-    }
-    source.check_tail(&mut warnings)?;
-    source.finish()?;
-
-    let shape = header.shape.map(|n| n as usize);
-    let converted = converter.finish();
-    let stats = converted.stats;
-    if let Some((index, value)) = converted.infinite {
-        let index = Grid { shape, affine }.point(index);
-        return Err(VolumeError::Infinite { path, index, value });
-    }
-    if !converted.fits {
-        return Err(VolumeError::Range { path, min: stats.min, max: stats.max });
-    }
-    if converted.rounding > 0.0 {
-        warnings.push(format!(
-            "{} voxels were rounded to whole HU: the largest change is {:.3e} HU",
-            dtype.name(),
-            converted.rounding
-        ));
-    }
-    if stats.nan_count > 0 {
-        warnings.push(format!("{} voxels are NaN: they become air (-1024 HU)", stats.nan_count));
-    }
-    let volume = Volume::new(
-        Grid { shape, affine },
-        converted.voxels,
-        converted.slope as f32,
-        converted.intercept as f32,
-    )?;
-    Ok(Loaded { volume, stats, dtype: dtype.name(), warnings })
+    let layout = Layout {
+        shape: header.shape,
+        affine,
+        dtype,
+        big_endian: header.big_endian,
+        scaling,
+        offset: header.voxel_offset,
+    };
+    decode(source, &layout, warnings)
 }
 
 /// Paths of the header and image file of a pair, given either of them. `None` for a single file.

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::encode::encode;
-use super::gzip::GzipWriter;
+use crate::voxels::GzipWriter;
 use crate::{Grid, PartialFile, Volume, VolumeError};
 
 /// Number of voxels converted to bytes at a time.

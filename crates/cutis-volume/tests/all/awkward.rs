@@ -6,7 +6,7 @@
 //! for `i16_slope0` it adds the intercept, for `q_s_conflict` it prefers the qform, and `no_form`.
 
 use cutis_test_kit::scans;
-use cutis_volume::{VolumeError, nifti};
+use cutis_volume::{Loaded, VolumeError, nifti};
 
 type Rows = [[f64; 4]; 3];
 
@@ -123,7 +123,7 @@ const ACCEPTED: &[Expected] = &[
 ];
 
 /// Describes the differences between a volume and its expected properties.
-fn problems(found: &nifti::Loaded, expected: &Expected) -> Vec<String> {
+fn problems(found: &Loaded, expected: &Expected) -> Vec<String> {
     let grid = found.volume.grid();
     let stats = found.stats;
     let mut problems = Vec::new();

@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::Write;
 
-use cutis_volume::{VolumeError, nifti};
+use cutis_volume::{Loaded, VolumeError, nifti};
 use flate2::{Compression, write::GzEncoder};
 use proptest::prelude::*;
 
@@ -54,7 +54,7 @@ impl Image {
         self
     }
 
-    fn read(&self) -> Result<nifti::Loaded, VolumeError> {
+    fn read(&self) -> Result<Loaded, VolumeError> {
         read("scan.nii", &self.bytes)
     }
 
@@ -66,7 +66,7 @@ impl Image {
     }
 }
 
-fn read(name: &str, bytes: &[u8]) -> Result<nifti::Loaded, VolumeError> {
+fn read(name: &str, bytes: &[u8]) -> Result<Loaded, VolumeError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, bytes).unwrap();

@@ -1,38 +1,52 @@
-//! Reads the bytes of a NIfTI file, decompresses them, and limits the work to the size given in the
+//! Reads the bytes of a volume file, decompresses them, and limits the work to the size given in the
 //! header.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use flate2::bufread::MultiGzDecoder;
+use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
-use super::header::Header;
 use crate::VolumeError;
 
 /// Number of bytes decoded at a time. It is a multiple of every voxel size.
-pub(super) const PORTION: usize = 1 << 18;
+pub(crate) const PORTION: usize = 1 << 18;
 /// Largest expansion by deflate: a match of 258 bytes takes at least two bits.
 const DEFLATE_LIMIT: u64 = 1032;
 /// Number of bytes read after the last voxel, to reach the gzip checksum.
 const TAIL: u64 = 1 << 16;
 
 /// Receives the raw bytes of a file, in order, with the file's path.
-pub(super) type Observer<'a> = dyn FnMut(&Path, &[u8]) + 'a;
+pub(crate) type Observer<'a> = dyn FnMut(&Path, &[u8]) + 'a;
+
+/// Borrows the observer again, for one file.
+pub(crate) fn again<'a>(observer: &'a mut Option<&mut Observer<'_>>) -> Option<&'a mut Observer<'a>> {
+    match observer {
+        Some(observer) => Some(&mut **observer),
+        None => None,
+    }
+}
+
+/// How the voxels of a file are compressed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Compression {
+    Gzip,
+    Zlib,
+}
 
 /// An open file, decompressed if its first bytes are those of gzip.
-pub(super) struct Source<'a> {
-    pub(super) path: PathBuf,
+pub(crate) struct Source<'a> {
+    pub(crate) path: PathBuf,
     stream: Stream<'a>,
-    pub(super) compressed: bool,
+    pub(crate) compressed: bool,
     /// Bytes on the disk.
-    pub(super) len: u64,
+    pub(crate) len: u64,
     /// Bytes delivered so far.
     at: u64,
 }
 
 impl<'a> Source<'a> {
-    pub(super) fn open(path: &Path, observer: Option<&'a mut Observer<'a>>) -> Result<Self, VolumeError> {
+    pub(crate) fn open(path: &Path, observer: Option<&'a mut Observer<'a>>) -> Result<Self, VolumeError> {
         let failed = |source| VolumeError::Io { path: path.into(), action: "read", source };
         let mut file = File::open(path).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
@@ -48,23 +62,25 @@ impl<'a> Source<'a> {
         Ok(Self { path: path.into(), stream, compressed, len, at: 0 })
     }
 
-    pub(super) fn header(&mut self) -> Result<Header, VolumeError> {
-        let mut bytes = vec![0; 4];
-        let reason = "it is shorter than a header";
-        let short = VolumeError::NotNifti { path: self.path.clone(), reason };
-        if self.fill(&mut bytes)? < 4 {
-            return Err(short);
-        }
-        let len = Header::len(&self.path, [bytes[0], bytes[1], bytes[2], bytes[3]])?;
-        bytes.resize(len, 0);
-        if self.fill(&mut bytes[4..])? < len - 4 {
-            return Err(short);
-        }
-        Header::decode(&self.path, &bytes)
+    /// Decompresses the rest of the file from here on. Positions then count decompressed bytes.
+    pub(crate) fn decompress(mut self, compression: Compression) -> Self {
+        self.stream = match (self.stream, compression) {
+            (Stream::Plain(raw), Compression::Gzip) => Stream::Gzip(Box::new(MultiGzDecoder::new(raw))),
+            (Stream::Plain(raw), Compression::Zlib) => Stream::Zlib(Box::new(ZlibDecoder::new(raw))),
+            (other, _) => other,
+        };
+        self.compressed = true;
+        self.at = 0;
+        self
+    }
+
+    /// Number of bytes delivered so far.
+    pub(crate) fn position(&self) -> u64 {
+        self.at
     }
 
     /// Returns an error if a file of this length cannot hold the voxels.
-    pub(super) fn expect(&self, voxel_offset: u64, bytes: u64) -> Result<(), VolumeError> {
+    pub(crate) fn expect(&self, voxel_offset: u64, bytes: u64) -> Result<(), VolumeError> {
         let most = if self.compressed { self.len.saturating_mul(DEFLATE_LIMIT) } else { self.len };
         match voxel_offset.checked_add(bytes) {
             Some(end) if end <= most => Ok(()),
@@ -76,7 +92,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    pub(super) fn skip_to(&mut self, voxel_offset: u64, bytes: u64) -> Result<(), VolumeError> {
+    pub(crate) fn skip_to(&mut self, voxel_offset: u64, bytes: u64) -> Result<(), VolumeError> {
         let mut skipped = vec![0; PORTION];
         while self.at < voxel_offset {
             let wanted = PORTION.min((voxel_offset - self.at) as usize);
@@ -92,7 +108,7 @@ impl<'a> Source<'a> {
     }
 
     /// Reads until the buffer is full or the file ends. Returns the number of bytes read.
-    pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, VolumeError> {
+    pub(crate) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, VolumeError> {
         let mut filled = 0;
         while filled < buffer.len() {
             match self.stream.read(&mut buffer[filled..]) {
@@ -112,7 +128,7 @@ impl<'a> Source<'a> {
 
     /// Reads a limited number of bytes after the last voxel. The decoder verifies the gzip checksum
     /// if the file ends within them.
-    pub(super) fn check_tail(&mut self, warnings: &mut Vec<String>) -> Result<(), VolumeError> {
+    pub(crate) fn check_tail(&mut self, warnings: &mut Vec<String>) -> Result<(), VolumeError> {
         let mut tail = Vec::new();
         match self.stream.by_ref().take(TAIL).read_to_end(&mut tail) {
             Ok(0) => {}
@@ -124,10 +140,11 @@ impl<'a> Source<'a> {
 
     /// Reads the remaining raw bytes and passes them to the observer. Does nothing without an
     /// observer.
-    pub(super) fn finish(self) -> Result<(), VolumeError> {
+    pub(crate) fn finish(self) -> Result<(), VolumeError> {
         let mut raw = match self.stream {
             Stream::Plain(raw) => raw,
             Stream::Gzip(decoder) => decoder.into_inner(),
+            Stream::Zlib(decoder) => decoder.into_inner(),
         };
         if raw.get_ref().observer.is_some() {
             io::copy(&mut raw, &mut io::sink()).map_err(|source| VolumeError::Io {
@@ -143,6 +160,7 @@ impl<'a> Source<'a> {
 enum Stream<'a> {
     Plain(BufReader<Observed<'a>>),
     Gzip(Box<MultiGzDecoder<BufReader<Observed<'a>>>>),
+    Zlib(Box<ZlibDecoder<BufReader<Observed<'a>>>>),
 }
 
 impl Read for Stream<'_> {
@@ -150,6 +168,7 @@ impl Read for Stream<'_> {
         match self {
             Self::Plain(raw) => raw.read(buffer),
             Self::Gzip(decoder) => decoder.read(buffer),
+            Self::Zlib(decoder) => decoder.read(buffer),
         }
     }
 }

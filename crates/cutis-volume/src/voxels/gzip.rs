@@ -22,20 +22,20 @@ const MEMBER_HEADER: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
 const LAST_BLOCK: [u8; 2] = [3, 0];
 
 /// A writer that compresses its input and writes it to `inner`.
-pub(super) struct GzipWriter<W: Write> {
+pub(crate) struct GzipWriter<W: Write> {
     inner: W,
     pending: Vec<u8>,
     crc: Crc,
 }
 
 impl<W: Write> GzipWriter<W> {
-    pub(super) fn new(mut inner: W) -> io::Result<Self> {
+    pub(crate) fn new(mut inner: W) -> io::Result<Self> {
         inner.write_all(&MEMBER_HEADER)?;
         Ok(Self { inner, pending: Vec::new(), crc: Crc::new() })
     }
 
     /// Writes the remaining blocks and the trailer.
-    pub(super) fn finish(mut self) -> io::Result<W> {
+    pub(crate) fn finish(mut self) -> io::Result<W> {
         self.compress(self.pending.len())?;
         self.inner.write_all(&LAST_BLOCK)?;
         self.inner.write_all(&self.crc.sum().to_le_bytes())?;

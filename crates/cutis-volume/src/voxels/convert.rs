@@ -6,12 +6,11 @@
 //! stored as HU rounded to whole numbers, with slope 1. CT reconstructions usually hold whole HU
 //! already. The largest rounding error is recorded.
 
-use super::read::HuStats;
-use crate::AIR_HU;
+use crate::{AIR_HU, HuStats};
 
 /// A voxel type that holds one real number.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum VoxelType {
+pub(crate) enum VoxelType {
     U8,
     I8,
     I16,
@@ -26,7 +25,7 @@ pub(super) enum VoxelType {
 
 impl VoxelType {
     /// The type with this `datatype` in the header, or the name of an unsupported type.
-    pub(super) fn from_code(code: i16) -> Result<Self, &'static str> {
+    pub(crate) fn from_code(code: i16) -> Result<Self, &'static str> {
         Ok(match code {
             2 => Self::U8,
             4 => Self::I16,
@@ -49,7 +48,7 @@ impl VoxelType {
         })
     }
 
-    pub(super) fn bytes(self) -> usize {
+    pub(crate) fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -59,7 +58,7 @@ impl VoxelType {
     }
 
     /// The name of the type in NumPy.
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::U8 => "uint8",
             Self::I8 => "int8",
@@ -76,7 +75,7 @@ impl VoxelType {
 }
 
 /// Converts voxel bytes to int16.
-pub(super) struct Converter {
+pub(crate) struct Converter {
     dtype: VoxelType,
     big_endian: bool,
     scaling: [f64; 2],
@@ -91,7 +90,7 @@ pub(super) struct Converter {
 }
 
 /// Result of a [`Converter`].
-pub(super) struct Converted {
+pub(crate) struct Converted {
     pub voxels: Vec<i16>,
     pub slope: f64,
     pub intercept: f64,
@@ -113,7 +112,7 @@ struct Range<T, S> {
 
 impl Converter {
     /// Creates a converter without allocating. `scaling` is slope and intercept.
-    pub(super) fn new(dtype: VoxelType, big_endian: bool, scaling: [f64; 2]) -> Self {
+    pub(crate) fn new(dtype: VoxelType, big_endian: bool, scaling: [f64; 2]) -> Self {
         Self {
             dtype,
             big_endian,
@@ -128,12 +127,12 @@ impl Converter {
     }
 
     /// Reserves memory for `total` voxels. Returns false if there is not enough.
-    pub(super) fn reserve(&mut self, total: usize) -> bool {
+    pub(crate) fn reserve(&mut self, total: usize) -> bool {
         self.voxels.try_reserve_exact(total.saturating_sub(self.voxels.len())).is_ok()
     }
 
     /// Converts and appends whole voxels.
-    pub(super) fn push(&mut self, bytes: &[u8]) {
+    pub(crate) fn push(&mut self, bytes: &[u8]) {
         match self.dtype {
             VoxelType::U8 => self.push_stored(bytes, u8::from_le_bytes, 0),
             VoxelType::I8 => self.push_stored(bytes, i8::from_le_bytes, 0),
@@ -200,7 +199,7 @@ impl Converter {
         }
     }
 
-    pub(super) fn finish(mut self) -> Converted {
+    pub(crate) fn finish(mut self) -> Converted {
         let [slope, intercept] = self.scaling;
         if self.dtype.bytes() > 2 {
             let Range { min, max, sum } = self.hu;

@@ -1,0 +1,97 @@
+//! Decodes the voxels of an open file into a volume.
+
+use std::path::PathBuf;
+
+use super::convert::{Converter, VoxelType};
+use super::source::{PORTION, Source};
+use crate::{Affine, Grid, Loaded, Volume, VolumeError};
+
+/// Where and how a file holds its voxels, as its header says.
+pub(crate) struct Layout {
+    /// Voxels per axis.
+    pub(crate) shape: [u64; 3],
+    pub(crate) affine: Affine,
+    pub(crate) dtype: VoxelType,
+    pub(crate) big_endian: bool,
+    /// Slope and intercept of HU.
+    pub(crate) scaling: [f64; 2],
+    /// Position of the first voxel in the source.
+    pub(crate) offset: u64,
+}
+
+/// Reads all voxels. `warnings` holds what was noticed in the header.
+///
+/// # Errors
+/// [`VolumeError::Truncated`], [`VolumeError::TooLarge`], [`VolumeError::Range`],
+/// [`VolumeError::Infinite`] or [`VolumeError::Io`].
+pub(crate) fn decode(
+    mut source: Source<'_>,
+    layout: &Layout,
+    mut warnings: Vec<String>,
+) -> Result<Loaded, VolumeError> {
+    let path: PathBuf = source.path.clone();
+    let &Layout { shape, affine, dtype, .. } = layout;
+    let too_large = || VolumeError::TooLarge { path: path.clone(), shape: shape };
+    let count = shape.iter().try_fold(1u64, |count, &n| count.checked_mul(n)).ok_or_else(too_large)?;
+    let bytes = count.checked_mul(dtype.bytes() as u64).ok_or_else(too_large)?;
+    let voxels = usize::try_from(count).map_err(|_| too_large())?;
+    source.expect(layout.offset, bytes)?;
+    source.skip_to(layout.offset, bytes)?;
+
+    let mut converter = Converter::new(dtype, layout.big_endian, layout.scaling);
+    let mut reserved = 0usize;
+    let mut buffer = vec![0; PORTION.min(bytes as usize)];
+    let mut done = 0u64;
+    while done < bytes {
+        let wanted = PORTION.min((bytes - done) as usize);
+        let got = source.fill(&mut buffer[..wanted])?;
+        done += got as u64;
+        if got < wanted {
+            return Err(VolumeError::Truncated { path, expected_bytes: bytes, found_bytes: done });
+        }
+        let received = (done / dtype.bytes() as u64) as usize;
+        if received > reserved {
+            // The size of an uncompressed file is known to suffice. For a compressed file, the
+            // reserved memory grows with the voxels received, so that a header with wrong sizes
+            // cannot make the program allocate too much.
+            let capacity =
+                if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
+            if !converter.reserve(capacity) {
+                return Err(too_large());
+            }
+            reserved = capacity;
+        }
+        converter.push(&buffer[..wanted]);
+    }
+    source.check_tail(&mut warnings)?;
+    source.finish()?;
+
+    let shape = shape.map(|n| n as usize);
+    let converted = converter.finish();
+    let stats = converted.stats;
+    if let Some((index, value)) = converted.infinite {
+        let index = Grid { shape, affine }.point(index);
+        return Err(VolumeError::Infinite { path, index, value });
+    }
+    if !converted.fits {
+        return Err(VolumeError::Range { path, min: stats.min, max: stats.max });
+    }
+    if converted.rounding > 0.0 {
+        warnings.push(format!(
+            "{} voxels were rounded to whole HU: the largest change is {:.3e} HU",
+            dtype.name(),
+            converted.rounding
+        ));
+    }
+    if stats.nan_count > 0 {
+        warnings.push(format!("{} voxels are NaN: they become air (-1024 HU)", stats.nan_count));
+    }
+    let volume = Volume::new(
+        Grid { shape, affine },
+        converted.voxels,
+        converted.slope as f32,
+        converted.intercept as f32,
+    )?;
+    Ok(Loaded { volume, stats, dtype: dtype.name(), warnings })
+}
+
