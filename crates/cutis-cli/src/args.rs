@@ -7,7 +7,7 @@ use clap::{Args as Group, Parser, Subcommand};
 use cutis::mesh::{SkinMode, Split};
 use cutis::render::Side;
 use cutis::scene::{Override, constraint_kinds};
-use cutis::volume::sample::LatticeSize;
+use cutis::volume::{ReadOptions, sample::LatticeSize};
 
 /// Cut a CT scan and watch skin tension open the wound.
 ///
@@ -92,18 +92,26 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Describe a volume file
+    /// Describe a volume file, or list the series in a folder of DICOM files
     Inspect {
-        /// NIfTI file
-        volume: PathBuf,
+        #[command(flatten)]
+        volume: VolumeArgs,
         /// Print as JSON
         #[arg(long)]
         json: bool,
     },
+    /// Write a volume in another format
+    Convert {
+        #[command(flatten)]
+        volume: VolumeArgs,
+        /// File to write (.nii or .nii.gz)
+        #[arg(long)]
+        out: PathBuf,
+    },
     /// Detect the skin of a volume
     Skin {
-        /// NIfTI file
-        volume: PathBuf,
+        #[command(flatten)]
+        volume: VolumeArgs,
         /// Lattice: native, a spacing in mm, or nx,ny,nz
         #[arg(long, default_value = "native")]
         lattice: LatticeSize,
@@ -154,8 +162,8 @@ pub(crate) enum Command {
     },
     /// Draw a volume: its skin from one side, or a slice
     Render {
-        /// NIfTI file
-        volume: PathBuf,
+        #[command(flatten)]
+        volume: VolumeArgs,
         /// File to write (.png)
         #[arg(long)]
         out: PathBuf,
@@ -201,6 +209,26 @@ pub(crate) enum SceneCommand {
     Reference,
     /// JSON schema of report.json
     ReportSchema,
+}
+
+/// A volume, and how to read it.
+#[derive(Clone, Debug, Group)]
+pub(crate) struct VolumeArgs {
+    /// Volume file, or a folder with a DICOM series
+    #[arg(value_name = "VOLUME")]
+    pub(crate) path: PathBuf,
+    /// Number of the DICOM series, if the folder has several
+    #[arg(long, value_name = "NUMBER")]
+    series: Option<u32>,
+    /// Resample tilted or unevenly spaced slices to a regular grid with perpendicular axes
+    #[arg(long)]
+    resample: bool,
+}
+
+impl VolumeArgs {
+    pub(crate) fn options(&self) -> ReadOptions {
+        ReadOptions { series: self.series, resample: self.resample }
+    }
 }
 
 /// Options of `cutis tune`.

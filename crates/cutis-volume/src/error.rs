@@ -132,6 +132,25 @@ pub enum VolumeError {
         /// Plus or minus infinity.
         value: f64,
     },
+    /// The first two axes of a volume are not perpendicular, or its slices are shifted too far.
+    #[error(
+        "the volume cannot be resampled to perpendicular axes (the largest cosine between two of its axes is {cosine:.6}): its \
+         first two axes must be perpendicular, and its slices may be shifted by at most four times their size"
+    )]
+    NotStacked {
+        /// Largest |cosine| between two index axes.
+        cosine: f64,
+    },
+    /// The HU of a volume to resample do not fit into int16.
+    #[error("{hu} HU do not fit into int16 (-32768 to 32767 HU); is this a CT in Hounsfield units?")]
+    ResampledRange {
+        /// The first such value.
+        hu: f32,
+    },
+    /// DICOM files are not a CT volume.
+    #[cfg(feature = "dicom")]
+    #[error(transparent)]
+    Dicom(#[from] Box<crate::dicom::DicomError>),
     /// NIfTI-1 cannot hold this shape.
     #[error("{path}: shape {shape:?} cannot be written: NIfTI-1 holds 1 to 32767 voxels per axis")]
     WriteShape {
@@ -276,4 +295,11 @@ pub enum VolumeError {
         /// Largest drift along that axis, in voxels.
         drift_voxels: f64,
     },
+}
+
+#[cfg(feature = "dicom")]
+impl From<crate::dicom::DicomError> for VolumeError {
+    fn from(error: crate::dicom::DicomError) -> Self {
+        Self::Dicom(Box::new(error))
+    }
 }

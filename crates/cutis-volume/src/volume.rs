@@ -114,13 +114,18 @@ impl Volume {
             let offset: usize = (0..3).map(|axis| (corner >> axis & 1) * steps[axis]).sum();
             self.hu(self.voxels[base + offset])
         });
-        if hu.iter().any(|&value| value >= AIR_HU) && hu.iter().any(|&value| value < AIR_HU) {
-            hu = hu.map(|value| value.max(AIR_HU));
-        }
+        without_padding(&mut hu);
         let mix = |a: f64, b: f64, t: f64| a + t * (b - a);
         let [x, y, z] = fraction;
         let along_x: [f64; 4] = std::array::from_fn(|row| mix(hu[2 * row].into(), hu[2 * row + 1].into(), x));
         mix(mix(along_x[0], along_x[1], y), mix(along_x[2], along_x[3], y), z) as f32
+    }
+}
+
+/// Raises padding to air if some of the values are padding and others are not.
+pub(crate) fn without_padding(hu: &mut [f32]) {
+    if hu.iter().any(|&value| value >= AIR_HU) && hu.iter().any(|&value| value < AIR_HU) {
+        hu.iter_mut().for_each(|value| *value = value.max(AIR_HU));
     }
 }
 

@@ -52,7 +52,7 @@ pub use cutis_volume as volume;
 pub use backend::{Device, DeviceLimits, Devices, devices};
 pub use body::{SkinRequest, find_skin};
 pub use cost::{CostPart, CostReport, Plan, check};
-pub use ct::{Inspection, inspect};
+pub use ct::{FolderInspection, Inspection, Series, convert, inspect, inspect_folder};
 pub use error::Error;
 pub use model::{ScanTension, SceneCt, SceneSystem, build_system, build_system_and_ct};
 pub use output::{ResampleRequest, report, resample_run};

@@ -21,7 +21,9 @@ fn with_file<T>(volume: &Nifti, look: impl FnOnce(&std::path::Path) -> T) -> T {
 #[test]
 fn an_inspection_describes_the_file() {
     let scaled = Nifti { scaling: [2.0, 10.0], ..ct() };
-    let found = with_file(&scaled, |path| serde_json::to_value(cutis::inspect(path).unwrap()).unwrap());
+    let found = with_file(&scaled, |path| {
+        serde_json::to_value(cutis::inspect(path, &Default::default()).unwrap()).unwrap()
+    });
     assert_eq!(found["shape"], serde_json::json!([48, 32, 50]));
     assert_eq!(found["orientation"], "LPS");
     assert_eq!(found["dtype"], "int16");
@@ -41,7 +43,12 @@ fn an_inspection_describes_the_file() {
 /// says.
 #[test]
 fn the_skin_of_a_file_lies_on_the_body() {
-    let request = SkinRequest { lattice: LatticeSize::Native, split: Split::Kuhn6, mode: SkinMode::Exterior };
+    let request = SkinRequest {
+        read: Default::default(),
+        lattice: LatticeSize::Native,
+        split: Split::Kuhn6,
+        mode: SkinMode::Exterior,
+    };
     let (report, bytes) = with_file(&ct(), |path| {
         let out = path.with_file_name("skin.vtu");
         let report = cutis::find_skin(path, &request, Some(&out), &Silent).unwrap();

@@ -1,18 +1,68 @@
-//! `inspect`, `skin`, `phantom` and `render`: commands that simulate nothing.
+//! `inspect`, `convert`, `skin`, `phantom` and `render`: commands that simulate nothing.
 
 use std::path::Path;
 
 use cutis::mesh::{SkinMode, SkinReport, Split};
 use cutis::render::{Focus, Plane, Side, SliceView, View, raymarch, slice};
-use cutis::volume::{nifti, phantom::Phantom, sample::LatticeSize};
-use cutis::{Error, Inspection, Progress, SkinRequest};
+use cutis::volume::{phantom::Phantom, sample::LatticeSize};
+use cutis::{Error, FolderInspection, Inspection, Progress, Series, SkinRequest};
 
 use super::pretty;
+use crate::args::VolumeArgs;
 use crate::terminal::{Terminal, print};
 
-pub(crate) fn inspect(volume: &Path, json: bool) -> Result<(), Error> {
-    let found = cutis::inspect(volume)?;
-    print(&if json { pretty(&found) } else { page(&found) });
+pub(crate) fn inspect(volume: &VolumeArgs, json: bool) -> Result<(), Error> {
+    let options = volume.options();
+    if volume.path.is_dir() && options.series.is_none() {
+        let found = cutis::inspect_folder(&volume.path, &options)?;
+        print(&if json { pretty(&found) } else { folder_page(&found) });
+    } else {
+        let found = cutis::inspect(&volume.path, &options)?;
+        print(&if json { pretty(&found) } else { page(&found) });
+    }
+    Ok(())
+}
+
+fn folder_page(found: &FolderInspection) -> String {
+    let mut lines: Vec<String> = found.series.iter().map(series_lines).collect();
+    lines.extend(found.notes.iter().map(|note| format!("note: {note}")));
+    lines.extend(found.volume.as_ref().map(page));
+    lines.join("\n")
+}
+
+/// A line for a series, and one for each problem.
+fn series_lines(series: &Series) -> String {
+    let number = series.number.map_or("-".into(), |number| number.to_string());
+    let mut line = format!("series {number}  \"{}\"  {} slices", series.description, series.slices);
+    if let (Some([nx, ny]), Some([dx, dy])) = (series.size, series.spacing_mm) {
+        line += &format!("  {nx} x {ny} pixels of {dx:.4} x {dy:.4} mm");
+    }
+    if let Some([least, most]) = series.slice_distance_mm {
+        line += &match most - least < 0.0005 {
+            true => format!("  {least:.3} mm apart"),
+            false => format!("  {least:.3} to {most:.3} mm apart"),
+        };
+    }
+    if let Some([min, max]) = series.hu {
+        line += &format!("  HU {min} to {max}");
+    }
+    if let Some(tilt) = series.tilt_deg.filter(|&tilt| tilt > 0.0) {
+        line += &format!("  tilted by {tilt:.1} degrees");
+    }
+    line += &format!("\n  first file: {}", series.file.display());
+    if let Some(problem) = &series.problem {
+        line += &format!("\n  not readable: {problem}");
+    }
+    line
+}
+
+pub(crate) fn convert(volume: &VolumeArgs, out: &Path) -> Result<(), Error> {
+    let terminal = Terminal::new();
+    terminal.begin("convert", 0);
+    let notes = cutis::convert(&volume.path, &volume.options(), out)?;
+    terminal.end();
+    notes.iter().for_each(|note| terminal.note(note));
+    print(&out.display().to_string());
     Ok(())
 }
 
@@ -38,15 +88,15 @@ fn page(found: &Inspection) -> String {
 }
 
 pub(crate) fn skin(
-    volume: &Path,
+    volume: &VolumeArgs,
     lattice: LatticeSize,
     mode: SkinMode,
     split: Split,
     out: Option<&Path>,
     json: bool,
 ) -> Result<(), Error> {
-    let request = SkinRequest { lattice, split, mode };
-    let report = cutis::find_skin(volume, &request, out, &Terminal::new())?;
+    let request = SkinRequest { read: volume.options(), lattice, split, mode };
+    let report = cutis::find_skin(&volume.path, &request, out, &Terminal::new())?;
     print(&if json { pretty(&report) } else { skin_page(&report, out) });
     Ok(())
 }
@@ -100,7 +150,7 @@ pub(crate) struct Look {
 }
 
 /// Draws a volume and writes a PNG.
-pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error> {
+pub(crate) fn render(volume: &VolumeArgs, out: &Path, look: &Look) -> Result<(), Error> {
     let focus = match (&look.focus, look.zoom) {
         (Some(text), Some(size_mm)) => {
             Some(Focus { center_mm: numbers("--focus", text, ',', "x,y,z in mm")?, size_mm })
@@ -112,7 +162,7 @@ pub(crate) fn render(volume: &Path, out: &Path, look: &Look) -> Result<(), Error
     let slice_at = look.slice.as_deref().map(plane).transpose()?;
     let terminal = Terminal::new();
     terminal.begin("read the CT", 0);
-    let volume = nifti::read(volume)?.volume;
+    let volume = cutis::volume::read(&volume.path, &volume.options())?.volume;
     terminal.end();
     terminal.begin("draw", 0);
     let image = match slice_at {

@@ -24,6 +24,7 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
             simulate::resample(&scene, &change, cutis::ResampleRequest { run, volume, out })
         }
         Command::Inspect { volume, json } => look::inspect(&volume, json),
+        Command::Convert { volume, out } => look::convert(&volume, &out),
         Command::Skin { volume, lattice, mode, split, out, json } => {
             look::skin(&volume, lattice, mode, split, out.as_deref(), json)
         }

@@ -46,8 +46,8 @@ impl Header {
             [540, _] | [_, 540] => Ok(NIFTI2),
             _ => Err(VolumeError::NotNifti {
                 path: path.into(),
-                reason: "its first four bytes are neither 348 (NIfTI-1) nor 540 (NIfTI-2); DICOM is not read yet, dcm2niix \
-                         converts it",
+                reason: "its first four bytes are neither 348 (NIfTI-1) nor 540 (NIfTI-2); it is neither NRRD, nor \
+                         MetaImage, nor DICOM either",
             }),
         }
     }

@@ -6,5 +6,6 @@ mod placement;
 mod read;
 mod write;
 
+pub(crate) use read::read_files;
 pub use read::{read, read_observed};
 pub use write::{Writer, write};

@@ -54,9 +54,12 @@ pub fn read_observed(
     read_files(path.as_ref(), Some(&mut observe))
 }
 
-fn read_files(path: &Path, mut observer: Option<&mut Observer<'_>>) -> Result<Loaded, VolumeError> {
+pub(crate) fn read_files(
+    path: &Path,
+    mut observer: Option<&mut Observer<'_>>,
+) -> Result<Loaded, VolumeError> {
     if path.is_dir() {
-        let reason = "it is a folder; Cutis does not read DICOM, but dcm2niix converts a series to one file";
+        let reason = "it is a folder, and this build of Cutis has no support for DICOM (feature dicom)";
         return Err(VolumeError::NotNifti { path: path.into(), reason });
     }
     let pair = pair(path)?;

@@ -94,4 +94,3 @@ pub(crate) fn decode(
     )?;
     Ok(Loaded { volume, stats, dtype: dtype.name(), warnings })
 }
-

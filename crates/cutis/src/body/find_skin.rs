@@ -5,7 +5,7 @@ use std::path::Path;
 use cutis_mesh::vtk::{self, Cells, Piece, Space};
 use cutis_mesh::{Frame, Lattice, Skin, SkinMode, SkinOptions, SkinReport, Split, skin};
 use cutis_volume::sample::LatticeSize;
-use cutis_volume::{nifti, sample};
+use cutis_volume::{ReadOptions, sample};
 use nalgebra::Point3;
 
 use super::{AIR_BELOW_HU, air};
@@ -14,6 +14,8 @@ use crate::{Error, Progress};
 /// The rule by which the skin is found, and the lattice.
 #[derive(Clone, Copy, Debug)]
 pub struct SkinRequest {
+    /// How the volume is read.
+    pub read: ReadOptions,
     /// Lattice over the volume.
     pub lattice: LatticeSize,
     /// How a cell is split into tetrahedra.
@@ -37,7 +39,7 @@ pub fn find_skin(
         check_extension(path)?;
     }
     progress.begin("read the CT", 0);
-    let volume = nifti::read(volume)?.volume;
+    let volume = cutis_volume::read(volume, &request.read)?.volume;
     progress.end();
     progress.begin("detect the skin", 0);
     let lattice = Lattice::new(sample::lattice_grid(volume.grid(), request.lattice)?, request.split)?;

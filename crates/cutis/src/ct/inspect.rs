@@ -1,8 +1,8 @@
-//! `cutis inspect`: the header and the HU range of a volume file.
+//! `cutis inspect`: the header and the HU range of a volume, and the series of a DICOM folder.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use cutis_volume::nifti;
+use cutis_volume::{Loaded, ReadOptions};
 use serde::Serialize;
 
 use crate::Error;
@@ -32,14 +32,17 @@ pub struct Inspection {
     pub warnings: Vec<String>,
 }
 
-/// Reads a volume file and reports its shape, placement and HU range.
+/// Reads a volume and reports its shape, placement and HU range.
 ///
 /// # Errors
-/// [`Error::Volume`] if the file is not a CT volume that can be read.
-pub fn inspect(path: &Path) -> Result<Inspection, Error> {
-    let loaded = nifti::read(path)?;
+/// [`Error::Volume`] if the path is not a CT volume that can be read.
+pub fn inspect(path: &Path, options: &ReadOptions) -> Result<Inspection, Error> {
+    Ok(describe(cutis_volume::read(path, options)?))
+}
+
+fn describe(loaded: Loaded) -> Inspection {
     let grid = loaded.volume.grid();
-    Ok(Inspection {
+    Inspection {
         shape: grid.shape,
         spacing_mm: grid.affine.spacing_mm(),
         affine: grid.affine.rows(),
@@ -50,5 +53,91 @@ pub fn inspect(path: &Path) -> Result<Inspection, Error> {
         hu_sum: loaded.stats.sum,
         nan_count: loaded.stats.nan_count,
         warnings: loaded.warnings,
-    })
+    }
+}
+
+/// The CT series in a folder of DICOM files.
+#[derive(Clone, Debug, Serialize)]
+pub struct FolderInspection {
+    /// The series, ordered by number.
+    pub series: Vec<Series>,
+    /// What else is in the folder.
+    pub notes: Vec<String>,
+    /// The volume, if there is one series and it can be read.
+    pub volume: Option<Inspection>,
+}
+
+/// A CT series.
+#[derive(Clone, Debug, Serialize)]
+pub struct Series {
+    /// Its number, to be given as `volume.series`.
+    pub number: Option<u32>,
+    /// Its description.
+    pub description: String,
+    /// Number of files.
+    pub slices: usize,
+    /// The first file by name. As a path it names the series.
+    pub file: PathBuf,
+    /// Columns and rows.
+    pub size: Option<[usize; 2]>,
+    /// Distance of pixels along rows and columns, mm.
+    pub spacing_mm: Option<[f64; 2]>,
+    /// Smallest and largest distance of neighboring slices, mm.
+    pub slice_distance_mm: Option<[f64; 2]>,
+    /// Angle by which the slices are tilted, degrees.
+    pub tilt_deg: Option<f64>,
+    /// Lowest and highest HU.
+    pub hu: Option<[f64; 2]>,
+    /// True if it can be read with `volume.resample = true` only.
+    pub needs_resampling: bool,
+    /// Why it cannot be read as it is.
+    pub problem: Option<String>,
+}
+
+/// Lists the CT series in a folder, and describes the volume if there is only one.
+///
+/// # Errors
+/// [`Error::Volume`] if the folder cannot be read, has no CT series, or this build has no support
+/// for DICOM.
+pub fn inspect_folder(path: &Path, options: &ReadOptions) -> Result<FolderInspection, Error> {
+    #[cfg(feature = "dicom")]
+    {
+        let listing = cutis_volume::dicom::list(path)?;
+        if listing.series.is_empty() {
+            // The same error as a run has.
+            cutis_volume::read(path, options)?;
+        }
+        let volume = match &listing.series[..] {
+            [only] if only.problem.is_none() || (only.needs_resampling && options.resample) => {
+                Some(inspect(path, options)?)
+            }
+            _ => None,
+        };
+        let series = listing.series.into_iter().map(Series::from).collect();
+        Ok(FolderInspection { series, notes: listing.notes, volume })
+    }
+    #[cfg(not(feature = "dicom"))]
+    {
+        let volume = Some(inspect(path, options)?);
+        Ok(FolderInspection { series: Vec::new(), notes: Vec::new(), volume })
+    }
+}
+
+#[cfg(feature = "dicom")]
+impl From<cutis_volume::dicom::SeriesInfo> for Series {
+    fn from(info: cutis_volume::dicom::SeriesInfo) -> Self {
+        Self {
+            number: info.number,
+            description: info.description,
+            slices: info.slices,
+            file: info.file,
+            size: info.size,
+            spacing_mm: info.spacing_mm,
+            slice_distance_mm: info.slice_distance_mm,
+            tilt_deg: info.tilt_deg,
+            hu: info.hu,
+            needs_resampling: info.needs_resampling,
+            problem: info.problem,
+        }
+    }
 }

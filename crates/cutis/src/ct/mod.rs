@@ -1,6 +1,8 @@
-//! The CT of a scene: read from a NIfTI file or made by the phantom. The first stage of a run.
+//! The CT of a scene: read from its files or made by the phantom. The first stage of a run.
 
+mod convert;
 mod inspect;
 pub(crate) mod source;
 
-pub use inspect::{Inspection, inspect};
+pub use convert::convert;
+pub use inspect::{FolderInspection, Inspection, Series, inspect, inspect_folder};

@@ -1,18 +1,18 @@
-//! The CT of a scene: read from its file, or made by the phantom.
+//! The CT of a scene: read from its files, or made by the phantom.
 
 use cutis_volume::phantom::Phantom;
-use cutis_volume::{Table, TableKind, Volume, nifti};
+use cutis_volume::{Table, TableKind, Volume};
 use sha2::{Digest, Sha256};
 
 use crate::Error;
 use crate::output::report::Input;
 use crate::run::files;
-use crate::scene::{LoadedScene, PhantomSection, SceneFile, TableChoice, VolumeSection};
+use crate::scene::{LoadedScene, PhantomSection, SceneFile, TableChoice};
 
 /// The CT and its origin.
 pub(crate) struct Source {
     pub(crate) volume: Volume,
-    /// SHA-256 of the file's bytes or of the phantom's voxels. It identifies the volume.
+    /// SHA-256 of the bytes of its files, or of the phantom's voxels. It identifies the volume.
     pub(crate) sha256: String,
     /// The scene file and the CT, for the report.
     pub(crate) inputs: Vec<Input>,
@@ -26,20 +26,17 @@ pub(crate) struct Source {
 pub(crate) fn load(loaded: &LoadedScene) -> Result<Source, Error> {
     let scene_input =
         Input { path: loaded.file.display().to_string(), sha256: files::sha256_of(loaded.text.as_bytes()) };
-    match &loaded.scene.volume {
-        VolumeSection { path: Some(path), .. } => {
+    let section = &loaded.scene.volume;
+    match (&section.path, &section.phantom) {
+        (Some(path), _) => {
             let mut hash = Sha256::new();
-            let read = nifti::read_observed(path, |file, bytes| {
-                if file == path {
-                    hash.update(bytes);
-                }
-            })?;
+            let read = cutis_volume::read_observed(path, &section.options(), |_, bytes| hash.update(bytes))?;
             let sha256 = files::hex(&hash.finalize());
             let input = Input { path: path.display().to_string(), sha256: sha256.clone() };
             let inputs = vec![scene_input, input];
             Ok(Source { volume: read.volume, sha256, inputs, warnings: read.warnings })
         }
-        VolumeSection { phantom: Some(PhantomSection { size, seed, turn_deg }), path: None } => {
+        (None, Some(PhantomSection { size, seed, turn_deg })) => {
             let volume = Phantom::new(*size, *seed)
                 .and_then(|phantom| phantom.turned(*turn_deg)?.volume())
                 .map_err(loaded.file().blame("volume.phantom"))?;
@@ -51,7 +48,7 @@ pub(crate) fn load(loaded: &LoadedScene) -> Result<Source, Error> {
             let inputs = vec![scene_input, Input { path, sha256: sha256.clone() }];
             Ok(Source { volume, sha256, inputs, warnings: Vec::new() })
         }
-        VolumeSection { path: None, phantom: None } => {
+        (None, None) => {
             Err(loaded.file().bad_key("volume", "", "must have exactly one of `path` and `phantom`"))
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use cutis_volume::nifti;
+use cutis_volume::{Format, ReadOptions};
 
 use super::last_cut_s;
 use super::report::Resample;
@@ -37,6 +37,8 @@ pub fn resample_run(
     request: &ResampleRequest,
     progress: &dyn Progress,
 ) -> Result<Resample, Error> {
+    // A wrong name is reported before the time for resampling is spent.
+    Format::of(&request.out)?;
     let mut clock = Clock::new(progress);
     let folder = RunFolder(request.run.clone());
     let mut stages = Stages::on(Request::of(loaded)?.open()?);
@@ -46,13 +48,13 @@ pub fn resample_run(
     let fingerprint = checkpoint::fingerprint(&loaded.scene, &source.sha256);
     let saved = Checkpoint::read(&folder.checkpoint(), &fingerprint, body.mesh.positions.len())?;
     let volume = match &request.volume {
-        Some(path) => nifti::read(path)?.volume,
+        Some(path) => cutis_volume::read(path, &ReadOptions::default())?.volume,
         None => source.volume,
     };
     let warp = BodyWarp::new(&body, &saved.positions, last_cut_s(&loaded.scene, saved.frame), None, &stages)?;
     let (deformed, report) =
         clock.stage("resample", 0, |progress| warp.apply(&volume, &mut stages, progress))?;
     stages.notes.iter().for_each(|note| progress.note(note));
-    clock.stage("write", 0, |_| Ok(nifti::write(&request.out, &deformed)?))?;
+    clock.stage("write", 0, |_| Ok(cutis_volume::write(&request.out, &deformed)?))?;
     Ok(report)
 }

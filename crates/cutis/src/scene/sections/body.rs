@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use cutis_mesh::{HalfSpace, SkinMode, Split};
+use cutis_volume::ReadOptions;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -14,12 +15,34 @@ use crate::scene::choice::OneOr;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeSection {
-    /// A NIfTI file (`.nii`, `.nii.gz`, `.hdr`), relative to the scene file.
+    /// A NIfTI file (`.nii`, `.nii.gz`, `.hdr`), an NRRD file (`.nrrd`, `.nhdr`), a MetaImage
+    /// (`.mha`, `.mhd`), or a DICOM series: its folder, or one of its files. Relative to the scene
+    /// file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
+    /// Number of the DICOM series to read, if the folder has several. `cutis inspect FOLDER` lists
+    /// them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<u32>,
+    /// Resample slices that are tilted (gantry tilt) or unevenly spaced to a regular grid with
+    /// perpendicular axes. Without it such a scan is refused, or read with a warning that its
+    /// deformed volume cannot be written.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub resample: bool,
     /// The built-in synthetic torso, used instead of a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phantom: Option<PhantomSection>,
+}
+
+impl VolumeSection {
+    /// How to read the file.
+    pub(crate) fn options(&self) -> ReadOptions {
+        ReadOptions { series: self.series, resample: self.resample }
+    }
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// The synthetic torso.

@@ -1,0 +1,62 @@
+//! Reads a CT volume of any format that the crate knows. The content decides, not the name.
+
+use std::path::Path;
+
+use crate::voxels::Observer;
+use crate::{Loaded, VolumeError, nifti, to_perpendicular_axes};
+
+/// How to read a volume.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Number of the DICOM series to read (attribute SeriesNumber). `None` if there is only one.
+    pub series: Option<u32>,
+    /// Resample slices that are tilted or unevenly spaced to a regular grid with perpendicular axes.
+    pub resample: bool,
+}
+
+/// Reads a volume: a NIfTI file, or a DICOM series given by its folder or one of its files.
+///
+/// DICOM needs the feature `dicom`.
+///
+/// # Errors
+/// The errors of [`nifti::read`] and, with the feature `dicom`, `VolumeError::Dicom`. Each names
+/// the file. [`VolumeError::NotStacked`] if resampling is asked for and not possible.
+pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Loaded, VolumeError> {
+    read_files(path.as_ref(), options, None)
+}
+
+/// Reads a volume as [`read`] does, and passes the bytes of its files to `observe` on the way.
+///
+/// When the function succeeds, `observe` has received every byte of every file of the volume, in
+/// order, as they are on the disk: first the header file of a pair, and the slices of a DICOM series
+/// along their normal.
+///
+/// # Errors
+/// The errors of [`read`].
+pub fn read_observed(
+    path: impl AsRef<Path>,
+    options: &ReadOptions,
+    mut observe: impl FnMut(&Path, &[u8]),
+) -> Result<Loaded, VolumeError> {
+    read_files(path.as_ref(), options, Some(&mut observe))
+}
+
+fn read_files(
+    path: &Path,
+    options: &ReadOptions,
+    observer: Option<&mut Observer<'_>>,
+) -> Result<Loaded, VolumeError> {
+    #[cfg(feature = "dicom")]
+    if path.is_dir() || crate::dicom::is_dicom(path) {
+        return crate::dicom::read_series(path, options, observer);
+    }
+    let mut loaded = nifti::read_files(path, observer)?;
+    if options.resample && loaded.volume.grid().affine.is_sheared() {
+        loaded.volume = to_perpendicular_axes(loaded.volume)?;
+        loaded.warnings.retain(|warning| !warning.contains("not perpendicular"));
+        loaded
+            .warnings
+            .push("the axes were not perpendicular: the volume was resampled to perpendicular axes".into());
+    }
+    Ok(loaded)
+}
