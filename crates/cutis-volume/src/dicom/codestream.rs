@@ -1,6 +1,9 @@
 //! Checks of compressed pixels before they are decoded: each codestream states its own size, which
 //! must be that of the slice. A decoder would otherwise write beyond the slice, or fill a part of it.
 
+use std::path::Path;
+
+use super::error::DicomError;
 use super::slice::PixelFormat;
 
 /// Whether a transfer syntax is read, by its UID.
@@ -14,6 +17,7 @@ pub(super) enum Codec {
     Refused(&'static str, &'static str),
 }
 
+/// What to do with a compression that is not read.
 const DECOMPRESS: &str = "decompress the files first, for example with `gdcmconv --raw IN OUT`";
 
 impl Codec {
@@ -48,6 +52,23 @@ impl Codec {
     }
 }
 
+impl Codec {
+    /// The codec of a transfer syntax.
+    ///
+    /// # Errors
+    /// [`DicomError::Compression`] for one that is not read.
+    pub(super) fn require(path: &Path, uid: &str) -> Result<Self, DicomError> {
+        match Self::of(uid) {
+            Self::Refused(name, remedy) => {
+                let known = uid.len() <= 64 && uid.chars().all(|c| c.is_ascii_digit() || c == '.');
+                let syntax = format!("{name} (transfer syntax {})", if known { uid } else { "unknown" });
+                Err(DicomError::Compression { path: path.into(), syntax, remedy })
+            }
+            codec => Ok(codec),
+        }
+    }
+}
+
 /// Returns why a codestream cannot be decoded to `size` pixels.
 pub(super) fn check(
     codec: Codec,
@@ -57,7 +78,13 @@ pub(super) fn check(
 ) -> Result<(), &'static str> {
     match codec {
         Codec::Jpeg => {
-            let (found, bits) = jpeg_size(stream).ok_or("the JPEG stream has no header of a frame")?;
+            let (found, bits, lossless) =
+                jpeg_size(stream).ok_or("the JPEG stream has no header of a frame")?;
+            if bits > 8 && !lossless {
+                return Err(
+                    "lossy JPEG of more than 8 bits is not read; decompress the files first, for example with `gdcmconv --raw IN OUT`",
+                );
+            }
             same_size(found, size)?;
             wide_enough(bits, format)
         }
@@ -85,8 +112,9 @@ fn wide_enough(bits: u8, format: PixelFormat) -> Result<(), &'static str> {
     }
 }
 
-/// Columns, rows and bits of the start of frame of a JPEG stream (ISO 10918-1, B.2.2).
-fn jpeg_size(stream: &[u8]) -> Option<([usize; 2], u8)> {
+/// Columns, rows and bits of the start of frame of a JPEG stream, and whether it is lossless
+/// (ISO 10918-1, B.2.2).
+fn jpeg_size(stream: &[u8]) -> Option<([usize; 2], u8, bool)> {
     let mut at = 2;
     loop {
         let header = stream.get(at..at + 4)?;
@@ -98,7 +126,7 @@ fn jpeg_size(stream: &[u8]) -> Option<([usize; 2], u8)> {
                 let frame = stream.get(at + 4..at + 10)?;
                 let [rows, columns] =
                     [1, 3].map(|n| usize::from(u16::from_be_bytes([frame[n], frame[n + 1]])));
-                return (frame[5] == 1).then_some(([columns, rows], frame[0]));
+                return (frame[5] == 1).then_some(([columns, rows], frame[0], header[1] == 0xc3));
             }
             _ => at += 2 + length,
         }

@@ -100,8 +100,8 @@ pub enum DicomError {
         /// What to do.
         remedy: &'static str,
     },
-    /// The pixel data do not have the size that the header gives.
-    #[error("{path}: the pixels are damaged: {reason}")]
+    /// The pixel data are not what the header says, or the decoder fails.
+    #[error("{path}: the pixels cannot be decoded: {reason}")]
     Pixels {
         /// Path of the file.
         path: PathBuf,
@@ -123,8 +123,9 @@ pub enum DicomError {
     },
     /// Slices are missing.
     #[error(
-        "{count} slices seem to be missing between {before} and {after}: they are {gap_mm:.3} mm apart, and other slices \
-         {usual_mm:.3} mm; copy the missing files to the folder"
+        "{count} slice{} seem{} to be missing between {before} and {after}: they are {gap_mm:.3} mm apart, and other slices \
+         {usual_mm:.3} mm; copy the missing files to the folder",
+        if *count == 1 { "" } else { "s" }, if *count == 1 { "s" } else { "" }
     )]
     MissingSlices {
         /// Path of the file before the gap.

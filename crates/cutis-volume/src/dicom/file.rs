@@ -5,9 +5,12 @@ use std::io::{Cursor, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+use dicom_encoding::transfer_syntax::TransferSyntaxIndex;
 use dicom_object::{DefaultDicomObject, OpenFileOptions, Tag};
+use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 use flate2::read::DeflateDecoder;
 
+use super::codestream::Codec;
 use super::error::DicomError;
 use super::lengths::{self, Encoding};
 use crate::VolumeError;
@@ -47,6 +50,10 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, VolumeError> {
 pub(super) fn parse(path: &Path, bytes: &[u8], whole: bool) -> Result<DefaultDicomObject, DicomError> {
     let damaged = |reason| DicomError::Damaged { path: path.into(), reason };
     let (syntax, start) = transfer_syntax(bytes).map_err(damaged)?;
+    if TransferSyntaxRegistry.get(&syntax).is_none() {
+        // The library does not parse the header of such a file.
+        Codec::require(path, &syntax)?;
+    }
     check_lengths(&bytes[start..], &syntax).map_err(damaged)?;
     let options = match whole {
         true => OpenFileOptions::new().read_all(),

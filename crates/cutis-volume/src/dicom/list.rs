@@ -54,7 +54,7 @@ pub fn list(path: impl AsRef<Path>) -> Result<Listing, VolumeError> {
     let folder = Folder::scan(path)?;
     let mut notes = Vec::new();
     if let Some(error) = &folder.damaged {
-        notes.push(format!("no series can be read as long as a file is damaged: {error}"));
+        notes.push(format!("no series can be read as long as this file is in the folder: {error}"));
     }
     if !folder.others.is_empty() {
         notes.push(format!("other files: {}", folder.describe_others()));

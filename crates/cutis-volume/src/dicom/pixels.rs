@@ -1,7 +1,6 @@
 //! Pixels of one slice: decoded to stored values, then to HU.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
 
 use dicom_core::value::Value;
 use dicom_object::{DefaultDicomObject, Tag};
@@ -45,7 +44,7 @@ pub(super) fn decode(slice: &Slice, object: &DefaultDicomObject) -> Result<Pixel
 
 fn stored_bytes(slice: &Slice, object: &DefaultDicomObject) -> Result<Vec<u8>, DicomError> {
     let damaged = |reason| DicomError::Pixels { path: slice.path.clone(), reason };
-    let codec = codec(&slice.path, object)?;
+    let codec = Codec::require(&slice.path, object.meta().transfer_syntax())?;
     let element = object.get(Tag(0x7fe0, 0x0010)).ok_or(damaged("the attribute PixelData is missing"))?;
     match (codec, element.value()) {
         (Codec::Raw, Value::Primitive(_)) => {}
@@ -61,22 +60,6 @@ fn stored_bytes(slice: &Slice, object: &DefaultDicomObject) -> Result<Vec<u8>, D
     {
         Ok(Ok(bytes)) => Ok(bytes),
         _ => Err(damaged("the decoder of the library dicom-pixeldata does not read them")),
-    }
-}
-
-/// How the pixels are compressed.
-///
-/// # Errors
-/// [`DicomError::Compression`] for one that is not read.
-pub(super) fn codec(path: &Path, object: &DefaultDicomObject) -> Result<Codec, DicomError> {
-    let uid = object.meta().transfer_syntax();
-    match Codec::of(uid) {
-        Codec::Refused(name, remedy) => {
-            let known = uid.len() <= 64 && uid.chars().all(|c| c.is_ascii_digit() || c == '.');
-            let syntax = format!("{name} (transfer syntax {})", if known { uid } else { "unknown" });
-            Err(DicomError::Compression { path: path.into(), syntax, remedy })
-        }
-        codec => Ok(codec),
     }
 }
 

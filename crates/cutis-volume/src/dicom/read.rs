@@ -34,6 +34,9 @@ pub(crate) fn read_series(
     }
     let series = folder.choose(options.series)?;
     let stack = stack(series)?;
+    if stack.slices.iter().any(|slice| slice.lossy) {
+        warnings.push("the pixels were compressed with a loss: their HU are not those of the scanner".into());
+    }
     if !options.resample || stack.is_regular() {
         stack.require_regular(path, &mut warnings)?;
         return load(path, &stack, observer, warnings);

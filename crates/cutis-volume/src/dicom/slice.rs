@@ -99,6 +99,8 @@ pub(super) struct Slice {
     pub(super) rescale: [f64; 2],
     /// Lowest and highest stored value that is padding.
     pub(super) padding: Option<[i64; 2]>,
+    /// Whether the pixels were ever compressed with a loss.
+    pub(super) lossy: bool,
 }
 
 impl Slice {
@@ -126,6 +128,7 @@ impl Slice {
             padding: padding(attributes, format)?,
             format,
             rescale: rescale(attributes)?,
+            lossy: attributes.text(tags::LOSSY) == "01",
         })
     }
 

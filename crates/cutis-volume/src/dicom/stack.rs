@@ -61,18 +61,20 @@ impl Stack {
         }
         let mut sorted = gaps.clone();
         sorted.sort_by(f64::total_cmp);
-        let usual = sorted[sorted.len() / 2];
+        let usual = sorted[(sorted.len() - 1) / 2];
         let (least, most) = (sorted[0], sorted[sorted.len() - 1]);
         let same = SAME_MM.max(SAME_SHARE * usual);
         if let Some(n) = gaps.iter().position(|&gap| gap <= same) {
             let [first, second] = [n, n + 1].map(|n| slices[n].path.clone());
             return Err(DicomError::SamePosition { first, second, gap_mm: gaps[n] });
         }
-        // Whole multiples of the smallest distance: slices of an even series are missing.
+        // Most distances are equal, and others are multiples of them: slices of an even series are
+        // missing.
+        let mostly_equal = usual <= (1.0 + UNEVEN_SHARE) * least;
         let whole = |gap: f64| (gap / least - (gap / least).round()).abs() <= UNEVEN_SHARE;
         let thick = |slice: &Slice| slice.thickness_mm.unwrap_or(0.0);
         let even_thickness = slices.iter().all(|slice| (thick(slice) - thick(&slices[0])).abs() <= 1e-3);
-        if even_thickness && gaps.iter().all(|&gap| whole(gap)) {
+        if mostly_equal && even_thickness && gaps.iter().all(|&gap| whole(gap)) {
             if let Some(n) = gaps.iter().position(|&gap| (gap / least).round() >= 2.0) {
                 return Err(DicomError::MissingSlices {
                     before: slices[n].path.clone(),

@@ -39,6 +39,7 @@ attributes! {
     PADDING_LIMIT = 0x0028 0x0121 "PixelPaddingRangeLimit";
     INTERCEPT = 0x0028 0x1052 "RescaleIntercept";
     SLOPE = 0x0028 0x1053 "RescaleSlope";
+    LOSSY = 0x0028 0x2110 "LossyImageCompression";
     MODALITY_LUT = 0x0028 0x3000 "ModalityLUTSequence";
 }
 

@@ -1,6 +1,8 @@
-//! Tests of NIfTI files and the phantom, against other programs, closed forms and damaged input.
+//! Tests of volume files and the phantom, against other programs, closed forms and damaged input.
 
 mod awkward;
+#[cfg(feature = "dicom")]
+mod dicom;
 mod hostile;
 mod phantom;
 mod round_trip;
