@@ -9,6 +9,7 @@ pub mod at_rest;
 pub mod cantilever;
 pub mod chainmail;
 pub mod closing;
+pub mod inputs;
 pub mod instructions;
 pub mod kit;
 pub mod main_job;
@@ -38,6 +39,7 @@ mod tests {
             ("cantilever", &crate::cantilever::TABLES),
             ("chainmail", &crate::chainmail::TABLES),
             ("closing", &crate::closing::TABLES),
+            ("inputs", &crate::inputs::TABLES),
             ("main-job", &crate::main_job::TABLES),
             ("parity", &crate::parity::TABLES),
             (crate::patch::PAGE, &crate::patch::TABLES),

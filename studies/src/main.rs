@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use cutis_studies::kit::Failure;
 use cutis_studies::{
-    accuracy, at_rest, cantilever, chainmail, closing, instructions, main_job, mutations, parity, patch,
-    peers, pictures, region, rest, speed, stability, tuning, wound,
+    accuracy, at_rest, cantilever, chainmail, closing, inputs, instructions, main_job, mutations, parity,
+    patch, peers, pictures, region, rest, speed, stability, tuning, wound,
 };
 
 /// A study and its options.
@@ -19,6 +19,7 @@ enum Study {
     Cantilever(cantilever::Options),
     Chainmail(chainmail::Options),
     Closing(closing::Options),
+    Inputs(inputs::Options),
     Instructions(instructions::Options),
     MainJob(main_job::Options),
     Mutations(mutations::Options),
@@ -42,6 +43,7 @@ impl Study {
             Self::Cantilever(options) => cantilever::run(options, out),
             Self::Chainmail(options) => chainmail::run(options, out),
             Self::Closing(options) => closing::run(options, out),
+            Self::Inputs(options) => inputs::run(options, out),
             Self::Instructions(options) => instructions::run(options, out),
             Self::MainJob(options) => main_job::run(options, out),
             Self::Mutations(options) => mutations::run(options, out),

@@ -10,6 +10,7 @@ mod determinism;
 mod gpu;
 mod growing_cut;
 mod identity;
+mod inputs;
 mod left_out;
 mod lip_contact;
 mod materials;

@@ -32,7 +32,8 @@ usage: cargo xtask COMMAND
   tidy [--all]        check the rules of sources, manifests and pages; --all also where a rule is not
                       in force yet
   licenses            check licenses, bans and sources of all dependencies with cargo-deny
-  python              compare outputs with nibabel and SimpleITK, and a bent beam with scikit-fem
+  python              compare inputs and outputs with nibabel, pydicom, pynrrd and SimpleITK, and a
+                      bent beam with scikit-fem
   lines [--at REV]    count lines per tree and language, in the checkout or in a revision of git
   publish --dry-run   pack every crate as for crates.io and build it from its package
   study NAME [OPTIONS]
@@ -46,6 +47,7 @@ usage: cargo xtask COMMAND
       cantilever      a bent beam and scikit-fem; always writes its page
       chainmail       ChainMail on scans, and position-based dynamics
       closing         what opens a cut, and the force of sutures that close an excision
+      inputs          volumes that are read or refused, with the message; needs the test data
       instructions    instructions of the inner loops per constraint, with limits; needs Valgrind
       main-job        the main job on the phantom and on real scans, with and without skin tension
       region          cost and error of a region of interest and of a graded lattice

@@ -139,7 +139,7 @@ mod tests {
             .iter()
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
-        assert_eq!(names, ["awkward.py", "cantilever.py", "outputs.py"]);
+        assert_eq!(names, ["awkward.py", "cantilever.py", "dicom.py", "formats.py", "outputs.py"]);
     }
 
     #[test]

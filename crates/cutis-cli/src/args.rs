@@ -104,7 +104,7 @@ pub(crate) enum Command {
     Convert {
         #[command(flatten)]
         volume: VolumeArgs,
-        /// File to write (.nii or .nii.gz)
+        /// File to write (.nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd)
         #[arg(long)]
         out: PathBuf,
     },
@@ -154,7 +154,7 @@ pub(crate) enum Command {
         /// Volume to deform, in the same world frame [default: the scene's own]
         #[arg(long)]
         volume: Option<PathBuf>,
-        /// File to write (.nii or .nii.gz)
+        /// File to write (.nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd)
         #[arg(long)]
         out: PathBuf,
         #[command(flatten)]

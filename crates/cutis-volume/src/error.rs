@@ -161,8 +161,8 @@ pub enum VolumeError {
     },
     /// The affine has a shear. A qform cannot represent it, and ITK refuses it.
     #[error(
-        "{path}: the voxel axes are not perpendicular (the largest cosine between two of them is {cosine:.6}). A NIfTI qform cannot hold that; \
-         resample to an orthogonal grid first"
+        "{path}: the voxel axes are not perpendicular (the largest cosine between two of them is {cosine:.6}). A NIfTI qform and a \
+         MetaImage cannot hold that; read it with volume.resample = true or --resample, which resamples to perpendicular axes"
     )]
     Sheared {
         /// Path of the file to write.

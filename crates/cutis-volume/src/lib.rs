@@ -1,4 +1,4 @@
-//! CT volumes: NIfTI files, geometry, Hounsfield-unit tables, sampling at lattice points, and a
+//! CT volumes: their files, geometry, Hounsfield-unit tables, sampling at lattice points, and a
 //! synthetic phantom.
 #![doc = ""]
 #![doc = include_str!("../README.md")]
@@ -10,7 +10,9 @@ pub mod dicom;
 mod error;
 mod grid;
 mod loaded;
+pub mod metaimage;
 pub mod nifti;
+pub mod nrrd;
 mod partial_file;
 pub mod phantom;
 mod read;

@@ -1,26 +1,31 @@
 //! Reads a CT volume of any format that the crate knows. The content decides, not the name.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use crate::voxels::Observer;
-use crate::{Loaded, VolumeError, nifti, to_perpendicular_axes};
+use crate::{Loaded, VolumeError, metaimage, nifti, nrrd, to_perpendicular_axes};
 
 /// How to read a volume.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReadOptions {
     /// Number of the DICOM series to read (attribute SeriesNumber). `None` if there is only one.
     pub series: Option<u32>,
-    /// Resample slices that are tilted or unevenly spaced to a regular grid with perpendicular axes.
+    /// Resample slices that are tilted or unevenly spaced to a regular grid with perpendicular
+    /// axes.
     pub resample: bool,
 }
 
-/// Reads a volume: a NIfTI file, or a DICOM series given by its folder or one of its files.
+/// Reads a volume: a NIfTI, NRRD or MetaImage file, or a DICOM series given by its folder or one of
+/// its files.
 ///
 /// DICOM needs the feature `dicom`.
 ///
 /// # Errors
-/// The errors of [`nifti::read`] and, with the feature `dicom`, `VolumeError::Dicom`. Each names
-/// the file. [`VolumeError::NotStacked`] if resampling is asked for and not possible.
+/// The errors of [`nifti::read`], [`nrrd::read`] and [`metaimage::read`], and, with the feature
+/// `dicom`, `VolumeError::Dicom`. Each names the file. [`VolumeError::NotStacked`] if resampling is
+/// asked for and not possible.
 pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Loaded, VolumeError> {
     read_files(path.as_ref(), options, None)
 }
@@ -28,8 +33,8 @@ pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Loaded, Vol
 /// Reads a volume as [`read`] does, and passes the bytes of its files to `observe` on the way.
 ///
 /// When the function succeeds, `observe` has received every byte of every file of the volume, in
-/// order, as they are on the disk: first the header file of a pair, and the slices of a DICOM series
-/// along their normal.
+/// order, as they are on the disk: first the header file of a pair, and the slices of a DICOM
+/// series along their normal.
 ///
 /// # Errors
 /// The errors of [`read`].
@@ -50,7 +55,13 @@ fn read_files(
     if path.is_dir() || crate::dicom::is_dicom(path) {
         return crate::dicom::read_series(path, options, observer);
     }
-    let mut loaded = nifti::read_files(path, observer)?;
+    let mut loaded = if starts_with(path, nrrd::MAGIC) {
+        nrrd::read_files(path, observer)?
+    } else if metaimage::is_metaimage(path) {
+        metaimage::read_files(path, observer)?
+    } else {
+        nifti::read_files(path, observer)?
+    };
     if options.resample && loaded.volume.grid().affine.is_sheared() {
         loaded.volume = to_perpendicular_axes(loaded.volume)?;
         loaded.warnings.retain(|warning| !warning.contains("not perpendicular"));
@@ -59,4 +70,10 @@ fn read_files(
             .push("the axes were not perpendicular: the volume was resampled to perpendicular axes".into());
     }
     Ok(loaded)
+}
+
+fn starts_with(path: &Path, magic: &[u8]) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(magic.len() as u64).read_to_end(&mut start));
+    read.is_ok() && start == magic
 }

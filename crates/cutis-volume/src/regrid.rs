@@ -1,7 +1,7 @@
 //! Resamples slices at any positions to a grid with perpendicular axes and equal distances.
 //!
-//! The new grid has the axes of the slices: rows, columns and their normal. The values of a new slice
-//! are linear along the normal between the two slices next to it, and bilinear within each of them.
+//! The new grid has the axes of the slices: rows, columns and their normal. The values of a new
+//! slice are linear along the normal between the two slices next to it, and bilinear within each.
 //! So a scan with a tilted gantry is only shifted within its slices, and slices at uneven distances
 //! are only interpolated between neighbors.
 
@@ -31,8 +31,8 @@ pub(crate) struct Regridded {
     pub(crate) hu: Vec<i16>,
     pub(crate) shape: [usize; 3],
     pub(crate) step_mm: f64,
-    /// Position of the first voxel, in mm along rows, columns and normal from the first pixel of the
-    /// first slice.
+    /// Position of the first voxel, in mm along rows, columns and normal from the first pixel of
+    /// the first slice.
     pub(crate) origin_mm: [f64; 3],
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn regrid(slices: &Slices<'_>) -> Option<Regridded> {
         let low = shifts().fold(f64::INFINITY, f64::min).round();
         let high = shifts().fold(f64::NEG_INFINITY, f64::max).round();
         // Slices that are shifted by more than their size have no common volume to speak of.
-        if !(high - low <= 4.0 * slices.size[axis] as f64) {
+        if !high.is_finite() || high - low > 4.0 * slices.size[axis] as f64 {
             return None;
         }
         first[axis] = low as i64;

@@ -24,8 +24,18 @@ pub fn switched_off(metadata: &Value) -> Result<Vec<Finding>> {
         let on = on.get(id).and_then(|features| features.as_array());
         let is_on = |name: &str| on.is_some_and(|on| on.iter().any(|feature| feature == name));
         let features = package["features"].as_object().context("a package without features")?;
+        // A feature that only turns on others has no code of its own. Those others are checked.
+        let only_forwards = |name: &str| {
+            let parts = features[name].as_array().map(Vec::as_slice).unwrap_or_default();
+            !parts.is_empty() && parts.iter().filter_map(Value::as_str).all(|part| match part.split_once('/') {
+                Some((other, feature)) => on.iter().any(|(id, on)| {
+                    is_package(id, other) && on.as_array().is_some_and(|on| on.iter().any(|name| name == feature))
+                }),
+                None => is_on(part),
+            })
+        };
         for name in features.keys().filter(|name| !OTHER_SYSTEMS.contains(&name.as_str())) {
-            if !is_on(name) {
+            if !is_on(name) && !only_forwards(name) {
                 let place = package["name"].as_str().unwrap_or(id);
                 let message = format!(
                     "feature `{name}` is off in `cargo test --workspace`, so its code is not tested: \
@@ -36,6 +46,16 @@ pub fn switched_off(metadata: &Value) -> Result<Vec<Finding>> {
         }
     }
     Ok(findings)
+}
+
+/// Whether an id such as `path+file:///work/crates/a#0.1.0` or `…/folder#a@0.1.0` is that of a
+/// package.
+fn is_package(id: &str, name: &str) -> bool {
+    let (place, version) = id.rsplit_once('#').unwrap_or((id, ""));
+    match version.split_once('@') {
+        Some((found, _)) => found == name,
+        None => place.rsplit('/').next() == Some(name),
+    }
 }
 
 #[cfg(test)]
@@ -58,6 +78,22 @@ mod tests {
         assert_eq!(count(Value::Null, json!(["default", "gpu"])), 0);
         assert_eq!(count(Value::Null, json!(["default"])), 1);
         assert_eq!(count(Value::Null, json!([])), 2);
+    }
+
+    #[test]
+    fn a_feature_that_only_forwards_to_one_that_is_on_passes() {
+        let count = |on: Value| {
+            let metadata = json!({
+                "packages": [{ "id": "path+file:///b#0.1.0", "name": "b", "source": null, "features": { "more": ["a/x"] } }],
+                "resolve": { "nodes": [
+                    { "id": "path+file:///b#0.1.0", "features": [] },
+                    { "id": "path+file:///a#0.1.0", "features": on }
+                ] }
+            });
+            switched_off(&metadata).unwrap().len()
+        };
+        assert_eq!(count(json!(["x"])), 0);
+        assert_eq!(count(json!([])), 1);
     }
 
     #[test]

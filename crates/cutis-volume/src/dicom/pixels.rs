@@ -63,8 +63,8 @@ fn stored_bytes(slice: &Slice, object: &DefaultDicomObject) -> Result<Vec<u8>, D
     }
 }
 
-/// Bits `high_bit` down to `high_bit − bits_stored + 1` are the value. The others may hold anything,
-/// for example an overlay (PS3.5, section 8.1.1).
+/// Bits `high_bit` down to `high_bit − bits_stored + 1` are the value. The others may hold
+/// anything, for example an overlay (PS3.5, section 8.1.1).
 fn stored(raw: u16, format: PixelFormat) -> i64 {
     let value = i64::from(raw) >> (format.high_bit + 1 - format.bits_stored);
     let value = value & ((1 << format.bits_stored) - 1);

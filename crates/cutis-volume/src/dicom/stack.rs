@@ -74,16 +74,17 @@ impl Stack {
         let whole = |gap: f64| (gap / least - (gap / least).round()).abs() <= UNEVEN_SHARE;
         let thick = |slice: &Slice| slice.thickness_mm.unwrap_or(0.0);
         let even_thickness = slices.iter().all(|slice| (thick(slice) - thick(&slices[0])).abs() <= 1e-3);
-        if mostly_equal && even_thickness && gaps.iter().all(|&gap| whole(gap)) {
-            if let Some(n) = gaps.iter().position(|&gap| (gap / least).round() >= 2.0) {
-                return Err(DicomError::MissingSlices {
-                    before: slices[n].path.clone(),
-                    after: slices[n + 1].path.clone(),
-                    gap_mm: gaps[n],
-                    usual_mm: least,
-                    count: (gaps[n] / least).round() as u32 - 1,
-                });
-            }
+        let double = gaps.iter().position(|&gap| (gap / least).round() >= 2.0);
+        if let Some(n) =
+            double.filter(|_| mostly_equal && even_thickness && gaps.iter().all(|&gap| whole(gap)))
+        {
+            return Err(DicomError::MissingSlices {
+                before: slices[n].path.clone(),
+                after: slices[n + 1].path.clone(),
+                gap_mm: gaps[n],
+                usual_mm: least,
+                count: (gaps[n] / least).round() as u32 - 1,
+            });
         }
         let mean = along_mm[along_mm.len() - 1] / gaps.len() as f64;
         Ok(Some(Gaps { least, most, mean, usual }))

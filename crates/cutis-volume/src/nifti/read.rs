@@ -59,7 +59,7 @@ pub(crate) fn read_files(
     mut observer: Option<&mut Observer<'_>>,
 ) -> Result<Loaded, VolumeError> {
     if path.is_dir() {
-        let reason = "it is a folder, and this build of Cutis has no support for DICOM (feature dicom)";
+        let reason = "it is a folder: a DICOM series is read by builds with the feature dicom, and dcm2niix converts it to one file";
         return Err(VolumeError::NotNifti { path: path.into(), reason });
     }
     let pair = pair(path)?;

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::encode::encode;
-use crate::voxels::GzipWriter;
+use crate::voxels::{GzipWriter, fits_int16};
 use crate::{Grid, PartialFile, Volume, VolumeError};
 
 /// Number of voxels converted to bytes at a time.
@@ -20,12 +20,11 @@ const PORTION: usize = 1 << 16;
 /// The errors of [`Writer::create`] and [`Writer::push_slices`].
 pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), VolumeError> {
     let path = path.as_ref();
-    let whole = |hu: f32| hu == hu.trunc() && (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&hu);
     if volume.slope() == 1.0 && volume.intercept() == 0.0 {
         let mut writer = Writer::create(path, *volume.grid())?;
         writer.push_slices(volume.voxels())?;
         writer.finish()
-    } else if volume.voxels().iter().all(|&stored| whole(volume.hu(stored))) {
+    } else if fits_int16(volume) {
         let mut writer = Writer::create(path, *volume.grid())?;
         for portion in volume.voxels().chunks(PORTION) {
             let hu: Vec<i16> = portion.iter().map(|&stored| volume.hu(stored) as i16).collect();

@@ -31,7 +31,7 @@ pub(crate) fn decode(
 ) -> Result<Loaded, VolumeError> {
     let path: PathBuf = source.path.clone();
     let &Layout { shape, affine, dtype, .. } = layout;
-    let too_large = || VolumeError::TooLarge { path: path.clone(), shape: shape };
+    let too_large = || VolumeError::TooLarge { path: path.clone(), shape };
     let count = shape.iter().try_fold(1u64, |count, &n| count.checked_mul(n)).ok_or_else(too_large)?;
     let bytes = count.checked_mul(dtype.bytes() as u64).ok_or_else(too_large)?;
     let voxels = usize::try_from(count).map_err(|_| too_large())?;

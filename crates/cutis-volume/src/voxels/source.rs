@@ -1,5 +1,5 @@
-//! Reads the bytes of a volume file, decompresses them, and limits the work to the size given in the
-//! header.
+//! Reads the bytes of a volume file, decompresses them, and limits the work to the size given in
+//! the header.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -47,12 +47,28 @@ pub(crate) struct Source<'a> {
 
 impl<'a> Source<'a> {
     pub(crate) fn open(path: &Path, observer: Option<&'a mut Observer<'a>>) -> Result<Self, VolumeError> {
+        Self::open_file(path, observer, true)
+    }
+
+    /// Opens a file that is not compressed as a whole, for any first bytes.
+    pub(crate) fn open_plain(
+        path: &Path,
+        observer: Option<&'a mut Observer<'a>>,
+    ) -> Result<Self, VolumeError> {
+        Self::open_file(path, observer, false)
+    }
+
+    fn open_file(
+        path: &Path,
+        observer: Option<&'a mut Observer<'a>>,
+        detect: bool,
+    ) -> Result<Self, VolumeError> {
         let failed = |source| VolumeError::Io { path: path.into(), action: "read", source };
         let mut file = File::open(path).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
         let mut magic = Vec::with_capacity(2);
         file.by_ref().take(2).read_to_end(&mut magic).map_err(failed)?;
-        let compressed = magic == [0x1f, 0x8b];
+        let compressed = detect && magic == [0x1f, 0x8b];
         let observed = Observed { path: path.into(), file: io::Cursor::new(magic).chain(file), observer };
         let buffered = BufReader::with_capacity(PORTION, observed);
         let stream = match compressed {

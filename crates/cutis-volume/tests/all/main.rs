@@ -6,3 +6,4 @@ mod dicom;
 mod hostile;
 mod phantom;
 mod round_trip;
+mod text_formats;

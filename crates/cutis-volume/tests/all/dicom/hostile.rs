@@ -1,5 +1,5 @@
-//! Damaged files give a typed error that names them. Nothing panics, and nothing allocates more than
-//! the files can hold.
+//! Damaged files give a typed error that names them. Nothing panics, and nothing allocates more
+//! than the files can hold.
 
 use std::fs;
 

@@ -9,6 +9,8 @@ use cutis_volume::{ReadOptions, VolumeError, dicom::DicomError};
 const RESAMPLE: ReadOptions = ReadOptions { series: None, resample: true };
 /// Sum of HU of the slice in `transfer_syntaxes`, as pydicom and GDCM read it.
 const SUM: f64 = -248_794_693.0;
+/// Sum of HU of `abdomen_j2k`, as pydicom and GDCM read it.
+const SUM_ABDOMEN: f64 = -3_272_217_339.0;
 
 fn refused(name: &str, options: &ReadOptions) -> Option<DicomError> {
     let folder = scans::find(&format!("dicom/{name}"))?;
@@ -80,6 +82,8 @@ fn jpeg_2000_is_read_with_its_feature() {
     match cutis_volume::read(folder, &ReadOptions::default()) {
         Ok(loaded) if cfg!(feature = "dicom-jpeg2000") => {
             assert_eq!(loaded.volume.grid().shape, [512, 512, 20]);
+            // The sum of pydicom with GDCM.
+            assert_eq!(loaded.stats.sum, SUM_ABDOMEN);
             assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
         }
         Err(error) if !cfg!(feature = "dicom-jpeg2000") => {

@@ -120,12 +120,13 @@ fn eight_bit_pixels_are_read() {
 
 #[test]
 fn what_has_no_hu_is_refused_by_name() {
-    let refused = |change: fn(Slice) -> Slice| {
+    type Change = fn(Slice) -> Slice;
+    let refused = |change: Change| {
         let error = Folder::of(&[Slice::at(0.0), change(Slice::at(2.0))]).refused();
         assert!(error.to_string().contains("1.dcm"), "{error}");
         error.to_string()
     };
-    let cases: [(&str, fn(Slice) -> Slice); 12] = [
+    let cases: [(&str, Change); 12] = [
         ("RescaleIntercept", |slice| slice.without(0x0028_1052)),
         ("RescaleSlope is 0", |slice| slice.text(0x0028_1053, VR::DS, "0")),
         ("RescaleSlope is many", |slice| slice.text(0x0028_1053, VR::DS, "many")),
