@@ -21,18 +21,20 @@ pub fn switched_off(metadata: &Value) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
     for package in packages.iter().filter(|package| package["source"].is_null()) {
         let id = package["id"].as_str().context("a package without an id")?;
-        let on = on.get(id).and_then(|features| features.as_array());
-        let is_on = |name: &str| on.is_some_and(|on| on.iter().any(|feature| feature == name));
+        let own = on.get(id).and_then(|features| features.as_array());
+        let is_on = |name: &str| own.is_some_and(|own| own.iter().any(|feature| feature == name));
         let features = package["features"].as_object().context("a package without features")?;
         // A feature that only turns on others has no code of its own. Those others are checked.
         let only_forwards = |name: &str| {
             let parts = features[name].as_array().map(Vec::as_slice).unwrap_or_default();
-            !parts.is_empty() && parts.iter().filter_map(Value::as_str).all(|part| match part.split_once('/') {
-                Some((other, feature)) => on.iter().any(|(id, on)| {
-                    is_package(id, other) && on.as_array().is_some_and(|on| on.iter().any(|name| name == feature))
-                }),
-                None => is_on(part),
-            })
+            !parts.is_empty()
+                && parts.iter().filter_map(Value::as_str).all(|part| match part.split_once('/') {
+                    Some((other, feature)) => on.iter().any(|(id, its)| {
+                        let has = its.as_array().is_some_and(|its| its.iter().any(|name| name == feature));
+                        is_package(id, other) && has
+                    }),
+                    None => is_on(part),
+                })
         };
         for name in features.keys().filter(|name| !OTHER_SYSTEMS.contains(&name.as_str())) {
             if !is_on(name) && !only_forwards(name) {

@@ -1,5 +1,5 @@
 //! Checks of compressed pixels before they are decoded: each codestream states its own size, which
-//! must be that of the slice. A decoder would otherwise write beyond the slice, or fill only a part.
+//! must be that of the slice. Else a decoder would write beyond the slice, or fill a part of it.
 
 use std::path::Path;
 
