@@ -7,6 +7,7 @@ mod bad_scenes;
 mod bad_values;
 mod chainmail;
 mod determinism;
+mod dicom;
 mod gpu;
 mod growing_cut;
 mod identity;

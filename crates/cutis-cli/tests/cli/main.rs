@@ -1,5 +1,6 @@
 //! The program as users and scripts see it: exit codes, messages, JSON, and complete files or none.
 
+mod convert;
 mod disk;
 mod exit_codes;
 #[cfg(feature = "gpu")]

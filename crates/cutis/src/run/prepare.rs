@@ -46,7 +46,7 @@ fn refuse_sheared(loaded: &LoadedScene, source: &Source) -> Result<(), Error> {
     if !(loaded.scene.output.volume && source.volume.grid().affine.is_sheared()) {
         return Ok(());
     }
-    let why = "cannot be written: the axes of the CT are not at right angles; resample it to an orthogonal \
-               grid first, or leave this output out";
+    let why = "cannot be written: the axes of the CT are not at right angles; volume.resample = true \
+               resamples it to perpendicular axes; or leave this output out";
     Err(loaded.file().bad_key("output.volume", "true", why))
 }

@@ -98,14 +98,26 @@ impl Scene {
     }
 
     fn validate_volume(&self, check: &Check<'_>) -> Result<(), Error> {
-        match (&self.volume.path, &self.volume.phantom) {
+        let section = &self.volume;
+        let file = section.path.is_some();
+        let why = "is for a volume that is read: it needs `path`";
+        if let Some(series) = section.series {
+            check.require(file, "volume.series", series, why)?;
+        }
+        check.require(file || !section.resample, "volume.resample", section.resample, why)?;
+        match (&section.path, &section.phantom) {
             (Some(path), None) => {
                 let name = path.to_string_lossy();
-                check.require(!name.is_empty(), "volume.path", "", "must name a NIfTI file")
+                check.require(
+                    !name.is_empty(),
+                    "volume.path",
+                    "",
+                    "must name a volume file or a DICOM folder",
+                )
             }
             (None, Some(phantom)) => check.point("volume.phantom.turn_deg", phantom.turn_deg),
             _ => {
-                let why = "must have exactly one of `path` (a NIfTI file) and `phantom` (a size and a seed)";
+                let why = "must have exactly one of `path` (a volume file or a DICOM folder) and `phantom` (a size and a seed)";
                 check.require(false, "volume", "", why)
             }
         }

@@ -5,6 +5,8 @@ use std::fs;
 
 use cutis_test_kit::scans;
 use cutis_volume::{ReadOptions, VolumeError, dicom::DicomError};
+use dicom_core::value::{PixelFragmentSequence, Value};
+use dicom_core::{DataElement, VR};
 
 const RESAMPLE: ReadOptions = ReadOptions { series: None, resample: true };
 /// Sum of HU of the slice in `transfer_syntaxes`, as pydicom and GDCM read it.
@@ -91,4 +93,22 @@ fn jpeg_2000_is_read_with_its_feature() {
         }
         other => panic!("{other:?}"),
     }
+}
+
+#[test]
+fn a_frame_in_several_fragments_is_read() {
+    let name = "dicom/transfer_syntaxes/CTImage.dcm_JPEGProcess14SV1TransferSyntax_1.2.840.10008.1.2.4.70.dcm";
+    let Some(file) = scans::find(name) else { return };
+    let mut object = dicom_object::open_file(file).unwrap();
+    let tag = dicom_core::Tag(0x7fe0, 0x0010);
+    let stream = object.element(tag).unwrap().fragments().unwrap().concat();
+    // Three fragments of even size.
+    let fragments: Vec<Vec<u8>> = stream.chunks(stream.len() / 3 & !1).map(<[u8]>::to_vec).collect();
+    assert!(fragments.len() > 2);
+    let pixels = PixelFragmentSequence::new(Vec::<u32>::new(), fragments);
+    object.put(DataElement::new(tag, VR::OB, Value::PixelSequence(pixels)));
+    let folder = tempfile::tempdir().unwrap();
+    object.write_to_file(folder.path().join("slice.dcm")).unwrap();
+    let loaded = cutis_volume::read(folder.path(), &ReadOptions::default()).unwrap();
+    assert_eq!(loaded.stats.sum, SUM);
 }
