@@ -103,7 +103,7 @@ fn a_frame_in_several_fragments_is_read() {
     let tag = dicom_core::Tag(0x7fe0, 0x0010);
     let stream = object.element(tag).unwrap().fragments().unwrap().concat();
     // Three fragments of even size.
-    let fragments: Vec<Vec<u8>> = stream.chunks(stream.len() / 3 & !1).map(<[u8]>::to_vec).collect();
+    let fragments: Vec<Vec<u8>> = stream.chunks((stream.len() / 3) & !1).map(<[u8]>::to_vec).collect();
     assert!(fragments.len() > 2);
     let pixels = PixelFragmentSequence::new(Vec::<u32>::new(), fragments);
     object.put(DataElement::new(tag, VR::OB, Value::PixelSequence(pixels)));
