@@ -47,18 +47,21 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     Ok(checks.pass())
 }
 
+/// Tables with their names.
+pub type Tables = [(&'static str, Table); 3];
+
 /// The tables of outcomes, by name, and the checks.
 ///
 /// # Errors
 /// The test data are missing.
-pub fn outcomes(folder: &Path) -> Result<([(&'static str, Table); 3], Checks), Failure> {
+pub fn outcomes(folder: &Path) -> Result<(Tables, Checks), Failure> {
     let mut checks = Checks::default();
     let mut series = Table::new(["folder", "as it is", "with `volume.resample`"]);
     for path in entries(&folder.join("dicom"))? {
         let plain = ReadOptions::default();
         let resample = ReadOptions { resample: true, ..plain };
         let cells = [plain, resample].map(|options| outcome(&path, &options, &path, &mut checks));
-        series.add([name(&path), cells[0].clone(), cells[1].clone()]);
+        series.add([format!("`{}`", name(&path)), cells[0].clone(), cells[1].clone()]);
     }
     let mut syntaxes = Table::new(["transfer syntax", "outcome"]);
     for path in entries(&folder.join("dicom/transfer_syntaxes"))? {
@@ -71,9 +74,19 @@ pub fn outcomes(folder: &Path) -> Result<([(&'static str, Table); 3], Checks), F
     let mut nifti = Table::new(["file", "outcome"]);
     for path in entries(&folder.join("awkward"))? {
         let outcome = outcome(&path, &ReadOptions::default(), &path, &mut checks);
-        nifti.add([name(&path), outcome]);
+        nifti.add([format!("`{}`", name(&path)), outcome]);
     }
+    checks.control("half of a file is refused", half_is_refused(&folder.join("awkward/plain_i16.nii"))?);
     Ok(([("series", series), ("syntaxes", syntaxes), ("nifti", nifti)], checks))
+}
+
+/// Whether the first half of a file is refused.
+fn half_is_refused(path: &Path) -> Result<bool, Failure> {
+    let bytes = fs::read(path)?;
+    let folder = tempfile::tempdir()?;
+    let half = folder.path().join("half.nii");
+    fs::write(&half, &bytes[..bytes.len() / 2])?;
+    Ok(cutis::volume::read(&half, &ReadOptions::default()).is_err())
 }
 
 /// Files and folders in order of name.
@@ -120,13 +133,20 @@ fn outcome(path: &Path, options: &ReadOptions, hidden: &Path, checks: &mut Check
     }
 }
 
+/// A value with at most three digits after the point.
+fn rounded(value: f64) -> f64 {
+    (1000.0 * value).round() / 1000.0
+}
+
 fn describe(loaded: &Loaded) -> String {
     let grid = loaded.volume.grid();
     let ([nx, ny, nz], [sx, sy, sz]) = (grid.shape, grid.affine.spacing_mm());
     let orientation: String = grid.affine.orientation().iter().collect();
     let mut text = format!(
         "{nx} × {ny} × {nz} voxels of {sx:.3} × {sy:.3} × {sz:.3} mm, {orientation}, {}, {} to {} HU",
-        loaded.dtype, loaded.stats.min, loaded.stats.max
+        loaded.dtype,
+        rounded(loaded.stats.min),
+        rounded(loaded.stats.max)
     );
     loaded.warnings.iter().for_each(|warning| text += &format!("; {warning}"));
     text

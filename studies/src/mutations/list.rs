@@ -32,13 +32,11 @@ pub enum Suite {
     ChainMail,
     /// Pictures, meshes, tables and reports against known landmarks.
     Outputs,
-    /// File formats: DICOM, NRRD and MetaImage.
-    Inputs,
 }
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 7] = [
         Self::Conformance,
         Self::Solver,
         Self::Resample,
@@ -46,7 +44,6 @@ impl Suite {
         Self::Stability,
         Self::ChainMail,
         Self::Outputs,
-        Self::Inputs,
     ];
 
     /// Name on the command line and in the page.
@@ -59,7 +56,6 @@ impl Suite {
             Self::Stability => "stability",
             Self::ChainMail => "chainmail",
             Self::Outputs => "outputs",
-            Self::Inputs => "inputs",
         }
     }
 
@@ -72,17 +68,6 @@ impl Suite {
             Self::Problems => &["-p", "cutis-tests", "--test", "all", "problems::"],
             Self::Stability => &["-p", "cutis-tests", "--test", "all", "stability::"],
             Self::ChainMail => &["-p", "cutis-chainmail", "--features", "gpu", "--tests"],
-            Self::Inputs => &[
-                "-p",
-                "cutis-volume",
-                "--features",
-                "dicom-jpeg2000",
-                "--test",
-                "all",
-                "--",
-                "dicom::",
-                "text_formats::",
-            ],
             Self::Outputs => &[
                 "-p",
                 "cutis-tests",

@@ -2,7 +2,6 @@
 //! must fail for each.
 
 mod chainmail;
-mod inputs;
 mod list;
 mod outputs;
 mod stability;
@@ -15,7 +14,6 @@ use anyhow::{Context, bail, ensure};
 use clap::Parser;
 
 use self::chainmail::CHAINMAIL;
-use self::inputs::INPUTS;
 use self::list::{MUTATIONS, Mutation, Suite};
 use self::outputs::OUTPUTS;
 use self::stability::STABILITY;
@@ -44,7 +42,7 @@ impl Options {
 
 /// All mutations.
 fn all() -> impl Iterator<Item = &'static Mutation> {
-    MUTATIONS.iter().chain(STABILITY).chain(CHAINMAIL).chain(OUTPUTS).chain(INPUTS)
+    MUTATIONS.iter().chain(STABILITY).chain(CHAINMAIL).chain(OUTPUTS)
 }
 
 /// Tables of the page: faults and provenance of each suite.

@@ -95,9 +95,7 @@ impl Header {
         check_orientation(&fields, &affine, warnings);
         let data_file = match fields.get(&["ElementDataFile"]) {
             Some("LOCAL" | "Local" | "local") => None,
-            Some(name) if !name.is_empty() && !name.starts_with("LIST") && !name.contains('%') => {
-                Some(name.to_owned())
-            }
+            Some(name) if is_one_file(name) => Some(name.to_owned()),
             _ => return Err(fields.invalid(&["ElementDataFile"], "LOCAL, or one file with all voxels")),
         };
         let whole = |name: &'static str| -> Result<Option<i64>, VolumeError> {
@@ -128,6 +126,12 @@ impl Header {
             skip,
         })
     }
+}
+
+/// Whether a value of `ElementDataFile` names one file, and not a list or a pattern.
+fn is_one_file(name: &str) -> bool {
+    let several = name.starts_with("LIST") || name.contains('%');
+    !name.is_empty() && !several && !name.chars().any(char::is_control)
 }
 
 fn dtype(fields: &Fields<'_>) -> Result<VoxelType, VolumeError> {

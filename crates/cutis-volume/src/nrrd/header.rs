@@ -74,7 +74,8 @@ impl Header {
         let (shape, axes) = shape(&fields)?;
         let affine = affine(&fields, &axes, warnings)?;
         let data_file = fields.get("data file").or(fields.get("datafile")).map(str::to_owned);
-        if data_file.as_deref().is_some_and(|name| name.starts_with("LIST") || name.contains('%')) {
+        let several = |name: &str| name.starts_with("LIST") || name.contains('%');
+        if data_file.as_deref().is_some_and(|name| several(name) || name.chars().any(char::is_control)) {
             return Err(fields.invalid("data file", "one file with all voxels"));
         }
         if fields.get("line skip").is_some_and(|skip| skip != "0") {

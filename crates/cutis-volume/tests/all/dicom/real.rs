@@ -97,7 +97,8 @@ fn jpeg_2000_is_read_with_its_feature() {
 
 #[test]
 fn a_frame_in_several_fragments_is_read() {
-    let name = "dicom/transfer_syntaxes/CTImage.dcm_JPEGProcess14SV1TransferSyntax_1.2.840.10008.1.2.4.70.dcm";
+    let name =
+        "dicom/transfer_syntaxes/CTImage.dcm_JPEGProcess14SV1TransferSyntax_1.2.840.10008.1.2.4.70.dcm";
     let Some(file) = scans::find(name) else { return };
     let mut object = dicom_object::open_file(file).unwrap();
     let tag = dicom_core::Tag(0x7fe0, 0x0010);
