@@ -15,6 +15,7 @@ mod inputs;
 mod left_out;
 mod lip_contact;
 mod materials;
+mod no_skin;
 mod no_width;
 mod outputs;
 mod paper_form;

@@ -8,7 +8,8 @@ fn skin(volume: &Volume, mode: SkinMode, lattice: LatticeSize) -> SkinReport {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("solid.nii.gz");
     nifti::write(&file, volume).unwrap();
-    let request = SkinRequest { read: Default::default(), lattice, split: Split::Kuhn6, mode };
+    let request =
+        SkinRequest { read: Default::default(), lattice, split: Split::Kuhn6, mode, offset_hu: 0.0 };
     cutis::find_skin(&file, &request, None, &Silent).unwrap()
 }
 

@@ -121,6 +121,9 @@ pub(crate) enum Command {
         /// How a lattice cell is split
         #[arg(long, value_parser = one_of(&SPLITS), default_value = "kuhn6")]
         split: Split,
+        /// HU to add to every value of the file, as volume.offset_hu of a scene
+        #[arg(long, value_name = "HU", default_value_t = 0.0, allow_negative_numbers = true)]
+        offset_hu: f32,
         /// Write the triangles (.vtu or .vtp)
         #[arg(long)]
         out: Option<PathBuf>,

@@ -16,6 +16,8 @@ use cutis_solver::SolverError;
 use cutis_solver_cpu::CpuError;
 use cutis_volume::VolumeError;
 
+use crate::NoSkin;
+
 /// An error of the pipeline.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -73,6 +75,14 @@ pub enum Error {
         backend: String,
         /// The reason, and what to use instead.
         why: String,
+    },
+    /// A CT has no skin.
+    #[error("{}: there is no skin: {why}", ct.display())]
+    NoSkin {
+        /// The CT.
+        ct: PathBuf,
+        /// The reason, and what to change.
+        why: NoSkin,
     },
     /// An error of a volume, its file or a table.
     #[error(transparent)]
@@ -169,6 +179,7 @@ impl Error {
             | Self::Request { .. }
             | Self::Backend { .. }
             | Self::Checkpoint { .. }
+            | Self::NoSkin { .. }
             | Self::Material(_)
             | Self::Skin(_)
             | Self::Chain(_)

@@ -50,7 +50,7 @@ pub use cutis_solver_gpu as solver_gpu;
 pub use cutis_volume as volume;
 
 pub use backend::{Device, DeviceLimits, Devices, devices};
-pub use body::{SkinRequest, find_skin};
+pub use body::{NoSkin, SkinRequest, find_skin};
 pub use cost::{CostPart, CostReport, Plan, check};
 pub use ct::{FolderInspection, Inspection, Series, convert, inspect, inspect_folder};
 pub use error::Error;

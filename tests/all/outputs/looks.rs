@@ -48,6 +48,7 @@ fn the_skin_of_a_file_lies_on_the_body() {
         lattice: LatticeSize::Native,
         split: Split::Kuhn6,
         mode: SkinMode::Exterior,
+        offset_hu: 0.0,
     };
     let (report, bytes) = with_file(&ct(), |path| {
         let out = path.with_file_name("skin.vtu");

@@ -92,10 +92,11 @@ pub(crate) fn skin(
     lattice: LatticeSize,
     mode: SkinMode,
     split: Split,
+    offset_hu: f32,
     out: Option<&Path>,
     json: bool,
 ) -> Result<(), Error> {
-    let request = SkinRequest { read: volume.options(), lattice, split, mode };
+    let request = SkinRequest { read: volume.options(), lattice, split, mode, offset_hu };
     let report = cutis::find_skin(&volume.path, &request, out, &Terminal::new())?;
     print(&if json { pretty(&report) } else { skin_page(&report, out) });
     Ok(())

@@ -25,8 +25,8 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
         }
         Command::Inspect { volume, json } => look::inspect(&volume, json),
         Command::Convert { volume, out } => look::convert(&volume, &out),
-        Command::Skin { volume, lattice, mode, split, out, json } => {
-            look::skin(&volume, lattice, mode, split, out.as_deref(), json)
+        Command::Skin { volume, lattice, mode, split, offset_hu, out, json } => {
+            look::skin(&volume, lattice, mode, split, offset_hu, out.as_deref(), json)
         }
         Command::Phantom { size, seed, turn_deg, out } => look::phantom(size, seed, &turn_deg, &out),
         Command::Render { volume, out, side, slice, window, focus, zoom, pixels } => {

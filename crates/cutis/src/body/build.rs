@@ -8,7 +8,9 @@ use nalgebra::Point3;
 
 use super::cut_error::cut_error;
 use super::lattice::lattice;
-use super::{Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, region, sutures};
+use super::{
+    Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, no_skin, region, sutures,
+};
 use crate::Error;
 use crate::scene::Keep;
 
@@ -19,6 +21,10 @@ impl Body {
     /// [`Error`] for a section that does not work with this CT.
     pub(crate) fn build(sections: &BodySections<'_>, volume: &Volume) -> Result<Self, Error> {
         let BodySections { file, tissue, incisions, ref underminings, excisions, .. } = *sections;
+        let no_skin = |why| file.blame("volume")(Error::NoSkin { ct: sections.ct.into(), why });
+        if sections.skin.is_some() {
+            no_skin::refuse_offset(volume, tissue.air_below_hu, "volume.offset_hu").map_err(no_skin)?;
+        }
         let lattice = lattice(sections, volume)?;
         let hu = lattice.sample(volume)?;
         let air = air(&hu, tissue.air_below_hu);
@@ -26,6 +32,13 @@ impl Body {
         let found = Tissue { air: &air, cut_away: &tissue.cut_planes, largest_component };
         let mut warnings = Vec::new();
         let (whole, skin) = find_tissue(sections, &lattice, &found, &mut warnings)?;
+        if let Some(Skin { report, .. }) = skin.as_ref().filter(|skin| skin.triangles.is_empty()) {
+            let why = no_skin::reason(volume, tissue.air_below_hu, report);
+            match sections.cuts() || sections.smooth_skin {
+                true => return Err(no_skin(why)),
+                false => warnings.push(format!("there is no skin: {why}")),
+            }
+        }
         let (skin, skin_report) = skin.map(|skin| (skin.triangles, skin.report)).unzip();
         let skin: Vec<[u32; 3]> = skin.unwrap_or_default();
         let whole = if sections.smooth_skin { smooth(sections, whole, &hu, &skin)? } else { whole };

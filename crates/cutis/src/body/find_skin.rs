@@ -8,7 +8,8 @@ use cutis_volume::sample::LatticeSize;
 use cutis_volume::{ReadOptions, sample};
 use nalgebra::Point3;
 
-use super::{AIR_BELOW_HU, air};
+use super::{AIR_BELOW_HU, air, no_skin};
+use crate::ct::source::with_offset;
 use crate::{Error, Progress};
 
 /// The rule by which the skin is found, and the lattice.
@@ -22,13 +23,15 @@ pub struct SkinRequest {
     pub split: Split,
     /// Rule by which skin triangles are chosen.
     pub mode: SkinMode,
+    /// HU that are added to every value of the file, as `volume.offset_hu` of a scene.
+    pub offset_hu: f32,
 }
 
 /// Finds the skin of a volume file. If `out` is given, writes its triangles (`.vtu` or `.vtp`).
 ///
 /// # Errors
-/// [`Error`] for a volume that cannot be read, a lattice that does not fit, or a file that cannot
-/// be written.
+/// [`Error`] for a volume that cannot be read or has no skin, a lattice that does not fit, or a
+/// file that cannot be written.
 pub fn find_skin(
     volume: &Path,
     request: &SkinRequest,
@@ -38,14 +41,21 @@ pub fn find_skin(
     if let Some(path) = out {
         check_extension(path)?;
     }
+    let named = volume;
     progress.begin("read the CT", 0);
     let volume = cutis_volume::read(volume, &request.read)?.volume;
     progress.end();
+    let no_skin = |why| Error::NoSkin { ct: named.into(), why };
+    let volume = with_offset(volume, request.offset_hu)?;
+    no_skin::refuse_offset(&volume, AIR_BELOW_HU, "--offset-hu").map_err(no_skin)?;
     progress.begin("detect the skin", 0);
     let lattice = Lattice::new(sample::lattice_grid(volume.grid(), request.lattice)?, request.split)?;
     let air = air(&sample::to_grid(&volume, lattice.grid())?, AIR_BELOW_HU);
     let found = skin::detect(&lattice, &air, request.mode, &SkinOptions::default())?;
     progress.end();
+    if found.triangles.is_empty() {
+        return Err(no_skin(no_skin::reason(&volume, AIR_BELOW_HU, &found.report)));
+    }
     if let Some(path) = out {
         write(path, &lattice, &found)?;
     }

@@ -9,6 +9,7 @@ mod handles;
 mod lattice;
 mod materials;
 mod membrane;
+mod no_skin;
 mod region;
 mod sections;
 mod sutures;
@@ -26,6 +27,8 @@ pub(crate) use lattice::even_shape;
 pub(crate) use lattice::lattice;
 pub(crate) use materials::BodyMaterials;
 pub(crate) use membrane::{Membrane, Tangent};
+pub use no_skin::NoSkin;
+pub(crate) use no_skin::offset_warning;
 pub(crate) use sections::{BodySections, needs_skin, smooth_skin};
 
 /// HU below which a lattice point is air, unless a scene says otherwise: the HU at which opacity

@@ -1,5 +1,7 @@
 //! The sections of a scene that a body is built from.
 
+use std::path::Path;
+
 use cutis_mesh::{Excision, Incision, SkinMode, Undermining};
 
 use super::growing::Timing;
@@ -13,6 +15,8 @@ use crate::scene::{
 #[derive(Clone)]
 pub(crate) struct BodySections<'a> {
     pub(crate) file: SceneFile<'a>,
+    /// The name of the CT in messages.
+    pub(crate) ct: &'a Path,
     pub(crate) lattice: &'a LatticeSection,
     pub(crate) tissue: &'a TissueSection,
     /// Rule by which the skin is found; none if the scene does not need the skin.
@@ -47,6 +51,7 @@ impl<'a> BodySections<'a> {
         let times = Timing::all(scene);
         Self {
             file: loaded.file(),
+            ct: scene.volume.path.as_deref().unwrap_or(Path::new("phantom")),
             lattice: &scene.lattice,
             tissue: &scene.tissue,
             skin: needs_skin(scene).then_some(scene.skin.mode),
@@ -67,6 +72,13 @@ impl<'a> BodySections<'a> {
             sutures: if scene.model == ModelChoice::Pbd { &scene.suture } else { &[] },
             closes: scene.suture.iter().filter_map(|suture| scene.wound(&suture.wound)).collect(),
         }
+    }
+}
+
+impl BodySections<'_> {
+    /// Whether something cuts the body.
+    pub(super) fn cuts(&self) -> bool {
+        !self.incisions.is_empty() || !self.excisions.is_empty()
     }
 }
 

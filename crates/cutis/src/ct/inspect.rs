@@ -6,6 +6,7 @@ use cutis_volume::{Loaded, ReadOptions};
 use serde::Serialize;
 
 use crate::Error;
+use crate::body::offset_warning;
 
 /// Facts about a volume file.
 #[derive(Clone, Debug, Serialize)]
@@ -40,7 +41,8 @@ pub fn inspect(path: &Path, options: &ReadOptions) -> Result<Inspection, Error> 
     Ok(describe(cutis_volume::read(path, options)?))
 }
 
-fn describe(loaded: Loaded) -> Inspection {
+fn describe(mut loaded: Loaded) -> Inspection {
+    loaded.warnings.extend(offset_warning(&loaded.volume));
     let grid = loaded.volume.grid();
     Inspection {
         shape: grid.shape,

@@ -19,11 +19,28 @@ pub(crate) struct Source {
     pub(crate) warnings: Vec<String>,
 }
 
-/// Reads or makes the CT.
+/// Reads or makes the CT, and adds `volume.offset_hu`.
 ///
 /// # Errors
 /// [`Error::Volume`] for a file that cannot be read, [`Error`] for a phantom that cannot be made.
 pub(crate) fn load(loaded: &LoadedScene) -> Result<Source, Error> {
+    let source = read(loaded)?;
+    Ok(Source { volume: with_offset(source.volume, loaded.scene.volume.offset_hu)?, ..source })
+}
+
+/// Adds `hu` to every value of a volume.
+///
+/// # Errors
+/// [`Error::Volume`] if the sum with its intercept is not finite.
+pub(crate) fn with_offset(volume: Volume, hu: f32) -> Result<Volume, Error> {
+    if hu == 0.0 {
+        return Ok(volume);
+    }
+    let (grid, slope, intercept) = (*volume.grid(), volume.slope(), volume.intercept());
+    Ok(Volume::new(grid, volume.into_voxels(), slope, intercept + hu)?)
+}
+
+fn read(loaded: &LoadedScene) -> Result<Source, Error> {
     let scene_input =
         Input { path: loaded.file.display().to_string(), sha256: files::sha256_of(loaded.text.as_bytes()) };
     let section = &loaded.scene.volume;

@@ -6,6 +6,9 @@ use cutis_solver::Formulation;
 use super::*;
 use crate::{Error, model};
 
+/// Largest value that is added to the HU of a file. Offsets of 1000, 1024, 8192 and 32768 are known.
+const MOST_OFFSET_HU: f32 = 32768.0;
+
 /// Checks values of one scene file; the first bad value is an error.
 pub(crate) struct Check<'a> {
     pub(crate) file: SceneFile<'a>,
@@ -105,6 +108,11 @@ impl Scene {
             check.require(file, "volume.series", series, why)?;
         }
         check.require(file || !section.resample, "volume.resample", section.resample, why)?;
+        let (key, offset) = ("volume.offset_hu", section.offset_hu);
+        let range = format!("must lie between -{MOST_OFFSET_HU} and {MOST_OFFSET_HU} HU");
+        check.require(offset.abs() <= MOST_OFFSET_HU, key, offset, &range)?;
+        let why = "must be left out next to `phantom`, whose values are HU";
+        check.require(offset == 0.0 || section.phantom.is_none(), key, offset, why)?;
         match (&section.path, &section.phantom) {
             (Some(path), None) => {
                 let name = path.to_string_lossy();

@@ -29,6 +29,10 @@ pub struct VolumeSection {
     /// deformed volume cannot be written.
     #[serde(default, skip_serializing_if = "is_false")]
     pub resample: bool,
+    /// HU that are added to every value of the file, for a CT that was stored with an offset and
+    /// without an intercept. If air is 0 in the file, it is -1024.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset_hu: f32,
     /// The built-in synthetic torso, used instead of a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phantom: Option<PhantomSection>,
@@ -43,6 +47,10 @@ impl VolumeSection {
 
 fn is_false(value: &bool) -> bool {
     !value
+}
+
+fn is_zero(hu: &f32) -> bool {
+    *hu == 0.0
 }
 
 /// The synthetic torso.
