@@ -9,6 +9,7 @@ mod affine;
 pub mod dicom;
 mod error;
 mod grid;
+mod gzip_members;
 mod loaded;
 pub mod metaimage;
 pub mod nifti;

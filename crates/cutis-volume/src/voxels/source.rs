@@ -5,9 +5,10 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use flate2::bufread::ZlibDecoder;
 
 use crate::VolumeError;
+use crate::gzip_members::GzipMembers;
 
 /// Number of bytes decoded at a time. It is a multiple of every voxel size.
 pub(crate) const PORTION: usize = 1 << 18;
@@ -72,7 +73,7 @@ impl<'a> Source<'a> {
         let observed = Observed { path: path.into(), file: io::Cursor::new(magic).chain(file), observer };
         let buffered = BufReader::with_capacity(PORTION, observed);
         let stream = match compressed {
-            true => Stream::Gzip(Box::new(MultiGzDecoder::new(buffered))),
+            true => Stream::Gzip(Box::new(GzipMembers::new(buffered))),
             false => Stream::Plain(buffered),
         };
         Ok(Self { path: path.into(), stream, compressed, len, at: 0 })
@@ -151,6 +152,9 @@ impl<'a> Source<'a> {
             Ok(_) => warnings.push("there are bytes after the last voxel: they are ignored".into()),
             Err(source) => return Err(VolumeError::Io { path: self.path.clone(), action: "read", source }),
         }
+        if matches!(&self.stream, Stream::Gzip(members) if members.has_trailing_bytes()) {
+            warnings.push("there are bytes after the last gzip member: they are ignored".into());
+        }
         Ok(())
     }
 
@@ -159,7 +163,10 @@ impl<'a> Source<'a> {
     pub(crate) fn finish(self) -> Result<(), VolumeError> {
         let mut raw = match self.stream {
             Stream::Plain(raw) => raw,
-            Stream::Gzip(decoder) => decoder.into_inner(),
+            Stream::Gzip(members) => match members.into_inner() {
+                Some(raw) => raw,
+                None => return Ok(()),
+            },
             Stream::Zlib(decoder) => decoder.into_inner(),
         };
         if raw.get_ref().observer.is_some() {
@@ -175,7 +182,7 @@ impl<'a> Source<'a> {
 
 enum Stream<'a> {
     Plain(BufReader<Observed<'a>>),
-    Gzip(Box<MultiGzDecoder<BufReader<Observed<'a>>>>),
+    Gzip(Box<GzipMembers<BufReader<Observed<'a>>>>),
     Zlib(Box<ZlibDecoder<BufReader<Observed<'a>>>>),
 }
 

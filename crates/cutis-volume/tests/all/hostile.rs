@@ -163,6 +163,22 @@ fn a_gzip_bomb_is_unpacked_only_up_to_the_size_in_the_header() {
     );
 }
 
+/// Zeros after the last member are padding. Other bytes are ignored with a warning, as nibabel and
+/// ITK ignore them.
+#[test]
+fn bytes_after_the_last_gzip_member_are_ignored() {
+    let voxels: Vec<u8> = (0..48).map(|n| n * 5).collect();
+    let packed = gzip(&Image::new(4, &voxels).bytes);
+    let whole = read("scan.nii.gz", &packed).unwrap();
+    let behind = |bytes: &[u8]| read("scan.nii.gz", &[&packed, bytes].concat()).unwrap();
+    for (bytes, warns) in [(vec![0; 1000], false), (b"no member".to_vec(), true), (vec![0, 0, 7], true)] {
+        let loaded = behind(&bytes);
+        assert_eq!(loaded.volume, whole.volume);
+        let warned = loaded.warnings.iter().any(|line| line.contains("after the last gzip member"));
+        assert_eq!((warned, loaded.warnings.len()), (warns, usize::from(warns)), "{:?}", loaded.warnings);
+    }
+}
+
 #[test]
 fn damaged_gzip_files_are_refused() {
     let voxels: Vec<u8> = (0..48).map(|n| n * 5).collect();
@@ -171,6 +187,11 @@ fn damaged_gzip_files_are_refused() {
     assert!(whole.warnings.is_empty());
     for cut in 1..packed.len() - 2 {
         assert!(read("scan.nii.gz", &packed[..packed.len() - cut]).is_err(), "{cut} bytes short");
+    }
+    // Trailing bytes do not make up for bytes that are missing.
+    for cut in [1, 9, packed.len() / 2] {
+        let short = [&packed[..packed.len() - cut], &[7; 64]].concat();
+        assert!(read("scan.nii.gz", &short).is_err(), "{cut} bytes short, with others behind");
     }
     let mut wrong_checksum = packed.clone();
     let at = packed.len() - 7;
