@@ -265,8 +265,9 @@ pub enum VolumeError {
     },
     /// A lattice has fewer than two vertices along an axis, or too many for 32-bit indices.
     #[error(
-        "a lattice of {vertices:?} vertices over {shape:?} voxels is not possible: expected at least 2 vertices and 2 voxels \
-         along each axis, and at most {most} vertices in total"
+        "a lattice of {} vertices over {shape:?} voxels is not possible: expected at least 2 vertices and 2 voxels \
+         along each axis, and at most {most} vertices in total",
+        counts(vertices)
     )]
     LatticeSize {
         /// Vertices along each axis, rounded. Very small spacings give very large numbers.
@@ -302,4 +303,10 @@ impl From<crate::dicom::DicomError> for VolumeError {
     fn from(error: crate::dicom::DicomError) -> Self {
         Self::Dicom(Box::new(error))
     }
+}
+
+/// Numbers of vertices as text: `[401, 301, 201]`, or `1e300` for one that is very large.
+fn counts(vertices: &[f64; 3]) -> String {
+    let text = |&n: &f64| if n < 1e15 { format!("{n:.0}") } else { format!("{n:e}") };
+    format!("[{}]", vertices.each_ref().map(text).join(", "))
 }

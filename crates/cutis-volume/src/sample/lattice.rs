@@ -85,6 +85,14 @@ mod tests {
     }
 
     #[test]
+    fn impossible_sizes_are_printed_as_counts() {
+        let refused = |mm| lattice_grid(&voxels([101, 33, 48]), LatticeSize::SpacingMm(mm)).unwrap_err();
+        let text = refused(0.001).to_string();
+        assert!(text.contains("[200001, 80001, 141001] vertices"), "{text}");
+        assert!(refused(1e-300).to_string().contains("e302"), "{}", refused(1e-300));
+    }
+
+    #[test]
     fn the_corners_of_lattice_and_volume_coincide() {
         let volume = voxels([101, 33, 48]);
         for text in ["native", "4.0", "51, 17 ,90", "7"] {
