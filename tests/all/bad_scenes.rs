@@ -19,7 +19,13 @@ pub fn refused(set: &[(&str, &str)]) -> Error {
 
 #[test]
 fn impossible_scenes_are_refused_with_file_and_section() {
-    let cases: [(&str, &str, &[&str]); 20] = [
+    let cases: [(&str, &str, &[&str]); 22] = [
+        (
+            "incision",
+            "[{ from_mm = [-140, 20, 0], to_mm = [140, 20, 0], depth_mm = 20 }]",
+            &["`incision[0]`", "through the body", "mm below the skin", "add points along the skin"],
+        ),
+        ("volume.offset_hu", "-1024", &["volume.offset_hu", "-1024", "phantom"]),
         (
             "incision",
             "[{ from_mm = [30, 300, 0], to_mm = [30, 300, 50], depth_mm = 20, width_mm = 7 }]",

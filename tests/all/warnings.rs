@@ -36,6 +36,14 @@ fn narrow_slits_and_free_bodies_cause_warnings() {
     assert!(!warns(&[], "nothing is fixed"));
 }
 
+/// The small phantom ends at z = 147 mm.
+#[test]
+fn an_incision_that_leaves_the_scan_causes_a_warning() {
+    let cut = |z: &str| format!("[{{ from_mm = [30, 110, {z}], to_mm = [30, 110, 0], depth_mm = 20 }}]");
+    assert!(warns(&[("incision", &cut("240"))], "incision[0] has no skin along"));
+    assert!(!warns(&[("incision", &cut("90"))], "has no skin along"));
+}
+
 #[test]
 fn an_override_of_one_output_keeps_the_others() {
     let output = scene(SMALL, &[("output.tissue", "true")]).scene.output;

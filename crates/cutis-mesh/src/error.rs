@@ -157,8 +157,7 @@ pub enum MeshError {
         from_mm: [f64; 3],
         /// End of the segment in mm.
         to_mm: [f64; 3],
-        /// Distance in mm from the segment to the nearest center of a skin triangle. Infinite if
-        /// there is no skin.
+        /// Distance in mm from the segment to the nearest center of a skin triangle.
         distance_mm: f64,
         /// Largest allowed distance in mm.
         reach_mm: f64,
@@ -177,6 +176,45 @@ pub enum MeshError {
         to_mm: [f64; 3],
         /// Mean outward normal of the skin near the segment. It is short if normals cancel.
         normal: [f64; 3],
+    },
+    /// A cut needs a skin to be placed on, and there is none.
+    #[error("incision {incision} has no skin to lie on: the skin has no triangles")]
+    IncisionWithoutSkin {
+        /// Number of the incision, from 0.
+        incision: usize,
+    },
+    /// The segment of an incision leaves the skin and runs through the body.
+    #[error(
+        "incision {incision}: the segment {from_mm:?} → {to_mm:?} mm runs through the body instead of along the skin: it passes {below_mm:.1} mm below the skin at {at_mm:.1?} mm; add points along the skin between its ends"
+    )]
+    IncisionThroughBody {
+        /// Number of the incision, from 0.
+        incision: usize,
+        /// Start of the segment in mm.
+        from_mm: [f64; 3],
+        /// End of the segment in mm.
+        to_mm: [f64; 3],
+        /// Largest depth of the segment below the skin in mm.
+        below_mm: f64,
+        /// Where that is, in mm.
+        at_mm: [f64; 3],
+    },
+    /// The segment of an incision has skin below or above it along less than half of its length.
+    #[error(
+        "incision {incision}: only {:.0} % of the segment {from_mm:?} → {to_mm:?} mm has skin within {reach_mm:.1} mm above or below it; at least half is needed: end it where the skin ends, or add points along the skin",
+        100.0 * share
+    )]
+    IncisionOverGap {
+        /// Number of the incision, from 0.
+        incision: usize,
+        /// Start of the segment in mm.
+        from_mm: [f64; 3],
+        /// End of the segment in mm.
+        to_mm: [f64; 3],
+        /// Share of its length with skin.
+        share: f64,
+        /// Largest distance in mm at which skin counts.
+        reach_mm: f64,
     },
     /// The slit contains no vertex and crosses no edge.
     #[error(

@@ -11,6 +11,10 @@ use crate::{Lattice, MeshError};
 /// segments.
 const MOST_BINS: f64 = 1024.0;
 
+/// Largest depth of a segment below the skin, over its length below the skin. A chord of a circle
+/// has this sag if it spans about 90°.
+const DEEPEST: f64 = 0.2;
+
 /// A segment of an incision placed on the skin at rest. Lengths are in meters, positions in local
 /// meters.
 ///
@@ -37,6 +41,8 @@ pub struct Slit {
     /// Coordinate of the skin along the inward axis, relative to the segment, in the middle of
     /// equal bins along it.
     skin: Vec<f64>,
+    /// Share of the bins that have skin.
+    on_skin: f64,
 }
 
 /// Coordinates of a point with respect to a slit, in m.
@@ -58,8 +64,10 @@ impl Slit {
     /// [`MeshError::VertexIndex`] if a triangle names a point that does not exist.
     /// [`MeshError::IncisionSize`] if a length, depth or width is not finite and positive.
     /// [`MeshError::IncisionPath`] if a path has fewer than two points, turns back or crosses
-    /// itself. [`MeshError::IncisionOffSkin`] if a segment is too far from the skin.
-    /// [`MeshError::IncisionThroughSkin`] if it pierces the skin.
+    /// itself. [`MeshError::IncisionWithoutSkin`] if there is no skin.
+    /// [`MeshError::IncisionOffSkin`] or [`MeshError::IncisionOverGap`] if a segment is too far
+    /// from the skin. [`MeshError::IncisionThroughBody`] or [`MeshError::IncisionThroughSkin`] if it
+    /// runs through the body or pierces the skin.
     pub fn on_lattice(
         lattice: &Lattice,
         skin: &[[u32; 3]],
@@ -112,6 +120,9 @@ impl Slit {
             distance_mm: distance * 1000.0,
             reach_mm: reach * 1000.0,
         };
+        if facets.is_empty() {
+            return Err(MeshError::IncisionWithoutSkin { incision: number });
+        }
         let distance = facets.iter().map(from_segment).fold(f64::INFINITY, f64::min);
         if distance > reach {
             return Err(off_skin(distance));
@@ -120,6 +131,15 @@ impl Slit {
             facets.iter().filter(|facet| from_segment(facet) <= reach + 2.0 * step).collect();
         let stations = (length / step).ceil().clamp(1.0, MOST_BINS) as usize;
         let places = (0..stations).map(|n| start + along * (length * (n as f64 + 0.5) / stations as f64));
+        if let Some((below, at)) = through_body(surface, &near, reach, [start, end], stations) {
+            return Err(MeshError::IncisionThroughBody {
+                incision: number,
+                from_mm,
+                to_mm,
+                below_mm: below * 1000.0,
+                at_mm: surface.frame.to_mm(at.cast()).into(),
+            });
+        }
         let normal = mean_normal(&near, places, 2.0 * step);
         let outward = normal - along * normal.dot(&along);
         // The direction is not reliable if the angle between skin and segment is above about 84°,
@@ -145,13 +165,18 @@ impl Slit {
             depth,
             above: reach,
             skin: Vec::new(),
+            on_skin: 1.0,
         };
         let (heights, on_skin) = slit.heights(surface);
-        if 2 * on_skin < heights.len() {
+        slit.on_skin = on_skin as f64 / heights.len() as f64;
+        if slit.on_skin < 0.5 {
             let from = |end: Point3<f64>| {
                 facets.iter().map(|facet| (facet.center - end).norm()).fold(f64::INFINITY, f64::min)
             };
-            return Err(off_skin(from(start).max(from(end))));
+            let distance = from(start).max(from(end));
+            let (share, reach_mm) = (slit.on_skin, reach * 1000.0);
+            let over_gap = MeshError::IncisionOverGap { incision: number, from_mm, to_mm, share, reach_mm };
+            return Err(if distance > reach { off_skin(distance) } else { over_gap });
         }
         slit.skin = heights;
         Ok(slit)
@@ -284,6 +309,16 @@ impl Slit {
         self.length
     }
 
+    /// Number of the incision of which it is a segment.
+    pub fn incision(&self) -> usize {
+        self.incision
+    }
+
+    /// Length of the segment that has skin above or below it, in m.
+    pub fn length_on_skin(&self) -> f64 {
+        self.on_skin * self.length
+    }
+
     /// Unit vector from the start to the end of the segment.
     pub fn along(&self) -> Vector3<f64> {
         self.along
@@ -304,6 +339,46 @@ impl Slit {
     pub fn inward(&self) -> Vector3<f64> {
         self.inward
     }
+}
+
+/// The largest depth below the skin in m of a segment that runs through the body, and its place.
+/// None if the segment follows the skin.
+///
+/// Each stretch of the segment below the skin may be deeper than the shallower one of its ends by
+/// [`DEEPEST`] of its length, or by two lattice steps. `near` are the facets within `reach` and two
+/// lattice steps of the segment.
+fn through_body(
+    surface: &SkinSurface<'_>,
+    near: &[&Facet],
+    reach: f64,
+    [start, end]: [Point3<f64>; 2],
+    stations: usize,
+) -> Option<(f64, Point3<f64>)> {
+    let place = |n: usize| start + (end - start) * (n as f64 / stations as f64);
+    let depth = |n: usize| {
+        let depth = depth_below(near.iter().copied(), place(n), surface.step);
+        if depth.abs() <= reach { depth } else { depth_below(surface.facets.iter(), place(n), surface.step) }
+    };
+    let depths: Vec<(usize, f64)> = (0..=stations).map(|n| (n, depth(n))).collect();
+    let interval = (end - start).norm() / stations as f64;
+    let deepest = |stretch: &[(usize, f64)]| {
+        let &(at, below) = stretch.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let ends = stretch[0].1.min(stretch[stretch.len() - 1].1);
+        let most = (DEEPEST * interval * stretch.len() as f64).max(2.0 * surface.step);
+        (below > 0.0 && below - ends > most).then(|| (below, place(at)))
+    };
+    let stretches = depths.chunk_by(|a, b| (a.1 > 0.0) == (b.1 > 0.0));
+    stretches.filter_map(deepest).max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Distance in m from a place to the skin, negative outside the body. The sign is that of the mean
+/// height of the facets that are at most a lattice step farther than the closest one.
+fn depth_below<'a>(facets: impl Iterator<Item = &'a Facet> + Clone, place: Point3<f64>, step: f64) -> f64 {
+    let distance = |facet: &Facet| (facet.center - place).norm();
+    let nearest = facets.clone().map(distance).fold(f64::INFINITY, f64::min);
+    let close = facets.filter(|facet| distance(facet) <= nearest + step);
+    let height: f64 = close.map(|facet| facet.area_vector.dot(&(facet.center - place))).sum();
+    if height > 0.0 { nearest } else { -nearest }
 }
 
 /// Mean of the skin normals at some places. The normal at a place is the area-weighted mean of the

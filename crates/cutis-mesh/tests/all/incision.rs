@@ -258,6 +258,46 @@ fn curved_skin_is_cut_to_an_even_depth() {
     assert!(cut.gapes[0].measure(&mesh.positions).bins >= 10);
 }
 
+/// A limb along x, of radius 40 mm around y = 28, z = 58 mm.
+fn limb() -> (TetMesh, Vec<[u32; 3]>) {
+    let lattice = lattice([12, 49, 49], [2.0; 3], Split::Kuhn6);
+    body(&lattice, |p| (p[1] - 28.0).hypot(p[2] - 58.0) <= 40.0)
+}
+
+/// A segment between two places on a limb, at these angles from its top.
+fn chord([from, to]: [f64; 2]) -> Incision {
+    let at = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        [41.0, 28.0 + 40.0 * sin, 58.0 + 40.0 * cos]
+    };
+    incision(at(from), at(to), 45.0, 4.0)
+}
+
+/// A straight segment from one side of a limb to the other is refused with its depth below the
+/// skin, also if the incision is deeper than that. Control: a chord of 60° follows the skin.
+#[test]
+fn a_segment_through_a_limb_is_refused() {
+    let (mesh, triangles) = limb();
+    let shallow = |angles| Incision { depth_mm: 8.0, ..chord(angles) };
+    let find = |one: Incision| plan(&mesh, &triangles, &[shallow([-30.0, 30.0]), one]).map(|_| ());
+    find(shallow([40.0, 100.0])).unwrap();
+    for (angles, depth) in [([-90.0, 90.0], 40.0), ([-70.0, 70.0], 26.3), ([-60.0, 60.0], 20.0)] {
+        let error = find(chord(angles)).unwrap_err();
+        let MeshError::IncisionThroughBody { incision: 1, below_mm, at_mm, .. } = error else {
+            panic!("{angles:?}: {error}")
+        };
+        assert!((below_mm - depth).abs() < 4.0, "{angles:?}: {below_mm} mm, not {depth}");
+        assert!((at_mm[1] - 28.0).abs() < 6.0, "{angles:?}: {at_mm:?}");
+        assert!(error.to_string().contains("add points along the skin"), "{error}");
+    }
+    // One end is on the skin, and the other one inside the body.
+    let pierces = incision([41.0, 0.0, 86.5], [41.0, 28.0, 65.0], 20.0, 4.0);
+    assert!(matches!(find(pierces), Err(MeshError::IncisionThroughBody { incision: 1, .. })));
+    // A path that follows the skin below it is placed on the skin.
+    let below = incision([34.0, 28.0, 92.0], [48.0, 28.0, 92.0], 10.0, 4.0);
+    find(below).unwrap();
+}
+
 #[test]
 fn several_incisions_each_have_their_gape() {
     let (mesh, triangles) = block(2.0, Split::Kuhn6);
@@ -325,7 +365,8 @@ fn invalid_incisions_are_refused() {
     ] {
         assert!(matches!(error, MeshError::VertexIndex { position: 0, vertex: u32::MAX, .. }), "{error}");
     }
-    assert!(matches!(plan(&mesh, &[], &[incision(a, b, 6.0, 4.0)]), Err(MeshError::IncisionOffSkin { .. })));
+    let without_skin = plan(&mesh, &[], &[incision(a, b, 6.0, 4.0)]).unwrap_err();
+    assert!(matches!(without_skin, MeshError::IncisionWithoutSkin { incision: 0 }), "{without_skin}");
 }
 
 #[test]

@@ -45,6 +45,7 @@ impl Body {
         let lattice = whole.lattice();
         let incisions: Vec<Incision> = incisions.iter().map(Incision::from).collect();
         let slits = Slit::on_lattice(lattice, &skin, &incisions).map_err(cut_error(file))?;
+        warnings.extend(off_skin(&slits));
         let excisions: Vec<Excision> = excisions.iter().map(Excision::from).collect();
         let pieces = Piece::on_lattice(lattice, &skin, &excisions).map_err(cut_error(file))?;
         let pockets = Pocket::on_lattice(lattice, &skin, &slits, &pieces, underminings);
@@ -164,6 +165,27 @@ fn divide_masses(masses: &mut Vec<f32>, severed: &Severed, mesh: &TetMesh, densi
             *mass = divided[v];
         }
     }
+}
+
+/// Share of a path without skin above which it is reported.
+const OFF_SKIN: f64 = 0.1;
+
+/// Warnings about incisions that lie in part where there is no skin.
+fn off_skin(slits: &[Slit]) -> Vec<String> {
+    let sum = |slits: &[Slit], length: fn(&Slit) -> f64| slits.iter().map(length).sum::<f64>() * 1e3;
+    let incisions = slits.chunk_by(|a, b| a.incision() == b.incision());
+    let warning = |slits: &[Slit]| {
+        let (length, on_skin) = (sum(slits, Slit::length), sum(slits, Slit::length_on_skin));
+        (length - on_skin > OFF_SKIN * length).then(|| {
+            format!(
+                "incision[{}] has no skin along {:.0} of its {length:.0} mm: it leaves the scan, or passes over \
+                 a gap in the skin, and cuts nothing there",
+                slits[0].incision(),
+                length - on_skin
+            )
+        })
+    };
+    incisions.filter_map(warning).collect()
 }
 
 /// Volumes in ml of the parts of the body that its cuts separate from the largest one.

@@ -13,6 +13,9 @@ pub(super) fn cut_error(file: SceneFile<'_>) -> impl Fn(MeshError) -> Error {
             | MeshError::IncisionPath { incision, .. }
             | MeshError::IncisionOffSkin { incision, .. }
             | MeshError::IncisionThroughSkin { incision, .. }
+            | MeshError::IncisionWithoutSkin { incision }
+            | MeshError::IncisionThroughBody { incision, .. }
+            | MeshError::IncisionOverGap { incision, .. }
             | MeshError::IncisionEmpty { incision, .. }
             | MeshError::IncisionWithoutLips { incision, .. } => format!("incision[{incision}]"),
             MeshError::Undermining { undermining, .. } => format!("undermining[{undermining}]"),
