@@ -12,6 +12,11 @@ pub(crate) fn error(error: &cutis::Error) {
     say(&format!("error: {error}"));
 }
 
+/// Prints the last line of an interrupted program. A progress bar stays above it.
+pub(crate) fn interrupted(message: &str) {
+    say(&format!("\n{message}"));
+}
+
 /// Prints a line on standard output. A closed pipe is ignored.
 pub(crate) fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");

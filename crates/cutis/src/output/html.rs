@@ -1,7 +1,7 @@
 //! `report.html`: the report for people, one file with pictures and plots inside.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use base64::Engine;
 
@@ -123,7 +123,9 @@ fn line_plot(title: &str, values: &'static str, curves: &[(String, Vec<[f64; 2]>
 fn page(report: &Report, figures: &[Figure], plots: &[String], scene_toml: &str) -> String {
     let mut out = String::new();
     let mut put = |text: &str| out.push_str(text);
-    put("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Cutis run</title><style>");
+    put("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">");
+    put("<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">");
+    put(&format!("<title>{}</title><style>", escape(&title(report))));
     put(STYLE);
     put("</style></head><body><h1>Cutis run</h1>");
     put(&summary(report));
@@ -149,6 +151,12 @@ fn page(report: &Report, figures: &[Figure], plots: &[String], scene_toml: &str)
     }
     put(&format!("<h2>Scene as it ran</h2><pre>{}</pre></body></html>\n", escape(scene_toml)));
     out
+}
+
+/// The name of the scene, so that the pages of several runs can be told apart.
+fn title(report: &Report) -> String {
+    let scene = report.inputs.first().and_then(|input| Path::new(&input.path).file_stem());
+    scene.map_or_else(|| "Cutis run".into(), |name| format!("{} - Cutis run", name.to_string_lossy()))
 }
 
 fn summary(report: &Report) -> String {

@@ -1,8 +1,9 @@
 //! Checkpoints: the exact state from which `--resume` continues.
 //!
 //! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32),
-//! vertex count (u64), positions (3 × f32 per vertex, m, local frame), three words of 32 bits per
-//! vertex, further words, SHA-256 of all that (32). With the model `pbd` the words are velocities
+//! vertex count (u64), positions (3 × f32 per vertex, m, local frame), history, three words of 32
+//! bits per vertex, further words, SHA-256 of all that (32). The history is that of
+//! [`history`](super::history). With the model `pbd` the words are velocities
 //! (f32, m/s), the distance at which each thread began to pull (f32, m), and the positions at which
 //! handles with an `at_s` grabbed their vertices (f32, m); what has not happened is NaN. With
 //! `chainmail` they are coordinates (i32, units of the chain), the energy after the last drag (f64,
@@ -14,10 +15,12 @@ use std::path::Path;
 use nalgebra::Point3;
 use sha2::{Digest, Sha256};
 
+use super::frames::FrameRow;
+use super::history;
 use crate::run::files;
 use crate::{Error, Scene};
 
-const MAGIC: &[u8; 8] = b"CUTISCP3";
+const MAGIC: &[u8; 8] = b"CUTISCP4";
 const HEADER: usize = 8 + 32 + 4 + 8;
 const SEAL: usize = 32;
 
@@ -30,6 +33,8 @@ pub struct Checkpoint {
     pub positions: Vec<Point3<f32>>,
     /// The rest of the state, as the model defines it; at least three words per vertex.
     pub words: Vec<u32>,
+    /// The state before the first frame and one row per frame, without their wall times.
+    pub(crate) history: Vec<FrameRow>,
 }
 
 /// Identifies scene and volume. It ignores the keys that a resumed run may change: number of
@@ -66,9 +71,9 @@ impl Checkpoint {
         bytes.extend_from_slice(&self.frame.to_le_bytes());
         bytes.extend_from_slice(&(self.positions.len() as u64).to_le_bytes());
         let positions = self.positions.iter().flat_map(|p| [p.x, p.y, p.z]).map(f32::to_bits);
-        for word in positions.chain(self.words.iter().copied()) {
-            bytes.extend_from_slice(&word.to_le_bytes());
-        }
+        positions.for_each(|word| bytes.extend_from_slice(&word.to_le_bytes()));
+        history::encode(&self.history, &mut bytes);
+        self.words.iter().for_each(|word| bytes.extend_from_slice(&word.to_le_bytes()));
         let seal = Sha256::digest(&bytes);
         bytes.extend_from_slice(&seal);
         files::write(path, &bytes)
@@ -85,9 +90,12 @@ impl Checkpoint {
             return Err(fail("there is none; a run with run.checkpoint_every above 0 writes it".into()));
         }
         let bytes = files::read(path)?;
-        let least = HEADER + 24 * vertices + SEAL;
-        if bytes.len() < HEADER + SEAL || &bytes[..8] != MAGIC {
+        let least = HEADER + 24 * vertices + history::EMPTY + SEAL;
+        if bytes.len() < HEADER + SEAL || bytes[..7] != MAGIC[..7] {
             return Err(fail("it does not begin as one".into()));
+        }
+        if bytes[7] != MAGIC[7] {
+            return Err(fail("another version of the program wrote it; begin again without --resume".into()));
         }
         if bytes[8..40] != fingerprint[..] {
             return Err(fail("scene, volume or program version differ from those that wrote it".into()));
@@ -100,10 +108,14 @@ impl Checkpoint {
             return Err(fail("its checksum is wrong: the file is damaged".into()));
         }
         let frame = u32::from_le_bytes([content[40], content[41], content[42], content[43]]);
-        let words = content[HEADER..].chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let mut words: Vec<u32> = words.collect();
-        let rest = words.split_off(3 * vertices);
-        let positions = words.chunks_exact(3).map(|p| Point3::from([p[0], p[1], p[2]].map(f32::from_bits)));
-        Ok(Self { frame, positions: positions.collect(), words: rest })
+        let words = |bytes: &[u8]| -> Vec<u32> {
+            bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+        };
+        let (positions, rest) = content[HEADER..].split_at(12 * vertices);
+        let (history, rest) = history::decode(rest).ok_or_else(|| fail("its history is damaged".into()))?;
+        let positions = words(positions);
+        let positions =
+            positions.chunks_exact(3).map(|p| Point3::from([p[0], p[1], p[2]].map(f32::from_bits)));
+        Ok(Self { frame, positions: positions.collect(), words: words(rest), history })
     }
 }

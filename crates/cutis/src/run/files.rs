@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use cutis_volume::PartialFile;
+use cutis_volume::{PartialFile, VolumeError};
 use sha2::{Digest, Sha256};
 
 use crate::Error;
@@ -34,6 +34,31 @@ pub(crate) fn create_folder(path: &Path) -> Result<(), Error> {
         action: "create the folder",
         why: e.to_string(),
     })
+}
+
+/// Refuses a folder in which no file can be created, also one that does not exist yet. Nothing
+/// stays of the attempt.
+pub(crate) fn check_writable(folder: &Path) -> Result<(), Error> {
+    let refuse =
+        |path: &Path, action: &'static str, why: String| Err(Error::File { path: path.into(), action, why });
+    let mut existing = folder;
+    while !existing.exists() {
+        existing = match existing.parent() {
+            Some(parent) if parent.as_os_str().is_empty() => Path::new("."),
+            Some(parent) => parent,
+            None => return refuse(folder, "create the folder", "no folder above it exists".into()),
+        };
+    }
+    if !existing.is_dir() {
+        let why = format!("{} is a file", existing.display());
+        return refuse(folder, "create the folder", why);
+    }
+    let action = if existing == folder { "write to the folder" } else { "create the folder" };
+    match PartialFile::create(existing.join("probe")) {
+        Ok(_) => Ok(()),
+        Err(VolumeError::Io { source, .. }) => refuse(folder, action, source.to_string()),
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// SHA-256 of bytes, in hexadecimal digits.
@@ -93,10 +118,10 @@ paths! {
 }
 
 impl RunFolder {
-    /// Names of existing files that a run with these outputs does not write.
+    /// The files that a run with these outputs writes.
     ///
     /// `has_lines` says whether the body has lines of tension to draw.
-    pub(crate) fn stale_files(&self, output: &OutputSection, has_lines: bool) -> Vec<String> {
+    fn written(&self, output: &OutputSection, has_lines: bool) -> Vec<PathBuf> {
         let files = [
             (output.report, self.report()),
             (output.report, self.html()),
@@ -109,7 +134,101 @@ impl RunFolder {
             (output.pictures, self.slice()),
             (output.pictures && has_lines, self.tension()),
         ];
-        let stale = files.iter().filter(|(written, path)| !written && path.exists());
-        stale.filter_map(|(_, path)| Some(path.file_name()?.to_string_lossy().into_owned())).collect()
+        files.into_iter().filter(|(written, _)| *written).map(|(_, path)| path).collect()
+    }
+
+    /// Names of existing files that a run with these outputs does not write, and that no report in
+    /// the folder lists. They may belong to the user.
+    pub(crate) fn stale_files(&self, output: &OutputSection, has_lines: bool) -> Vec<String> {
+        let everything =
+            OutputSection { report: true, volume: true, surface: true, tissue: true, pictures: true };
+        let (written, earlier) = (self.written(output, has_lines), self.of_earlier_run());
+        let stale = self.written(&everything, true).into_iter();
+        stale
+            .filter(|path| path.exists() && !written.contains(path) && !earlier.contains(path))
+            .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+            .collect()
+    }
+
+    /// Removes the files that an earlier run wrote: those that this run does not write, and the
+    /// report, so that a report never lies next to files of another run. Other files stay. Returns
+    /// the names of the removed files that this run does not write.
+    pub(crate) fn remove_earlier(
+        &self,
+        output: &OutputSection,
+        has_lines: bool,
+    ) -> Result<Vec<String>, Error> {
+        let (written, mut names) = (self.written(output, has_lines), Vec::new());
+        let report = [self.html(), self.frames(), self.report()];
+        let earlier = self.of_earlier_run();
+        let (of_report, others): (Vec<_>, Vec<_>) =
+            earlier.into_iter().partition(|path| report.contains(path));
+        // The report goes last: until then it says which files are those of the earlier run.
+        for path in others.iter().filter(|path| !written.contains(path)).chain(&of_report) {
+            match fs::remove_file(path) {
+                Ok(()) if written.contains(path) => {}
+                Ok(()) => names.extend(path.file_name().map(|name| name.to_string_lossy().into_owned())),
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+                Err(error) => {
+                    let why = error.to_string();
+                    return Err(Error::File { path: path.clone(), action: "remove", why });
+                }
+            }
+        }
+        Ok(names)
+    }
+
+    /// The files that an earlier run wrote, as its report says. None without a report of Cutis.
+    fn of_earlier_run(&self) -> Vec<PathBuf> {
+        let output = || {
+            let report: serde_json::Value = serde_json::from_slice(&fs::read(self.report()).ok()?).ok()?;
+            report.get("schema")?.as_str().filter(|schema| schema.starts_with("cutis-report/"))?;
+            serde_json::from_value::<OutputSection>(report.get("scene")?.get("output")?.clone()).ok()
+        };
+        output().map(|output| self.written(&output, true)).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A report that is not one of Cutis says nothing about the files next to it.
+    #[test]
+    fn only_files_that_a_report_of_cutis_lists_are_removed() {
+        let here = tempfile::tempdir().unwrap();
+        let folder = RunFolder(here.path().into());
+        let (all, none) = (
+            OutputSection { report: true, volume: true, surface: false, tissue: false, pictures: false },
+            OutputSection { report: false, volume: false, surface: false, tissue: false, pictures: false },
+        );
+        let put = |schema: &str| {
+            let report = serde_json::json!({ "schema": schema, "scene": { "output": all } });
+            fs::write(folder.report(), report.to_string()).unwrap();
+            [folder.volume(), folder.skin(), here.path().join("notes.txt")]
+                .iter()
+                .for_each(|path| fs::write(path, "").unwrap());
+        };
+        put("someone-else/1");
+        assert_eq!(folder.remove_earlier(&none, false).unwrap(), [""; 0]);
+        assert_eq!(folder.stale_files(&none, false), ["report.json", "deformed.nii.gz", "skin.vtu"]);
+        put("cutis-report/1");
+        assert_eq!(folder.stale_files(&none, false), ["skin.vtu"]);
+        assert_eq!(folder.remove_earlier(&none, false).unwrap(), ["deformed.nii.gz", "report.json"]);
+        assert!(folder.skin().exists() && here.path().join("notes.txt").exists());
+        assert!(!folder.volume().exists() && !folder.report().exists());
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_is_refused_and_nothing_is_left() {
+        let here = tempfile::tempdir().unwrap();
+        check_writable(&here.path().join("a/b")).unwrap();
+        check_writable(here.path()).unwrap();
+        assert_eq!(fs::read_dir(here.path()).unwrap().count(), 0);
+        fs::write(here.path().join("file"), "").unwrap();
+        for folder in [here.path().join("file"), here.path().join("file/run"), "/proc/run".into()] {
+            let error = check_writable(&folder).unwrap_err().to_string();
+            assert!(error.contains(folder.to_str().unwrap()), "{error}");
+        }
     }
 }

@@ -4,17 +4,16 @@ use std::fmt::Write as _;
 
 use cutis_mesh::WoundGape;
 
-use super::files::{self, RunFolder};
-use crate::Error;
 use crate::output::report::Frames;
 
 /// One line of `frames.csv`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FrameRow {
     pub(crate) frame: u32,
     pub(crate) time_s: f64,
-    /// Wall time of the frame, ms.
-    pub(crate) ms: f64,
+    /// Wall time of the frame, ms; none for the state before the first frame, and for a frame that
+    /// an earlier run computed.
+    pub(crate) ms: Option<f64>,
     pub(crate) gapes: Vec<WoundGape>,
     /// Sum of the forces in the threads of each suture, and the largest one, N.
     pub(crate) sutures: Vec<[f64; 2]>,
@@ -22,9 +21,9 @@ pub(crate) struct FrameRow {
     pub(crate) handles: Vec<f64>,
 }
 
-/// Mean and shortest time of the frames. The first row is the state before them.
+/// Mean and shortest time of the frames that this run computed.
 pub(crate) fn frame_times(rows: &[FrameRow]) -> Frames {
-    let times: Vec<f64> = rows.iter().skip(1).map(|row| row.ms).collect();
+    let times: Vec<f64> = rows.iter().filter_map(|row| row.ms).collect();
     if times.is_empty() {
         return Frames::default();
     }
@@ -35,21 +34,9 @@ pub(crate) fn frame_times(rows: &[FrameRow]) -> Frames {
     }
 }
 
-/// Lines of `frames.csv` that an earlier run wrote before frame `done`.
-pub(crate) fn earlier_frames(folder: &RunFolder, done: u32) -> Result<String, Error> {
-    if !folder.frames().exists() {
-        return Ok(String::new());
-    }
-    let text = String::from_utf8_lossy(&files::read(&folder.frames())?).into_owned();
-    let before = |line: &&str| {
-        line.split(',').next().and_then(|frame| frame.parse::<u32>().ok()).is_some_and(|frame| frame < done)
-    };
-    Ok(text.lines().filter(before).flat_map(|line| [line, "\n"]).collect())
-}
-
 /// The text of `frames.csv`. Its first line of values is the state before the first frame.
-/// `earlier` are the lines of the run that this one resumes.
-pub(crate) fn frames_csv(earlier: &str, rows: &[FrameRow]) -> String {
+/// The wall time is 0 in that line, and empty for frames that an earlier run computed.
+pub(crate) fn frames_csv(rows: &[FrameRow]) -> String {
     let wounds = rows.first().map_or(0, |row| row.gapes.len());
     let mut out = String::from("frame,time_s,ms");
     for n in 0..wounds {
@@ -62,9 +49,13 @@ pub(crate) fn frames_csv(earlier: &str, rows: &[FrameRow]) -> String {
         let _ = write!(out, ",handle_{n}_n");
     }
     out.push('\n');
-    out.push_str(earlier);
     for row in rows {
-        let _ = write!(out, "{},{},{:.3}", row.frame, row.time_s, row.ms);
+        let ms = match (row.frame, row.ms) {
+            (_, Some(ms)) => format!("{ms:.3}"),
+            (0, None) => "0.000".into(),
+            (_, None) => String::new(),
+        };
+        let _ = write!(out, "{},{},{ms}", row.frame, row.time_s);
         for gape in &row.gapes {
             let _ = write!(out, ",{:.4},{:.4}", gape.mean_mm, gape.mid_mm);
         }

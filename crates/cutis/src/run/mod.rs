@@ -9,6 +9,7 @@ pub(crate) mod checkpoint;
 pub(crate) mod clock;
 pub(crate) mod files;
 pub(crate) mod frames;
+mod history;
 mod peak_memory;
 pub(crate) mod prepare;
 mod run_loop;
@@ -20,6 +21,7 @@ mod timing;
 use std::path::PathBuf;
 
 use crate::backend::{DeviceMeter, Request, Stages};
+use crate::body::Membrane;
 use crate::output::report::Report;
 use crate::output::{self, DeformedBody};
 use crate::scene::LoadedScene;
@@ -71,9 +73,19 @@ fn run_with(
     progress: &dyn Progress,
 ) -> Result<Report, Error> {
     let (mut clock, folder) = (Clock::new(progress), RunFolder(options.out.clone()));
+    files::check_writable(&folder.0)?;
     let prepare::Prepared { source, body, model, backend, plan } = prepare(loaded, request, &mut clock)?;
     let setup = simulate::Setup { loaded, options, folder: &folder, source: &source, body: &body };
     let simulated = simulate(&setup, model, &backend, plan, &mut clock)?;
+    let has_lines = body.membrane.as_ref().is_some_and(Membrane::has_lines);
+    let removed = folder.remove_earlier(&loaded.scene.output, has_lines)?;
+    if !removed.is_empty() {
+        progress.note(&format!(
+            "removed the files of an earlier run from {}: {}",
+            folder.0.display(),
+            removed.join(", ")
+        ));
+    }
     let deformed = DeformedBody {
         body: &body,
         positions: &simulated.result.end.positions,

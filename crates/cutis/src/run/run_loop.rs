@@ -7,6 +7,7 @@ use cutis_mesh::{Gape, WoundGape};
 use cutis_rest::Step;
 use cutis_solver::SolverError;
 
+use super::checkpoint::Checkpoint;
 use super::clock::Clock;
 use super::files::RunFolder;
 use super::frames::FrameRow;
@@ -30,6 +31,8 @@ pub(super) struct RunLoop<'a> {
     pub(super) stops: Vec<Stop>,
     /// Frame of the checkpoint from which the run resumes.
     pub(super) resumed: Option<u32>,
+    /// The rows up to that frame.
+    pub(super) history: Vec<FrameRow>,
     pub(super) timing: Timing,
     /// Whether an output needs the final positions on the GPU.
     pub(super) resamples: bool,
@@ -38,7 +41,7 @@ pub(super) struct RunLoop<'a> {
 
 /// The result of the frames.
 pub(super) struct RunResult {
-    /// The state before the first frame, then one row per frame.
+    /// The state before the first frame, then one row per frame, also of those before a checkpoint.
     pub(super) rows: Vec<FrameRow>,
     pub(super) end: SimulationEnd,
     /// The states of rest after the frames, if the run ends there.
@@ -72,14 +75,17 @@ impl RunLoop<'_> {
         let mut at = Position { frame: self.done(), saved };
         let lips = Lips::new(self.gapes);
         let mut times = PartTimes::new(self.timing);
-        let mut rows = vec![self.row(simulation, &lips, self.done(), 0.0)?];
+        let mut rows = self.history.clone();
+        if rows.is_empty() {
+            rows.push(self.row(simulation, &lips, self.done(), None)?);
+        }
         let until = self.run.until;
         if until == RunEnd::Frames || self.count() > 0 {
             let frames = |progress: &dyn Progress| {
-                let later = self.frames(simulation, &lips, &mut times, progress, &mut at);
-                later.map_err(|error| at.name(error))
+                let done = self.frames(simulation, &lips, &mut times, progress, &mut at, &mut rows);
+                done.map_err(|error| at.name(error))
             };
-            rows.extend(clock.stage_on(place, "simulate", self.count(), frames)?);
+            clock.stage_on(place, "simulate", self.count(), frames)?;
         }
         let mut settled = None;
         if until == RunEnd::Rest {
@@ -87,7 +93,7 @@ impl RunLoop<'_> {
         }
         let end = simulation.end()?;
         let on_device = if self.resamples { simulation.positions_on_device() } else { None };
-        if rows.len() > 1 {
+        if self.count() > 0 {
             self.time_extra_frame(simulation, &mut times);
         }
         Ok(RunResult { rows, settled, end, on_device, times })
@@ -113,7 +119,7 @@ impl RunLoop<'_> {
                 let mut advance = |step: &Step| progress.advance(before + bar.after(step));
                 let rest = simulation.settle(time_s, self.run.error, &mut advance)?;
                 let ms = start.elapsed().as_secs_f64() * 1e3;
-                let row = self.row(simulation, lips, self.run.frames, ms)?;
+                let row = self.row(simulation, lips, self.run.frames, Some(ms))?;
                 let done = n.checked_sub(1).map(|n| stops[n].done.clone()).unwrap_or_default();
                 settled.add(RestReport::of(&rest, ms), row, done);
                 progress.advance(before + SEARCH);
@@ -128,7 +134,7 @@ impl RunLoop<'_> {
         simulation: &mut dyn Simulation,
         lips: &Lips<'_>,
         frame: u32,
-        ms: f64,
+        ms: Option<f64>,
     ) -> Result<FrameRow, Error> {
         let time_s = simulation.time_s();
         let sutures = suture_forces(self.sutures, &simulation.thread_forces()?);
@@ -143,9 +149,9 @@ impl RunLoop<'_> {
         times: &mut PartTimes,
         progress: &dyn Progress,
         at: &mut Position,
-    ) -> Result<Vec<FrameRow>, Error> {
+        rows: &mut Vec<FrameRow>,
+    ) -> Result<(), Error> {
         let RunSection { frames, checkpoint_every: every, .. } = *self.run;
-        let mut rows = Vec::new();
         for frame in self.done() + 1..=frames {
             at.frame = frame;
             let start = Instant::now();
@@ -156,14 +162,15 @@ impl RunLoop<'_> {
                 simulation.step()?;
             }
             let ms = start.elapsed().as_secs_f64() * 1e3;
-            rows.push(self.row(simulation, lips, frame, ms)?);
+            rows.push(self.row(simulation, lips, frame, Some(ms))?);
             if every > 0 && (frame % every == 0 || frame == frames) {
-                simulation.save(frame)?.write(&self.folder.checkpoint(), &self.fingerprint)?;
+                let saved = Checkpoint { history: rows.clone(), ..simulation.save(frame)? };
+                saved.write(&self.folder.checkpoint(), &self.fingerprint)?;
                 at.saved = Some((frame, self.folder.checkpoint()));
             }
             progress.advance(u64::from(frame - self.done()));
         }
-        Ok(rows)
+        Ok(())
     }
 
     /// Times the parts of one more frame, if they are not timed in every frame. The state is no

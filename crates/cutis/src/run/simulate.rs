@@ -6,6 +6,7 @@ use super::RunOptions;
 use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
 use super::files::{self, RunFolder};
+use super::frames::FrameRow;
 use super::run_loop::{RunLoop, RunResult};
 use super::stops::Stop;
 use super::timing::Timing;
@@ -32,8 +33,6 @@ pub(super) struct Simulated {
     pub(super) plan: Plan,
     /// The GPU that the simulation ran on, if it ran on one.
     pub(super) device: Option<DeviceMeter>,
-    /// Frame of the checkpoint from which the run resumed.
-    pub(super) resumed: Option<u32>,
     pub(super) result: RunResult,
 }
 
@@ -58,6 +57,7 @@ pub(super) fn simulate(
     plan.warnings.iter().for_each(|warning| clock.progress.note(warning));
     let fingerprint = checkpoint::fingerprint(scene, &source.sha256);
     let resumed = if options.resume { Some(resume(setup, &fingerprint, &mut *simulation)?) } else { None };
+    let (resumed, history) = resumed.unzip();
     let run_loop = RunLoop {
         run: &scene.run,
         folder,
@@ -66,6 +66,7 @@ pub(super) fn simulate(
         sutures: if scene.solver.formulation == Formulation::Pbd { 0 } else { body.stitches.len() },
         stops: Stop::all(&plan.steps, scene),
         resumed,
+        history: history.unwrap_or_default(),
         timing: match (scene.output.report, simulation.parts_are_sequential()) {
             (false, _) => Timing::No,
             (true, true) => Timing::EveryFrame,
@@ -78,7 +79,7 @@ pub(super) fn simulate(
     // This frees the simulation's memory on the GPU for the stages that follow.
     drop(simulation);
     warn(&mut plan, &result.end.warnings, clock.progress);
-    Ok(Simulated { plan, device, resumed, result })
+    Ok(Simulated { plan, device, result })
 }
 
 /// Adds warnings to the plan, and shows them to the user.
@@ -87,21 +88,25 @@ pub(super) fn warn(plan: &mut Plan, warnings: &[String], progress: &dyn Progress
     plan.warnings.extend_from_slice(warnings);
 }
 
-/// Warning about files of an earlier run that this run will not replace.
+/// Warning about files that this run will neither replace nor remove.
 fn stale_files(setup: &Setup<'_>) -> Option<String> {
     let has_lines = setup.body.membrane.as_ref().is_some_and(Membrane::has_lines);
     let stale = setup.folder.stale_files(&setup.loaded.scene.output, has_lines);
     (!stale.is_empty() && !setup.options.resume).then(|| {
         format!(
-            "{} holds files of an earlier run that this one does not write: {}",
+            "{} holds files that this run does not write, and that no report of Cutis lists: {}",
             setup.folder.0.display(),
             stale.join(", ")
         )
     })
 }
 
-/// Restores the state of the run folder's checkpoint, and returns its frame.
-fn resume(setup: &Setup<'_>, fingerprint: &[u8; 32], simulation: &mut dyn Simulation) -> Result<u32, Error> {
+/// Restores the state of the run folder's checkpoint, and returns its frame and the rows up to it.
+fn resume(
+    setup: &Setup<'_>,
+    fingerprint: &[u8; 32],
+    simulation: &mut dyn Simulation,
+) -> Result<(u32, Vec<FrameRow>), Error> {
     let (path, frames) = (setup.folder.checkpoint(), setup.loaded.scene.run.frames);
     let saved = Checkpoint::read(&path, fingerprint, setup.body.mesh.positions.len())?;
     if saved.frame > frames {
@@ -109,5 +114,5 @@ fn resume(setup: &Setup<'_>, fingerprint: &[u8; 32], simulation: &mut dyn Simula
         return Err(Error::Checkpoint { path, why });
     }
     simulation.restore(&saved)?;
-    Ok(saved.frame)
+    Ok((saved.frame, saved.history))
 }

@@ -4,7 +4,7 @@ use cutis_mesh::{Slit, WoundGape};
 
 use super::clock::Clock;
 use super::files;
-use super::frames::{FrameRow, earlier_frames, frame_times, frames_csv};
+use super::frames::{FrameRow, frame_times, frames_csv};
 use super::simulate::{Setup, Simulated, warn};
 use super::stops::Settled;
 use crate::Error;
@@ -27,8 +27,8 @@ pub(super) fn report(
     outputs: OutputResults,
     clock: Clock<'_>,
 ) -> Result<Report, Error> {
-    let Setup { loaded, options, folder, source, body } = *setup;
-    let Simulated { mut plan, device, resumed, result } = simulated;
+    let Setup { loaded, folder, source, body, .. } = *setup;
+    let Simulated { mut plan, device, result } = simulated;
     let (rows, end) = (result.rows, result.end);
     let Settled { stops, last } = result.settled.unwrap_or_default();
     let (settling, settled) = last.unzip();
@@ -78,9 +78,7 @@ pub(super) fn report(
         warnings: [plan.warnings, outputs.warnings].concat(),
     };
     if loaded.scene.output.report {
-        let earlier =
-            if options.resume { earlier_frames(folder, resumed.unwrap_or(0))? } else { String::new() };
-        files::write(&folder.frames(), frames_csv(&earlier, &rows).as_bytes())?;
+        files::write(&folder.frames(), frames_csv(&rows).as_bytes())?;
         html::write(&report, &rows, &outputs.figures, folder)?;
         report.write(&folder.report())?;
     }

@@ -242,7 +242,7 @@ impl Simulation for SolverRun<'_> {
         let words = velocities.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits));
         let words = words.chain(self.threads.iter().flat_map(Threads::starts));
         let words = words.chain(self.hooks.iter().flat_map(Hooks::starts)).collect();
-        Ok(Checkpoint { frame, positions, words })
+        Ok(Checkpoint { frame, positions, words, history: Vec::new() })
     }
 
     /// Reads the whole body once. Residuals are measured on the host, so that they need no GPU

@@ -1,0 +1,75 @@
+//! Ctrl-C during a run: no partial file stays, and the last line says how to resume.
+
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use cutis::RunFolder;
+
+use crate::terminal;
+
+/// Exit code of a program that SIGINT ended.
+const INTERRUPTED: i32 = 130;
+
+/// A run that can be interrupted.
+pub(crate) struct Interruptible {
+    /// The run folder.
+    pub(crate) out: PathBuf,
+    /// Whether the command can resume, as `cutis run` can.
+    pub(crate) can_resume: bool,
+    /// Whether the run itself resumed from a checkpoint.
+    pub(crate) resumed: bool,
+}
+
+impl Interruptible {
+    /// Waits for Ctrl-C in the background, and then ends the program. Without a handler, which a
+    /// system may refuse, Ctrl-C ends the program as it always does.
+    pub(crate) fn watch(self) {
+        let start = SystemTime::now();
+        let _ = ctrlc::set_handler(move || {
+            terminal::interrupted(&self.message(start));
+            remove_partial_files(&self.out);
+            std::process::exit(INTERRUPTED);
+        });
+    }
+
+    fn message(&self, start: SystemTime) -> String {
+        let checkpoint = RunFolder(self.out.clone()).checkpoint();
+        let written = std::fs::metadata(&checkpoint).and_then(|facts| facts.modified());
+        let is_ours = written.is_ok_and(|written| self.resumed || written >= start);
+        match (self.can_resume, is_ours) {
+            (true, true) => {
+                let call: Vec<String> = std::env::args().map(|word| quoted(&word)).collect();
+                let resume = if self.resumed { "" } else { " --resume" };
+                format!(
+                    "interrupted; {} holds a state of this run. To continue: {}{resume}",
+                    checkpoint.display(),
+                    call.join(" ")
+                )
+            }
+            (true, false) => "interrupted; there is no checkpoint of this run to resume from: \
+                              run.checkpoint_every = 10 saves its state after every tenth frame"
+                .into(),
+            (false, _) => "interrupted; only `cutis run` with run.checkpoint_every can be resumed".into(),
+        }
+    }
+}
+
+/// Removes the hidden files of this process from the run folder.
+fn remove_partial_files(folder: &Path) {
+    let prefix = format!(".cutis-{}-", std::process::id());
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_ours = |name: &str| name.starts_with(&prefix) && name.ends_with(".part");
+    for entry in entries.filter(|entry| entry.file_name().to_str().is_some_and(is_ours)) {
+        // The program ends, and there is nobody to tell of a file that stays.
+        let _ = std::fs::remove_file(entry.path());
+    }
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@+".contains(c);
+    match !word.is_empty() && word.chars().all(plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
+}
