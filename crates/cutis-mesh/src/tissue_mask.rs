@@ -130,6 +130,11 @@ impl TissueMask {
         self.components
     }
 
+    /// Number of tets of the body.
+    pub fn tets(&self) -> usize {
+        self.masks.tet_count()
+    }
+
     /// Number of tissue tets in the components that were dropped.
     pub fn dropped_tets(&self) -> usize {
         self.dropped_tets

@@ -8,6 +8,7 @@ use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOp
 
 use super::pretty;
 use crate::args::Change;
+use crate::interrupt::Interruptible;
 use crate::terminal::{Terminal, print};
 
 /// Error of the state of rest in the demo.
@@ -18,6 +19,7 @@ pub(crate) fn demo(out: &Path, change: &Change, json: bool) -> Result<(), Error>
         Some(_) => change.applied(cutis::demo(&change.overrides(None))?),
         None => settled(&[("run.until", "rest"), ("run.error", DEMO_ERROR)], change, cutis::demo)?,
     };
+    Interruptible { out: out.into(), can_resume: false, resumed: false }.watch();
     finish(&loaded, RunOptions { out: out.into(), resume: false }, json)
 }
 
@@ -26,7 +28,9 @@ pub(crate) fn settle(scene: &Path, out: Option<PathBuf>, change: &Change, json: 
         let until = Override { key: "run.until".into(), value: "rest".into() };
         Scene::load(scene, &[overrides, &[until]].concat())
     })?;
-    finish(&loaded, RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume: false }, json)
+    let out = out.unwrap_or_else(|| folder(scene));
+    Interruptible { out: out.clone(), can_resume: false, resumed: false }.watch();
+    finish(&loaded, RunOptions { out, resume: false }, json)
 }
 
 /// A scene with keys that the user may change, and without frames.
@@ -49,7 +53,9 @@ pub(crate) fn run(
     json: bool,
 ) -> Result<(), Error> {
     let loaded = change.applied(Scene::load(scene, &change.overrides(None))?);
-    finish(&loaded, RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume }, json)
+    let options = RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume };
+    Interruptible { out: options.out.clone(), can_resume: true, resumed: resume }.watch();
+    finish(&loaded, options, json)
 }
 
 /// The run folder of a scene that names none.
@@ -143,6 +149,8 @@ fn table(plan: &Plan) -> String {
         format!("projections      {}", plan.projections),
         format!("memory, CT       {:.1} MB", plan.volume_bytes as f64 / 1e6),
     ];
+    let peak = plan.stages.iter().filter_map(|stage| stage.peak_bytes).max();
+    lines.extend(peak.map(|bytes| format!("memory, peak     {:.1} MB while planning", bytes as f64 / 1e6)));
     lines.extend((sizes.lip_pairs > 0).then(|| format!("lip pairs        {}", sizes.lip_pairs)));
     lines.extend(plan.tension.iter().map(|(kind, tension)| format!("tension          {kind}: {tension}")));
     lines.extend(plan.membrane.iter().map(|membrane| format!("lines of tension {}", membrane.summary())));

@@ -122,3 +122,22 @@ fn hostile_header() -> Vec<u8> {
     put(344, b"n+1\0");
     bytes
 }
+
+/// A lattice that is too fine for the memory is refused with the need, the memory and the key,
+/// before anything of its size is allocated. The address space is limited, so that the test needs
+/// no large machine. Control: the same limit suffices for the lattice of the scene.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_lattice_that_exceeds_the_memory_is_refused_by_name() {
+    let desk = Desk::new();
+    let limited = |call: &str| desk.script(&format!("ulimit -v 3000000; exec \"$cutis\" {call}"));
+    limited("check scene.toml --backend cpu").expect_success();
+    limited("check scene.toml --backend cpu --set lattice.spacing_mm=0.5").expect_error(
+        2,
+        &["scene.toml", "lattice.spacing_mm", "0.5", "GB of memory", "GB are available", "lattice.region"],
+    );
+    limited("check scene.toml --backend cpu --lattice 1.2")
+        .expect_error(2, &["scene.toml", "lattice.spacing_mm", "tetrahedra", "GB are available"]);
+    desk.cutis(&["phantom", "--size", "48,48,36", "--out", "ct.nii"]).expect_success();
+    limited("skin ct.nii --lattice 0.5").expect_error(2, &["--lattice", "GB of memory", "larger spacing"]);
+}

@@ -5,10 +5,13 @@ mod disk;
 mod exit_codes;
 #[cfg(feature = "gpu")]
 mod gpu;
+#[cfg(unix)]
+mod interrupt;
 mod json;
 mod looks;
 mod paper_form;
 mod printed;
+mod run_folder;
 mod steps;
 mod tune;
 

@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use super::cut_error::cut_error;
 use super::lattice::lattice;
 use super::{
-    Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, no_skin, region, sutures,
+    Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, memory, no_skin, region, sutures,
 };
 use crate::Error;
 use crate::scene::Keep;
@@ -26,6 +26,7 @@ impl Body {
             no_skin::refuse_offset(volume, tissue.air_below_hu, "volume.offset_hu").map_err(no_skin)?;
         }
         let lattice = lattice(sections, volume)?;
+        memory::check_points(sections, lattice.grid().len())?;
         let hu = lattice.sample(volume)?;
         let air = air(&hu, tissue.air_below_hu);
         let largest_component = tissue.keep == Keep::Largest;

@@ -8,7 +8,7 @@ use cutis_volume::sample::LatticeSize;
 use cutis_volume::{ReadOptions, sample};
 use nalgebra::Point3;
 
-use super::{AIR_BELOW_HU, air, no_skin};
+use super::{AIR_BELOW_HU, air, memory, no_skin};
 use crate::ct::source::with_offset;
 use crate::{Error, Progress};
 
@@ -50,6 +50,7 @@ pub fn find_skin(
     no_skin::refuse_offset(&volume, AIR_BELOW_HU, "--offset-hu").map_err(no_skin)?;
     progress.begin("detect the skin", 0);
     let lattice = Lattice::new(sample::lattice_grid(volume.grid(), request.lattice)?, request.split)?;
+    memory::check_request(lattice.grid().len())?;
     let air = air(&sample::to_grid(&volume, lattice.grid())?, AIR_BELOW_HU);
     let found = skin::detect(&lattice, &air, request.mode, &SkinOptions::default())?;
     progress.end();

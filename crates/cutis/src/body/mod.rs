@@ -9,6 +9,7 @@ mod handles;
 mod lattice;
 mod materials;
 mod membrane;
+mod memory;
 mod no_skin;
 mod region;
 mod sections;

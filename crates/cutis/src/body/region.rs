@@ -6,6 +6,7 @@ use nalgebra::{Point3, distance};
 use super::BodySections;
 use super::cut_error::cut_error;
 use super::handles::Grasp;
+use super::memory;
 use crate::Error;
 use crate::scene::{HandleSection, LatticeSection, PickedRegion, Zone};
 
@@ -19,6 +20,7 @@ pub(super) fn mesh(
 ) -> Result<TetMesh, Error> {
     let file = sections.file;
     let Some(zone) = region_zone(sections.lattice) else {
+        memory::check_tets(sections, whole.tets())?;
         return whole.mesh(hu).map_err(file.blame("tissue"));
     };
     let frame = Frame::center_of(whole.lattice().grid());
@@ -26,7 +28,11 @@ pub(super) fn mesh(
         Zone::Box(min, max) => (0..3).all(|axis| (min[axis]..=max[axis]).contains(&mm[axis])),
         Zone::Around(around) => near_action(sections.handles, from_cuts_mm(frame.to_local(mm)), mm, around),
     };
-    whole.mesh_within(hu, &whole.vertices_where(holds)).map_err(|error| match error {
+    let inside = whole.vertices_where(holds);
+    let count = |flags: &[bool]| flags.iter().filter(|&&flag| flag).count().max(1) as u64;
+    let share = whole.tets() as u64 * count(&inside) / count(whole.vertices());
+    memory::check_tets(sections, share as usize)?;
+    whole.mesh_within(hu, &inside).map_err(|error| match error {
         MeshError::RegionEmpty { .. } => file.bad_key("lattice.region", &shown(zone), &error.to_string()),
         other => file.blame("tissue")(other),
     })

@@ -5,6 +5,7 @@ use std::path::Path;
 use cutis_mesh::{Excision, Incision, SkinMode, Undermining};
 
 use super::growing::Timing;
+use super::memory::bytes_per_tet;
 use crate::model::ModelChoice;
 use crate::scene::{
     ExcisionSection, HandleSection, IncisionSection, LatticeSection, LoadedScene, MembraneSection, Scene,
@@ -18,6 +19,8 @@ pub(crate) struct BodySections<'a> {
     /// The name of the CT in messages.
     pub(crate) ct: &'a Path,
     pub(crate) lattice: &'a LatticeSection,
+    /// Memory that a tetrahedron takes.
+    pub(crate) bytes_per_tet: u64,
     pub(crate) tissue: &'a TissueSection,
     /// Rule by which the skin is found; none if the scene does not need the skin.
     pub(crate) skin: Option<SkinMode>,
@@ -53,6 +56,7 @@ impl<'a> BodySections<'a> {
             file: loaded.file(),
             ct: scene.volume.path.as_deref().unwrap_or(Path::new("phantom")),
             lattice: &scene.lattice,
+            bytes_per_tet: bytes_per_tet(scene),
             tissue: &scene.tissue,
             skin: needs_skin(scene).then_some(scene.skin.mode),
             smooth_skin: smooth_skin(scene),

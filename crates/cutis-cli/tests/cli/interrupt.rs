@@ -1,0 +1,64 @@
+//! Ctrl-C during a run: the message says how to resume, and the resumed run has the whole history.
+
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::{Desk, PROGRAM};
+
+/// Starts a long run, waits until `ready` exists, sends SIGINT, and returns exit code and standard
+/// error.
+fn interrupt(desk: &Desk, options: &[&str], ready: &str) -> (Option<i32>, String) {
+    let args = [&["run", "scene.toml", "--out", "run", "--frames", "1000000"], options].concat();
+    let mut command = Command::new(PROGRAM);
+    command.args(args).current_dir(desk.path(".")).stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    for _ in 0..600 {
+        if desk.path(ready).exists() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    assert!(desk.path(ready).exists(), "no {ready} in a minute");
+    std::thread::sleep(Duration::from_millis(300));
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let done = child.wait_with_output().unwrap();
+    (done.status.code(), String::from_utf8(done.stderr).unwrap())
+}
+
+#[test]
+fn an_interrupted_run_says_how_to_resume_and_resumes_with_its_history() {
+    let desk = Desk::new();
+    let every = ["--set", "run.checkpoint_every=3", "--set", "output={ report = true }"];
+    let (code, text) = interrupt(&desk, &every, "run/checkpoint.bin");
+    assert_eq!(code, Some(130), "{text}");
+    let last = text.trim_end().lines().last().unwrap();
+    assert!(last.contains("run/checkpoint.bin") && last.ends_with("--resume"), "{text}");
+    assert_eq!(desk.names("run"), ["checkpoint.bin"], "no partial file stays");
+
+    let state = std::fs::read(desk.path("run/checkpoint.bin")).unwrap();
+    let frame = u32::from_le_bytes(state[40..44].try_into().unwrap());
+    assert!(frame >= 3 && frame % 3 == 0, "{frame}");
+    let frames = (frame + 2).to_string();
+    let resume = ["run", "scene.toml", "--out", "run", "--resume", "--frames", &frames];
+    desk.cutis(&[&resume[..], &every].concat()).expect_success();
+    let table = std::fs::read_to_string(desk.path("run/frames.csv")).unwrap();
+    let found: Vec<u32> =
+        table.lines().skip(1).map(|line| line.split(',').next().unwrap().parse().unwrap()).collect();
+    assert_eq!(found, (0..=frame + 2).collect::<Vec<u32>>());
+    let html = std::fs::read_to_string(desk.path("run/report.html")).unwrap();
+    assert!(html.contains("<title>scene - Cutis run</title>") && html.contains("name=\"viewport\""));
+    let paths = html.split("<path d=\"M").filter_map(|rest| rest.split('"').next());
+    let points = paths.map(|path| 1 + path.matches('L').count()).max().unwrap();
+    assert_eq!(points, frame as usize + 3, "the curve has a point for each frame");
+}
+
+/// Control: without a checkpoint nothing can be resumed, and the message says what to set.
+#[test]
+fn an_interrupted_run_without_a_checkpoint_says_so() {
+    let desk = Desk::new();
+    let (code, text) = interrupt(&desk, &[], "run");
+    assert_eq!(code, Some(130), "{text}");
+    let last = text.trim_end().lines().last().unwrap();
+    assert!(last.contains("run.checkpoint_every") && !last.contains("--resume"), "{text}");
+}

@@ -1,0 +1,145 @@
+//! The memory that a lattice takes, compared with what the system can give. A lattice that is too
+//! fine is refused by name before anything of its size is allocated.
+
+use std::fs;
+use std::path::Path;
+
+use cutis_solver::Formulation;
+
+use super::BodySections;
+use crate::Error;
+use crate::model::ModelChoice;
+use crate::scene::{LatticeSection, Scene};
+
+/// Peak of the memory per lattice point while the body is found, bytes. `cutis skin` took 12.7 on
+/// the phantom, for 0.2 to 5.9 million points.
+const BYTES_PER_POINT: u64 = 13;
+
+/// Peak of the memory per tetrahedron of a scene, bytes. `cutis check` of the phantom took 33 with
+/// ChainMail, 79 with XPBD and 176 to 190 with vertex block descent, a membrane and materials, for
+/// 3.5 to 10.7 million tetrahedra, besides the lattice points.
+pub(super) fn bytes_per_tet(scene: &Scene) -> u64 {
+    match (scene.model, scene.solver.formulation) {
+        (ModelChoice::Chainmail, _) => 33,
+        (ModelChoice::Pbd, Formulation::Vbd) => 175,
+        (ModelChoice::Pbd, _) => 79,
+    }
+}
+
+/// Refuses a lattice of `points` points whose body cannot be found in the memory of this machine.
+pub(super) fn check_points(sections: &BodySections<'_>, points: usize) -> Result<(), Error> {
+    refuse_above(available(), sections, points as u64 * BYTES_PER_POINT, &format!("{points} lattice points"))
+}
+
+/// Refuses a body of `tets` tetrahedra that cannot be simulated in the memory of this machine.
+pub(super) fn check_tets(sections: &BodySections<'_>, tets: usize) -> Result<(), Error> {
+    refuse_above(available(), sections, tets as u64 * sections.bytes_per_tet, &format!("{tets} tetrahedra"))
+}
+
+/// Refuses a lattice of `points` points outside a scene.
+pub(super) fn check_request(points: usize) -> Result<(), Error> {
+    let (needed, available) = (points as u64 * BYTES_PER_POINT, available().unwrap_or(u64::MAX));
+    if needed <= available {
+        return Ok(());
+    }
+    let why = format!("{}; use a larger spacing", comparison(needed, available, &format!("{points} points")));
+    Err(Error::Request { what: "--lattice".into(), why })
+}
+
+fn refuse_above(
+    available: Option<u64>,
+    sections: &BodySections<'_>,
+    needed: u64,
+    what: &str,
+) -> Result<(), Error> {
+    let Some(available) = available.filter(|&available| needed > available) else { return Ok(()) };
+    let LatticeSection { spacing_mm, vertices, .. } = sections.lattice;
+    let (key, value) = match (spacing_mm, vertices) {
+        (Some(spacing), _) => ("lattice.spacing_mm", spacing.to_string()),
+        (None, Some(vertices)) => ("lattice.vertices", format!("{vertices:?}")),
+        (None, None) => ("lattice", String::new()),
+    };
+    // The memory goes with the number of points, which goes with the third power of the step.
+    let factor = (needed as f64 / available as f64).cbrt();
+    let remedy = match spacing_mm {
+        Some(spacing) => format!("use {:.2} or more", (spacing * factor * 100.0).ceil() / 100.0),
+        None => format!("use a spacing_mm that is {factor:.1} times as large"),
+    };
+    let zones =
+        "or leave tissue out (lattice.region), or use fewer points far from the cut (lattice.grading)";
+    let why = format!("{}; {remedy}, {zones}", comparison(needed, available, what));
+    Err(sections.file.bad_key(key, &value, &why))
+}
+
+fn comparison(needed: u64, available: u64, what: &str) -> String {
+    let gb = |bytes: u64| bytes as f64 / 1e9;
+    format!("{what} take about {:.1} GB of memory, and {:.1} GB are available", gb(needed), gb(available))
+}
+
+/// Memory that the system can give to this process, bytes: what is free, within the limits of its
+/// control group and of its address space. None if the system does not tell. Linux only.
+fn available() -> Option<u64> {
+    let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
+    let meminfo = read("/proc/meminfo");
+    let free = kib(&meminfo, "MemAvailable:").map(|free| free + kib(&meminfo, "SwapFree:").unwrap_or(0));
+    let address_space = soft_limit(&read("/proc/self/limits"), "Max address space")
+        .map(|limit| limit.saturating_sub(kib(&read("/proc/self/status"), "VmSize:").unwrap_or(0)));
+    [free, address_space, control_group(&read("/proc/self/cgroup"))].into_iter().flatten().min()
+}
+
+/// What a control group of version 2 leaves of its limit, the least of the group and those above.
+fn control_group(groups: &str) -> Option<u64> {
+    let group = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
+    let root = Path::new("/sys/fs/cgroup");
+    let number = |file: &Path| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
+    let left = |folder: &Path| {
+        Some(number(&folder.join("memory.max"))?.saturating_sub(number(&folder.join("memory.current"))?))
+    };
+    let folder = root.join(group);
+    folder.ancestors().take_while(|folder| folder.starts_with(root)).filter_map(left).min()
+}
+
+/// A number of KiB in a file of `/proc`, as bytes.
+fn kib(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
+}
+
+/// The soft limit in `/proc/self/limits`, bytes. None if it is unlimited.
+fn soft_limit(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_files_of_the_system_are_understood() {
+        let meminfo = "MemTotal:       24000000 kB\nMemAvailable:    1000 kB\nSwapFree:  0 kB\n";
+        assert_eq!(kib(meminfo, "MemAvailable:"), Some(1_024_000));
+        assert_eq!(kib(meminfo, "VmSize:"), None);
+        let limits = "Limit                     Soft Limit           Hard Limit           Units\n\
+                      Max address space         4096000              unlimited            bytes\n";
+        assert_eq!(soft_limit(limits, "Max address space"), Some(4_096_000));
+        assert_eq!(soft_limit(&limits.replace("4096000", "unlimited"), "Max address space"), None);
+        assert_eq!(control_group("12:cpu:/old\n"), None);
+    }
+
+    #[test]
+    fn a_lattice_that_needs_more_than_there_is_names_its_key() {
+        let loaded = crate::demo(&[]).unwrap();
+        let sections = BodySections::of(&loaded);
+        refuse_above(Some(8_000_000_000), &sections, 8_000_000_000, "n").unwrap();
+        refuse_above(None, &sections, u64::MAX, "n").unwrap();
+        let error = refuse_above(Some(1_000_000_000), &sections, 8_000_000_000, "n points").unwrap_err();
+        let text = error.to_string();
+        let spacing = loaded.scene.lattice.spacing_mm.unwrap();
+        for words in ["lattice.spacing_mm", "n points take about 8.0 GB", "1.0 GB are available"] {
+            assert!(text.contains(words), "{text}");
+        }
+        assert!(text.contains(&format!("use {:.2} or more", 2.0 * spacing)), "{text}");
+        assert!(error.is_bad_input());
+    }
+}
