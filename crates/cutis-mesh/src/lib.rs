@@ -5,6 +5,7 @@
 //! of values in millimeters end in `_mm`.
 #![forbid(unsafe_code)]
 
+mod below_skin;
 mod build;
 mod cells;
 mod component;

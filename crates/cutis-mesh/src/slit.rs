@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::below_skin::through_body;
 use crate::incision::Incision;
 use crate::path::check_path;
 use crate::skin_surface::{Facet, SkinSurface};
@@ -10,10 +11,6 @@ use crate::{Lattice, MeshError};
 /// Largest number of sample points and bins along one slit. It limits the work for very long
 /// segments.
 const MOST_BINS: f64 = 1024.0;
-
-/// Largest depth of a segment below the skin, over its length below the skin. A chord of a circle
-/// has this sag if it spans about 90°.
-const DEEPEST: f64 = 0.2;
 
 /// A segment of an incision placed on the skin at rest. Lengths are in meters, positions in local
 /// meters.
@@ -66,8 +63,8 @@ impl Slit {
     /// [`MeshError::IncisionPath`] if a path has fewer than two points, turns back or crosses
     /// itself. [`MeshError::IncisionWithoutSkin`] if there is no skin.
     /// [`MeshError::IncisionOffSkin`] or [`MeshError::IncisionOverGap`] if a segment is too far
-    /// from the skin. [`MeshError::IncisionThroughBody`] or [`MeshError::IncisionThroughSkin`] if it
-    /// runs through the body or pierces the skin.
+    /// from the skin. [`MeshError::IncisionThroughBody`] if it runs through the body, and
+    /// [`MeshError::IncisionThroughSkin`] if it pierces the skin.
     pub fn on_lattice(
         lattice: &Lattice,
         skin: &[[u32; 3]],
@@ -339,46 +336,6 @@ impl Slit {
     pub fn inward(&self) -> Vector3<f64> {
         self.inward
     }
-}
-
-/// The largest depth below the skin in m of a segment that runs through the body, and its place.
-/// None if the segment follows the skin.
-///
-/// Each stretch of the segment below the skin may be deeper than the shallower one of its ends by
-/// [`DEEPEST`] of its length, or by two lattice steps. `near` are the facets within `reach` and two
-/// lattice steps of the segment.
-fn through_body(
-    surface: &SkinSurface<'_>,
-    near: &[&Facet],
-    reach: f64,
-    [start, end]: [Point3<f64>; 2],
-    stations: usize,
-) -> Option<(f64, Point3<f64>)> {
-    let place = |n: usize| start + (end - start) * (n as f64 / stations as f64);
-    let depth = |n: usize| {
-        let depth = depth_below(near.iter().copied(), place(n), surface.step);
-        if depth.abs() <= reach { depth } else { depth_below(surface.facets.iter(), place(n), surface.step) }
-    };
-    let depths: Vec<(usize, f64)> = (0..=stations).map(|n| (n, depth(n))).collect();
-    let interval = (end - start).norm() / stations as f64;
-    let deepest = |stretch: &[(usize, f64)]| {
-        let &(at, below) = stretch.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let ends = stretch[0].1.min(stretch[stretch.len() - 1].1);
-        let most = (DEEPEST * interval * stretch.len() as f64).max(2.0 * surface.step);
-        (below > 0.0 && below - ends > most).then(|| (below, place(at)))
-    };
-    let stretches = depths.chunk_by(|a, b| (a.1 > 0.0) == (b.1 > 0.0));
-    stretches.filter_map(deepest).max_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-/// Distance in m from a place to the skin, negative outside the body. The sign is that of the mean
-/// height of the facets that are at most a lattice step farther than the closest one.
-fn depth_below<'a>(facets: impl Iterator<Item = &'a Facet> + Clone, place: Point3<f64>, step: f64) -> f64 {
-    let distance = |facet: &Facet| (facet.center - place).norm();
-    let nearest = facets.clone().map(distance).fold(f64::INFINITY, f64::min);
-    let close = facets.filter(|facet| distance(facet) <= nearest + step);
-    let height: f64 = close.map(|facet| facet.area_vector.dot(&(facet.center - place))).sum();
-    if height > 0.0 { nearest } else { -nearest }
 }
 
 /// Mean of the skin normals at some places. The normal at a place is the area-weighted mean of the
