@@ -25,6 +25,7 @@ mod problems;
 mod random_scenes;
 mod region;
 mod resume;
+mod rounding;
 mod scene_files;
 mod scenes;
 mod settle;

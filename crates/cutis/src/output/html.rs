@@ -153,7 +153,7 @@ fn page(report: &Report, figures: &[Figure], plots: &[String], scene_toml: &str)
     out
 }
 
-/// The name of the scene, so that the pages of several runs can be told apart.
+/// The name of the scene, so that the pages of several runs differ.
 fn title(report: &Report) -> String {
     let scene = report.inputs.first().and_then(|input| Path::new(&input.path).file_stem());
     scene.map_or_else(|| "Cutis run".into(), |name| format!("{} - Cutis run", name.to_string_lossy()))

@@ -6,7 +6,8 @@ use cutis_solver::Formulation;
 use super::*;
 use crate::{Error, model};
 
-/// Largest value that is added to the HU of a file. Offsets of 1000, 1024, 8192 and 32768 are known.
+/// Largest value that is added to the HU of a file. Offsets of 1000, 1024, 8192 and 32768 are in
+/// use.
 const MOST_OFFSET_HU: f32 = 32768.0;
 
 /// Checks values of one scene file; the first bad value is an error.

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::freed::Strength;
 use super::membrane_presets::{MembranePreset, PRESETS, preset};
+use super::rounding::lost_in_rounding;
 use super::too_stiff::too_stiff;
 use super::{BodyParts, ConstraintKind, KindFacts, ScanTension, one};
 use crate::Error;
@@ -365,6 +366,9 @@ impl ConstraintKind for MembraneSection {
         }
         if parts.solver.formulation == Formulation::Xpbd {
             warnings.extend(too_stiff(parts, self.frequency(parts)));
+            let tension = |values: MembraneValues| values.laws.map(|law| law.tension_n_per_m);
+            let most = self.values().map(tension).map_or(0.0, |[along, across]| along.max(across));
+            warnings.extend(lost_in_rounding(parts, most));
         }
         warnings
     }

@@ -11,6 +11,7 @@ mod freed;
 mod membrane;
 mod membrane_presets;
 mod moduli;
+mod rounding;
 mod skin_tension;
 mod tet_volume;
 mod too_stiff;

@@ -12,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::freed::Strength;
+use super::rounding::lost_in_rounding;
 use super::too_stiff::too_stiff;
 use super::{BodyParts, ConstraintKind, KindFacts, ScanTension, compliances, one};
 use crate::Error;
@@ -304,11 +305,8 @@ impl ConstraintKind for StcSection {
         add(divided.copies, &|copy| -f64::from(divided.shares[copy]))
     }
 
-    /// `T s (1 + β s)` with `s = 1/scale − 1`: the derivative of the energy of a triangle by its
-    /// area.
     fn tension(&self, scene: &Scene) -> Option<ScanTension> {
-        let stretch = 1.0 / self.rest_area_scale - 1.0;
-        let tension = self.area_modulus_n_per_m * stretch * (1.0 + self.amplification * stretch.max(0.0));
+        let tension = self.tension_n_per_m();
         let forces = scene.solver.formulation != Formulation::Pbd;
         forces.then_some(ScanTension { along_n_per_m: tension, across_n_per_m: tension, source: None })
     }
@@ -323,8 +321,18 @@ impl ConstraintKind for StcSection {
             warnings.push("no skin was found: skin tension has nothing to act on".to_owned());
         } else if parts.solver.formulation == Formulation::Xpbd {
             warnings.extend(too_stiff(parts, self.frequency(parts)));
+            warnings.extend(lost_in_rounding(parts, self.tension_n_per_m()));
         }
         warnings
+    }
+}
+
+impl StcSection {
+    /// Tension in the scan: `T s (1 + β s)` with `s = 1/scale − 1`, the derivative of the energy of
+    /// a triangle by its area.
+    fn tension_n_per_m(&self) -> f64 {
+        let stretch = 1.0 / self.rest_area_scale - 1.0;
+        self.area_modulus_n_per_m * stretch * (1.0 + self.amplification * stretch.max(0.0))
     }
 }
 
