@@ -29,6 +29,35 @@ fn a_membrane_that_is_too_stiff_for_the_substeps_causes_a_warning() {
 }
 
 #[test]
+fn substeps_that_lose_tension_to_rounding_cause_a_warning() {
+    let lost = |substeps| warns(&[("solver.substeps", substeps)], "rounding loses about");
+    assert!(lost("3000") && !lost("10") && !lost("100"));
+}
+
+/// A plate of 18 mm on the belly, which is two lattice steps thick, is thin. Control: one of 60 mm
+/// is not.
+#[test]
+fn tension_on_thin_parts_causes_a_warning() {
+    use cutis::volume::{Volume, nifti, phantom::Phantom};
+    let ct = Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap();
+    let warns = |thickness_mm: f64| {
+        let grid = *ct.grid();
+        let hu = |n: usize| {
+            let mm = grid.mm(grid.point(n));
+            let plate = mm.x.abs() < 60.0 && (80.0..190.0).contains(&mm.y) && mm.z.abs() < thickness_mm / 2.0;
+            if plate { 40 } else { ct.voxels()[n] }
+        };
+        let with_plate = Volume::new(grid, (0..grid.len()).map(hu).collect(), 1.0, 0.0).unwrap();
+        let here = tempfile::tempdir().unwrap();
+        let file = here.path().join("ct.nii");
+        nifti::write(&file, &with_plate).unwrap();
+        let volume = format!("{{ path = {file:?} }}");
+        warns(&[("volume", &volume), ("incision", "[]")], "thinner than 3 lattice steps")
+    };
+    assert!(warns(18.0) && !warns(60.0));
+}
+
+#[test]
 fn narrow_slits_and_free_bodies_cause_warnings() {
     assert!(warns(&[("incision[0].width_mm", "2.0")], "incision[0].width_mm = 2"));
     assert!(!warns(&[("incision.0.width_mm", "12.0")], "width_mm"));

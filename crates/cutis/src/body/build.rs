@@ -10,6 +10,7 @@ use super::cut_error::cut_error;
 use super::lattice::lattice;
 use super::{
     Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, memory, no_skin, region, sutures,
+    thin,
 };
 use crate::Error;
 use crate::scene::Keep;
@@ -61,6 +62,7 @@ impl Body {
             sections.membrane.map(|section| Membrane::find(file, section, &whole, &hu, &skin)).transpose()?;
         warnings.extend(membrane.iter().flat_map(|membrane| membrane.warnings.iter().cloned()));
         let mut mesh = region::mesh(sections, &whole, &hu, &from_cuts_mm)?;
+        warnings.extend(sections.has_tension.then(|| thin::warning(&whole, &mesh, &skin)).flatten());
         let mut materials = BodyMaterials::assign(sections, &whole, &hu, &mesh, &skin)?;
         warnings.extend(materials.iter().flat_map(|materials| materials.warnings(&mesh)));
         let (mut skin, mut inactive_skin) = mesh.divide_skin(&skin);

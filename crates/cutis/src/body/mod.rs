@@ -14,6 +14,7 @@ mod no_skin;
 mod region;
 mod sections;
 mod sutures;
+mod thin;
 
 use cutis_mesh::sever::{Embedded, Severed};
 use cutis_mesh::{Cut, InactiveSkin, Removed, SkinReport, Stitch, TetMesh};

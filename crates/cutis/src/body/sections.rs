@@ -22,6 +22,8 @@ pub(crate) struct BodySections<'a> {
     /// Memory that a tetrahedron takes.
     pub(crate) bytes_per_tet: u64,
     pub(crate) tissue: &'a TissueSection,
+    /// Whether a constraint puts the skin under tension.
+    pub(crate) has_tension: bool,
     /// Rule by which the skin is found; none if the scene does not need the skin.
     pub(crate) skin: Option<SkinMode>,
     /// Whether the vertices of the skin move onto a smooth surface.
@@ -58,6 +60,7 @@ impl<'a> BodySections<'a> {
             lattice: &scene.lattice,
             bytes_per_tet: bytes_per_tet(scene),
             tissue: &scene.tissue,
+            has_tension: scene.model == ModelChoice::Pbd && scene.constraints.need_skin(),
             skin: needs_skin(scene).then_some(scene.skin.mode),
             smooth_skin: smooth_skin(scene),
             membrane: membrane(scene),
