@@ -2,6 +2,7 @@
 
 mod args;
 mod commands;
+mod headless;
 mod interrupt;
 mod terminal;
 
@@ -10,6 +11,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
+    headless::quiet_drivers();
     let args = args::Args::parse();
     match commands::run(args.command) {
         Ok(()) => ExitCode::SUCCESS,

@@ -205,3 +205,12 @@ fn vulkan_is_loaded_only_on_request() {
     assert!(printed["backend"]["reason"].as_str().unwrap().contains("too few"), "{}", printed["backend"]);
     assert!(printed["left_out"].to_string().contains("gpu: no device is opened"), "{}", printed["left_out"]);
 }
+
+/// Without a display session, a layer of Mesa prints errors although nothing is wrong.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_machine_without_a_display_session_prints_no_errors() {
+    let desk = Desk::new();
+    let done = desk.script("unset NODEVICE_SELECT XDG_RUNTIME_DIR; exec \"$cutis\" devices").expect_success();
+    assert!(!done.stderr.contains("error"), "{}", done.stderr);
+}
