@@ -19,7 +19,8 @@ fn skin(volume: &Volume, offset_hu: f32) -> Result<usize, Error> {
     let file = folder.path().join("ct.nii.gz");
     nifti::write(&file, volume).unwrap();
     let lattice = LatticeSize::SpacingMm(12.0);
-    let request = SkinRequest { lattice, split: Split::Kuhn6, mode: SkinMode::Exterior, offset_hu };
+    let (split, mode) = (Split::Kuhn6, SkinMode::Exterior);
+    let request = SkinRequest { read: Default::default(), lattice, split, mode, offset_hu };
     cutis::find_skin(&file, &request, None, &Silent).map(|report| report.triangles)
 }
 
@@ -100,7 +101,11 @@ fn inspect_warns_about_an_offset() {
     let warns = |to: i16| {
         let file = folder.path().join("ct.nii");
         nifti::write(&file, &torso(|hu| hu + to)).unwrap();
-        cutis::inspect(&file).unwrap().warnings.iter().any(|line| line.contains("volume.offset_hu = -1024"))
+        cutis::inspect(&file, &Default::default())
+            .unwrap()
+            .warnings
+            .iter()
+            .any(|line| line.contains("volume.offset_hu = -1024"))
     };
     assert!(warns(1024) && !warns(0));
 }

@@ -23,6 +23,10 @@ pub(crate) struct Interruptible {
 impl Interruptible {
     /// Waits for Ctrl-C in the background, and then ends the program. Without a handler, which a
     /// system may refuse, Ctrl-C ends the program as it always does.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the run goes on in other threads; its partial files are removed"
+    )]
     pub(crate) fn watch(self) {
         let start = SystemTime::now();
         let _ = ctrlc::set_handler(move || {

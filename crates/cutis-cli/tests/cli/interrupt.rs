@@ -7,6 +7,7 @@ use crate::{Desk, PROGRAM};
 
 /// Starts a long run, waits until `ready` exists, sends SIGINT, and returns exit code and standard
 /// error.
+#[expect(clippy::disallowed_methods, reason = "a file of another process is no event to wait for")]
 fn interrupt(desk: &Desk, options: &[&str], ready: &str) -> (Option<i32>, String) {
     let args = [&["run", "scene.toml", "--out", "run", "--frames", "1000000"], options].concat();
     let mut command = Command::new(PROGRAM);

@@ -82,7 +82,7 @@ impl<'a> Source<'a> {
     /// Decompresses the rest of the file from here on. Positions then count decompressed bytes.
     pub(crate) fn decompress(mut self, compression: Compression) -> Self {
         self.stream = match (self.stream, compression) {
-            (Stream::Plain(raw), Compression::Gzip) => Stream::Gzip(Box::new(MultiGzDecoder::new(raw))),
+            (Stream::Plain(raw), Compression::Gzip) => Stream::Gzip(Box::new(GzipMembers::new(raw))),
             (Stream::Plain(raw), Compression::Zlib) => Stream::Zlib(Box::new(ZlibDecoder::new(raw))),
             (other, _) => other,
         };
