@@ -7,8 +7,9 @@ use rayon::prelude::*;
 
 /// Thickness in lattice steps below which a part is thin.
 const STEPS: f64 = 3.0;
-/// Number of skin vertices on thin parts up to which nothing is reported: a few are at corners.
-const FEW: usize = 20;
+/// Skin vertices on thin parts up to which nothing is reported, as a number and as a share of the
+/// skin: a few are at corners.
+const FEW: (usize, f64) = (20, 1e-3);
 
 /// Warning about the skin of a mesh on thin parts. `skin` are triangles in flat lattice indices.
 pub(super) fn warning(whole: &TissueMask, mesh: &TetMesh, skin: &[[u32; 3]]) -> Option<String> {
@@ -18,12 +19,13 @@ pub(super) fn warning(whole: &TissueMask, mesh: &TetMesh, skin: &[[u32; 3]]) -> 
     for (vertex, &point) in mesh.lattice_index.iter().enumerate() {
         moves[point as usize] = border.is_none_or(|border| !border[vertex]);
     }
-    let (mut thin, mut moving) = (Vec::new(), 0);
+    let (mut thin, mut moving) = (Vec::new(), 0_u32);
     for (point, is_thin) in thickness(lattice, whole.vertices(), skin) {
-        moving += usize::from(moves[point as usize]);
+        moving += u32::from(moves[point as usize]);
         thin.extend((is_thin && moves[point as usize]).then_some(point));
     }
-    let middle = *thin.get(thin.len() / 2).filter(|_| thin.len() > FEW)?;
+    let few = FEW.0.max((FEW.1 * f64::from(moving)) as usize);
+    let middle = *thin.get(thin.len() / 2).filter(|_| thin.len() > few)?;
     let at_mm: [f64; 3] = lattice.mm(lattice.grid().point(middle as usize)).into();
     Some(format!(
         "{} of {moving} vertices of the skin lie on parts that are thinner than {STEPS} lattice steps ({:.1} mm), \
