@@ -11,7 +11,7 @@ use cutis::volume::nifti;
 use cutis::{Error, LoadedScene, Progress, RunOptions, Silent};
 use cutis_test_kit::gpu::{is_exact, on_each_adapter};
 
-use crate::scenes::{self, Run, SMALL, names, run_in};
+use crate::scenes::{self, Run, SMALL, names, run_in, state_of};
 
 const BARE: (&str, &str) = ("output", "{}");
 
@@ -33,8 +33,9 @@ fn options_of(gpu: &Gpu) -> GpuOptions {
 /// Positions and velocities in the checkpoint of a folder.
 fn state(folder: &Path) -> Vec<f32> {
     let bytes = std::fs::read(folder.join("checkpoint.bin")).unwrap();
-    let values = bytes[52..bytes.len() - 32].chunks_exact(4);
-    values.map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+    let [positions, words] = state_of(&bytes);
+    let values = [positions, words].concat();
+    values.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
 /// True if two runs agree. Software adapters must give the CPU's bits. Hardware may fuse a

@@ -68,10 +68,9 @@ impl Run {
     /// Positions in the checkpoint, local meters.
     pub fn positions(&self) -> Vec<Point3<f32>> {
         let bytes = self.bytes("checkpoint.bin");
-        let count = u64::from_le_bytes(bytes[44..52].try_into().unwrap()) as usize;
-        let values = bytes[52..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
-        let values: Vec<f32> = values.take(3 * count).collect();
-        values.chunks_exact(3).map(Point3::from_slice).collect()
+        let [positions, _] = state_of(&bytes);
+        let values = positions.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
+        values.collect::<Vec<f32>>().chunks_exact(3).map(Point3::from_slice).collect()
     }
 
     /// Path of the run folder.
@@ -119,4 +118,14 @@ pub fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
     names
+}
+
+/// Positions, and velocities with all later words, in a checkpoint: the state without the history
+/// of openings and forces.
+pub fn state_of(checkpoint: &[u8]) -> [&[u8]; 2] {
+    let count = u64::from_le_bytes(checkpoint[44..52].try_into().unwrap()) as usize;
+    let (positions, rest) = checkpoint[52..checkpoint.len() - 32].split_at(12 * count);
+    let number = |n: usize| u32::from_le_bytes(rest[4 * n..][..4].try_into().unwrap()) as usize;
+    let [wounds, sutures, handles, rows] = [0, 1, 2, 3].map(number);
+    [positions, &rest[16 + 8 * rows * (2 + 5 * wounds + 2 * sutures + handles)..]]
 }

@@ -11,7 +11,7 @@ use cutis::tune::Demand;
 use cutis::{Error, LoadedScene, Scene, Silent, TuneOptions, Tuning};
 use nalgebra::Point3;
 
-use crate::scenes::{self, SMALL, run_in};
+use crate::scenes::{self, SMALL, run_in, state_of};
 
 /// The small phantom on a coarser lattice, for a shorter time in which it still comes to rest.
 fn scene(set: &[(&str, &str)]) -> LoadedScene {
@@ -40,11 +40,9 @@ fn tuned(loaded: &LoadedScene, folder: &Path, demand: Demand) -> (Tuning, Loaded
 /// Positions in the checkpoint of a folder, in local meters.
 fn state(folder: &Path) -> Vec<Point3<f64>> {
     let bytes = std::fs::read(folder.join("checkpoint.bin")).unwrap();
-    let values: Vec<f64> = bytes[52..bytes.len() - 32]
-        .chunks_exact(4)
-        .map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap())))
-        .collect();
-    values[..values.len() / 2].chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect()
+    let [positions, _] = state_of(&bytes);
+    let values = positions.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap())));
+    values.collect::<Vec<f64>>().chunks_exact(3).map(|p| Point3::new(p[0], p[1], p[2])).collect()
 }
 
 /// A run in double precision with the scene's formulation and many substeps: rest positions, final

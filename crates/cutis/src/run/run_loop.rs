@@ -51,6 +51,9 @@ pub(super) struct RunResult {
     pub(super) times: PartTimes,
 }
 
+/// The end of a simulation, and its positions on the GPU.
+type Ended = (SimulationEnd, Option<DevicePositions>);
+
 impl RunLoop<'_> {
     /// Frames that an earlier run computed.
     fn done(&self) -> u32 {
@@ -79,24 +82,33 @@ impl RunLoop<'_> {
         if rows.is_empty() {
             rows.push(self.row(simulation, &lips, self.done(), None)?);
         }
-        let until = self.run.until;
-        if until == RunEnd::Frames || self.count() > 0 {
-            let frames = |progress: &dyn Progress| {
-                let done = self.frames(simulation, &lips, &mut times, progress, &mut at, &mut rows);
-                done.map_err(|error| at.name(error))
-            };
-            clock.stage_on(place, "simulate", self.count(), frames)?;
-        }
-        let mut settled = None;
-        if until == RunEnd::Rest {
-            settled = Some(self.settle(simulation, &lips, clock)?);
-        }
-        let end = simulation.end()?;
-        let on_device = if self.resamples { simulation.positions_on_device() } else { None };
+        let mut frames = |simulation: &mut dyn Simulation, progress: &dyn Progress| {
+            let done = self.frames(simulation, &lips, &mut times, progress, &mut at, &mut rows);
+            done.map_err(|error| at.name(error))
+        };
+        let (settled, (end, on_device)) = if self.run.until == RunEnd::Frames {
+            let ended = clock.stage_on(place, "simulate", self.count(), |progress| {
+                frames(simulation, progress)?;
+                self.end(simulation)
+            })?;
+            (None, ended)
+        } else {
+            if self.count() > 0 {
+                clock.stage_on(place, "simulate", self.count(), |progress| frames(simulation, progress))?;
+            }
+            let (settled, ended) = self.settle(simulation, &lips, clock)?;
+            (Some(settled), ended)
+        };
         if self.count() > 0 {
             self.time_extra_frame(simulation, &mut times);
         }
         Ok(RunResult { rows, settled, end, on_device, times })
+    }
+
+    /// The state at the end, and the positions on the GPU if an output needs them.
+    fn end(&self, simulation: &mut dyn Simulation) -> Result<Ended, Error> {
+        let end = simulation.end()?;
+        Ok((end, if self.resamples { simulation.positions_on_device() } else { None }))
     }
 
     /// Finds the state of rest after each thing that is still to be done to the body.
@@ -105,7 +117,7 @@ impl RunLoop<'_> {
         simulation: &mut dyn Simulation,
         lips: &Lips<'_>,
         clock: &mut Clock<'_>,
-    ) -> Result<Settled, Error> {
+    ) -> Result<(Settled, Ended), Error> {
         let now_s = simulation.time_s();
         let stops: Vec<&Stop> = self.stops.iter().filter(|stop| stop.time_s > now_s).collect();
         let times_s: Vec<f64> = [now_s].into_iter().chain(stops.iter().map(|stop| stop.time_s)).collect();
@@ -124,7 +136,7 @@ impl RunLoop<'_> {
                 settled.add(RestReport::of(&rest, ms), row, done);
                 progress.advance(before + SEARCH);
             }
-            Ok(settled)
+            Ok((settled, self.end(simulation)?))
         })
     }
 
