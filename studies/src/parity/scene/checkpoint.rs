@@ -6,7 +6,7 @@ use anyhow::bail;
 
 use crate::parity::bench::Failure;
 
-const MAGIC: &[u8] = b"CUTISCP3";
+const MAGIC: &[u8] = b"CUTISCP4";
 /// Length of magic, fingerprint, frame, and number of vertices.
 const HEADER: usize = 8 + 32 + 4 + 8;
 
@@ -23,22 +23,32 @@ impl State {
     /// The file does not exist or has another layout.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = std::fs::read(path)?;
-        let count = bytes.get(HEADER - 8..HEADER).and_then(|count| count.try_into().ok());
-        let numbers = count.and_then(|count| usize::try_from(u64::from_le_bytes(count)).ok());
-        // Threads and hooks store further words after the velocities.
-        let length = numbers.and_then(|count| count.checked_mul(24));
-        let state = length.and_then(|length| bytes.get(HEADER..)?.get(..length));
-        let (Some(state), true) = (state, bytes.starts_with(MAGIC)) else {
-            bail!("{} is not a checkpoint of the known layout", path.display());
-        };
-        let mut values: Vec<f32> =
-            state.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-        let velocities = values.split_off(values.len() / 2);
-        Ok(Self { positions: values, velocities })
+        match vectors(&bytes) {
+            Some([positions, velocities]) => Ok(Self { positions, velocities }),
+            None => bail!("{} is not a checkpoint of the known layout", path.display()),
+        }
     }
 
     /// Largest coordinate in m; the origin is in the middle of the body.
     pub fn extent(&self) -> f64 {
         self.positions.iter().fold(0.0, |most: f64, &x| most.max(f64::from(x).abs()))
     }
+}
+
+/// Positions and velocities in the bytes of a checkpoint. The history of the frames lies between
+/// them. Threads and hooks store further words after the velocities.
+fn vectors(bytes: &[u8]) -> Option<[Vec<f32>; 2]> {
+    let (header, rest) = bytes.split_at_checked(HEADER)?;
+    let count = usize::try_from(u64::from_le_bytes(header[HEADER - 8..].try_into().ok()?)).ok()?;
+    let length = count.checked_mul(12)?;
+    let (positions, rest) = rest.split_at_checked(length)?;
+    let (head, rest) = rest.split_at_checked(16)?;
+    let number = |n: usize| Some(u32::from_le_bytes(head[4 * n..][..4].try_into().ok()?) as usize);
+    let width = 2 + 5 * number(0)? + 2 * number(1)? + number(2)?;
+    let history = width.checked_mul(8)?.checked_mul(number(3)?)?;
+    let velocities = rest.get(history..)?.get(..length)?;
+    let values = |bytes: &[u8]| {
+        bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect::<Vec<f32>>()
+    };
+    bytes.starts_with(MAGIC).then(|| [values(positions), values(velocities)])
 }
