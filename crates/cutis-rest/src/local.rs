@@ -21,9 +21,9 @@ const MOST: f64 = 0.05;
 const OPTIONS: Options = Options { error: 0.1, force: 1e-6, most_steps: 40, most_cycles: 100 };
 
 impl Body {
-    /// Brings the vertices to rest that moved much farther than the others in a step, from
-    /// positions `x` of all vertices. Returns the new positions. `None` if there are none, too
-    /// many, or none that come to rest.
+    /// Brings the vertices nearer to rest that moved much farther than the others in a step, from
+    /// positions `x` of all vertices. Returns the new positions. `None` if there are none or too
+    /// many, or if a force on them is not finite.
     pub(crate) fn relaxed(&self, x: &[Point3<f64>], step: &[Vector3<f64>]) -> Option<Vec<Point3<f64>>> {
         let chosen = self.far(step);
         if chosen.is_empty() || chosen.len() as f64 > MOST * self.free.len() as f64 {

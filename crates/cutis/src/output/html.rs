@@ -218,7 +218,7 @@ fn states_of_rest(stops: &[StopReport]) -> String {
     names(&mut out, "handle", "N", first.handles_n.len());
     out.push_str("<th>error</th><th>cycles</th></tr>");
     for stop in stops {
-        let _ = write!(out, "<tr><td>{} s</td><td>{}</td>", stop.time_s, escape(&stop.done.join(", ")));
+        let _ = write!(out, "<tr><td>{:.3} s</td><td>{}</td>", stop.time_s, escape(&stop.done.join(", ")));
         for value in [&stop.mid_mm, &stop.sutures_n, &stop.handles_n].into_iter().flatten() {
             let _ = write!(out, "<td class=\"n\">{value:.2}</td>");
         }

@@ -77,7 +77,7 @@ impl StopReport {
             .map(|(name, values)| format!("{name} {values}"))
             .collect();
         format!(
-            "{} s, {done}: {} (error {:.2} %, {:.1} s)",
+            "{:.3} s, {done}: {} (error {:.2} %, {:.1} s)",
             self.time_s,
             parts.join("; "),
             100.0 * self.error,
