@@ -56,7 +56,10 @@ class Beam:
         # The odd permutations have the other orientation.
         corners[3:, [1, 2]] = corners[3:, [2, 1]]
         self.tets = ((cubes @ strides)[:, None, None] + corners).reshape(-1, 4)
-        self.tet_colors = (np.arange(6) * 4 + cubes.sum(axis=1)[:, None] % 4).ravel()
+        # Parity along the middle axis of a walk, and of the sum along the other two.
+        middle = cubes[:, [axes[1] for axes in WALKS]]
+        ends = cubes.sum(axis=1)[:, None] - middle
+        self.tet_colors = (np.arange(6) * 4 + 2 * (middle % 2) + ends % 2).ravel()
 
     def shuffled(self):
         """The same beam with vertices, edges and tetrahedra in a scrambled order."""

@@ -22,7 +22,8 @@ pub struct Kuhn {
     pub edge_colors: Vec<u16>,
     /// Four vertices each, positively oriented.
     pub tets: Vec<[u32; 4]>,
-    /// Walk × (i + j + k) mod 4 of the cube: 24 colors.
+    /// Walk × parity of the cube along the middle axis of the walk × parity of the sum along the
+    /// other two: 24 colors.
     pub tet_colors: Vec<u16>,
 }
 
@@ -61,7 +62,8 @@ impl Kuhn {
                     tet.swap(1, 2);
                 }
                 lattice.tets.push(tet);
-                lattice.tet_colors.push((walk * 4 + p.iter().sum::<usize>() % 4) as u16);
+                let (middle, ends) = (p[axes[1]] % 2, (p[axes[0]] + p[axes[2]]) % 2);
+                lattice.tet_colors.push((walk * 4 + 2 * middle + ends) as u16);
             }
         }
         lattice
