@@ -165,6 +165,13 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
         let _ = (x, params);
         None
     }
+    /// True in the lanes where the limit certainly does not act, because `C` is `c`. If it is true
+    /// in all lanes, [`inverse_reach_squared`](Self::inverse_reach_squared) is not computed. It is
+    /// never true by default. The bits of a projection do not depend on it.
+    fn is_in_reach<T: Real>(c: T, params: &Self::Params<T>) -> T::SimdBool {
+        let _ = (c, params);
+        T::zero().simd_gt(T::zero())
+    }
     /// Returns the reference size of residuals: rest length (m), rest area (m²) or rest volume
     /// (m³). Zero means that the rest shape has no size; `SystemBuilder` refuses to take parameters
     /// from such a shape.

@@ -93,6 +93,18 @@ impl Constraint<4> for Volume {
         Some(inverse.select(size_squared.simd_gt(T::zero()), T::zero()))
     }
 
+    /// True if `|C| ≤ 2|V|`.
+    ///
+    /// Let `w` be the largest inverse mass. The limit acts if `w C²/r² > Σ w_i|∇_iV|²`. Each vertex
+    /// has an edge to the first vertex, or is that vertex, and its gradient is normal to the plane
+    /// of the other three. So the product of the edge with the gradient is `±V`, and
+    /// `|∇_iV| ≥ |V|/e`. With `r² ≥ 16 e²` the limit acts only if `|C| > 4|V|`. The factor of two
+    /// keeps rounding out of the result.
+    #[inline(always)]
+    fn is_in_reach<T: Real>(c: T, &[rest_volume]: &[T; 1]) -> T::SimdBool {
+        c.simd_abs().simd_le((c + rest_volume).simd_abs() * T::constant(2.0))
+    }
+
     fn rest_size<T: Real>(&[rest_volume]: &[T; 1]) -> T {
         rest_volume.simd_abs()
     }

@@ -2,6 +2,7 @@
 
 use cutis_constraints::{Constraint, Real};
 use nalgebra::{Point3, Vector3, convert};
+use simba::simd::SimdBool;
 
 use crate::Step;
 
@@ -97,9 +98,12 @@ pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
     let eval = C::eval(x, params);
     let mut weighted_square: T = convert(0.0);
     for i in 0..N {
-        weighted_square += w[i] * eval.grad[i].dot(&eval.grad[i]);
+        let part = w[i] * eval.grad[i].dot(&eval.grad[i]);
+        weighted_square = if i == 0 { part } else { weighted_square + part };
     }
-    if let Some(inverse_reach_squared) = C::inverse_reach_squared(x, params) {
+    if !C::is_in_reach(eval.c, params).all()
+        && let Some(inverse_reach_squared) = C::inverse_reach_squared(x, params)
+    {
         weighted_square = weighted_square.simd_max(least_square(w, eval.c, inverse_reach_squared));
     }
     let multiplier = rule.multiplier(eval.c, weighted_square, stiffness, multiplier);
@@ -108,7 +112,61 @@ pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
 
 #[cfg(test)]
 mod tests {
+    use cutis_constraints::{Eval, Volume};
+
     use super::*;
+
+    /// A tetrahedron with three edges of the length `edge` at its first vertex and the volume
+    /// `height·edge²/6`, in the constraint `Volume` or in one whose limit is always
+    /// computed.
+    fn both_ways(edge: f32, height: f32, rest_volume: f32, w: [f32; 4]) -> [Projection<f32, 4>; 2] {
+        let x = [[0.0, 0.0, 0.0], [edge, 0.0, 0.0], [0.0, edge, 0.0], [0.0, 0.0, height]].map(Point3::from);
+        let with = project::<Volume, 4, f32, _>(&x, &w, &[rest_volume], Pbd, 1.0, 0.0);
+        [with, project::<AlwaysLimited, 4, f32, _>(&x, &w, &[rest_volume], Pbd, 1.0, 0.0)]
+    }
+
+    struct AlwaysLimited;
+
+    impl Constraint<4> for AlwaysLimited {
+        const NAME: &'static str = "always limited";
+        const WGSL: &'static str = Volume::WGSL;
+        type Params<T: Real> = [T; 1];
+        type Material = ();
+        fn from_rest<T: Real>(x: &[Point3<T>; 4], (): &()) -> [T; 1] {
+            Volume::from_rest(x, &Default::default())
+        }
+        fn eval<T: Real>(x: &[Point3<T>; 4], params: &[T; 1]) -> Eval<T, 4> {
+            Volume::eval(x, params)
+        }
+        fn inverse_reach_squared<T: Real>(x: &[Point3<T>; 4], params: &[T; 1]) -> Option<T> {
+            Volume::inverse_reach_squared(x, params)
+        }
+        fn rest_size<T: Real>(params: &[T; 1]) -> T {
+            Volume::rest_size(params)
+        }
+    }
+
+    #[test]
+    fn a_limit_that_does_not_act_changes_no_bit() {
+        let mut cases = [0; 2];
+        for scale in [1e-9f32, 1e-5, 1.0, 1e6, 1e12] {
+            for flat in [0.0, 1e-12, 1e-6, 1e-3, 0.02, 0.1, 0.3, 1.0, 7.0] {
+                for grown in [-1e3, 0.0, 0.2, 1.0, 1.5, 30.0, 1e4, 1e9] {
+                    for light in [0.0, 1e-20, 1.0, 1e5, 1e25] {
+                        let volume = scale * scale * scale * grown / 6.0;
+                        let [with, without] = both_ways(scale, scale * flat, volume, [1.0, light, 2.0, 0.5]);
+                        let same = |a: f32, b: f32| a == b || a.is_nan() && b.is_nan();
+                        assert!(same(with.multiplier, without.multiplier), "{scale} {flat} {grown} {light}");
+                        let x = [[0.0; 3], [scale, 0.0, 0.0], [0.0, scale, 0.0], [0.0, 0.0, scale * flat]];
+                        let c = Volume::eval(&x.map(Point3::from), &[volume]).c;
+                        let skipped = Volume::is_in_reach(c, &[volume]);
+                        cases[usize::from(skipped)] += 1;
+                    }
+                }
+            }
+        }
+        assert!(cases.into_iter().all(|count| count > 100), "{cases:?}");
+    }
 
     #[test]
     fn an_undefined_quotient_moves_nothing() {
