@@ -32,6 +32,11 @@ pub const UNSAFE_FILES: &[UnsafeFile] = &[
         tests: Some(Tests { package: "cutis-solver", filter: "colored::", target_features: "" }),
     },
     UnsafeFile {
+        path: "crates/cutis-solver/src/colored/shared.rs",
+        reason: "has the vertices that these threads read and move",
+        tests: Some(Tests { package: "cutis-solver", filter: "colored::", target_features: "" }),
+    },
+    UnsafeFile {
         path: "crates/cutis-constraints/src/lanes/level.rs",
         reason: "calls functions for vector units that only some processors have",
         tests: LANES,

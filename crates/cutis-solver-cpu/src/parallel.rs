@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use cutis_constraints::{Scalar, SimdLevel};
-use cutis_solver::{Colored, ColoredVertices, ConstraintColor, Execute, Vertex, VertexBlock, VertexColor};
+use cutis_solver::{Colored, ColoredVertices, ConstraintColor, Execute, VertexBlock, VertexColor};
 use rayon::prelude::*;
 
 /// Number of vertices that a thread processes at a time.
@@ -39,13 +39,16 @@ impl<T: Scalar> Execute<T> for Parallel {
         fan_out(0..self.threads.min(color.chunks()), &|_| while color.move_next_chunk() {});
     }
 
-    fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {
-        let first = |part: &[Vertex<T>]| part.iter().position(|vertex| !vertex.is_finite());
+    fn find_first(
+        &self,
+        count: usize,
+        find: &(dyn Fn(Range<usize>) -> Option<usize> + Sync),
+    ) -> Option<usize> {
         if self.threads == 1 {
-            return first(vertices);
+            return find(0..count);
         }
-        let parts = vertices.par_chunks(BLOCK).enumerate();
-        parts.find_map_first(|(k, part)| Some(k * BLOCK + first(part)?))
+        let parts = (0..count.div_ceil(BLOCK)).into_par_iter();
+        parts.find_map_first(|k| find(k * BLOCK..count.min((k + 1) * BLOCK)))
     }
 }
 

@@ -28,7 +28,7 @@ impl<T: Scalar> SolverCpu<T> {
     /// Returns the errors of [`Simulation::new`], [`CpuError::Threads`] for no thread or too many,
     /// and [`CpuError::ThreadPool`] if the operating system cannot start the threads.
     pub fn new(system: System<T>, settings: Settings, threads: Option<usize>) -> Result<Self, CpuError> {
-        let simulation = Simulation::new(system, settings)?.with_teams();
+        let simulation = Simulation::new(system, settings)?.with_teams().with_columns();
         let available = || std::thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);
         let threads = threads.unwrap_or_else(available);
         if !(1..=MAX_THREADS).contains(&threads) {

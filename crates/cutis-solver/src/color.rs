@@ -7,7 +7,42 @@ use cutis_constraints::Scalar;
 
 use crate::batch::{ConstraintChunk, VertexChunk};
 use crate::loads::load_of;
-use crate::{ColorPass, ConstraintSet, Descent, Step, System, Vertex, VertexForce};
+use crate::{ColorPass, Columns, ConstraintSet, Descent, Step, System, Vertex, VertexForce};
+
+/// The vertices of a system, in one of two forms.
+pub enum VertexStore<'a, T> {
+    /// One vertex after the other.
+    Vertices(&'a mut [Vertex<T>]),
+    /// By column.
+    Columns(&'a mut Columns<T>),
+}
+
+impl<T: Scalar> VertexStore<'_, T> {
+    /// Returns the number of vertices.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Vertices(vertices) => vertices.len(),
+            Self::Columns(columns) => columns.len(),
+        }
+    }
+
+    /// True if there are no vertices.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl<'a, T> From<&'a mut [Vertex<T>]> for VertexStore<'a, T> {
+    fn from(vertices: &'a mut [Vertex<T>]) -> Self {
+        Self::Vertices(vertices)
+    }
+}
+
+impl<'a, T> From<&'a mut Columns<T>> for VertexStore<'a, T> {
+    fn from(columns: &'a mut Columns<T>) -> Self {
+        Self::Columns(columns)
+    }
+}
 
 /// One color of one kind of constraint, or the part of it in one tile, with everything that its
 /// projection needs.
@@ -19,7 +54,7 @@ pub struct ConstraintColor<'a, T: Scalar> {
     /// The tile to project, or `None` for the whole color.
     pub tile: Option<usize>,
     /// All vertices of the system.
-    pub vertices: &'a mut [Vertex<T>],
+    pub vertices: VertexStore<'a, T>,
     /// Parameters of the substep.
     pub step: Step<T>,
     /// One multiplier per constraint of the whole set, or empty if none are stored.

@@ -1,4 +1,4 @@
-//! The only unsafe code of the project: several threads move the vertices of one color.
+//! Several threads move the vertices of one color.
 //!
 //! Soundness for constraints: (1) A batch checks when it is built that each index is below the
 //! number of vertices, and `Groups::verify` checks that no two constraints of one color share a
@@ -6,9 +6,10 @@
 //! mutably for its whole lifetime, so that no other code reads or moves them. (3) The chunks are
 //! ranges of one color that do not overlap, and atomic counters that only grow hand out each chunk
 //! once: a counter per share, where the shares are ranges of chunks that do not overlap. So two
-//! threads never access the same vertex or the same multiplier. (4) A batch finds the strides of
-//! its runs by comparison of the checked indices, and reads a row of vertices only where each of
-//! them is a vertex of a constraint of the chunk.
+//! threads never access the same vertex or the same multiplier. (4) A batch finds the rows of its
+//! runs by comparison of the checked indices, and reads adjacent vertices only where each of them
+//! is a vertex of a constraint of the chunk. [`Columns`](crate::Columns) have a place for each
+//! vertex.
 //!
 //! Soundness for vertices: (1) A `Descent` and the system that it was built from are owned by one
 //! `Simulation`. Its incidences are those of the system's kinds. `Groups::verify_vertices` checks
@@ -20,6 +21,8 @@
 //! that share a constraint with them. No other thread moves those meanwhile.
 #![allow(unsafe_code)]
 
+mod shared;
+
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -27,10 +30,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
-use crate::batch::{Blocks, ConstraintChunk, Load, Store, TeamForces, VertexChunk};
+use crate::batch::{ConstraintChunk, Load, Store, TeamForces, VertexChunk};
 use crate::loads::load_of;
 use crate::teams::{MOST_NEIGHBORS, Neighborhood, TEAM, TEAM_CHUNK};
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
+
+pub(crate) use shared::{SharedStore, SharedVertices};
 
 /// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so
 /// that a tiny body has several.
@@ -55,6 +60,7 @@ const VERTEX_CHUNK: usize = if cfg!(miri) { 4 } else { 128 };
 /// #     .add::<Distance, 2>(&spring, &[[1.0]], Stiffness::pbd(1.0), &groups)?.build();
 /// let (vertices, kinds) = system.projection_parts();
 /// let (set, step) = (&*kinds[0], Step::Pbd);
+/// let vertices = vertices.into();
 /// let color = ConstraintColor { set, color: 0, tile: None, vertices, step, multipliers: &mut [] };
 /// let color = Colored::new(color, cutis_constraints::SimdLevel::best(), 2);
 /// let color = &color;
@@ -73,7 +79,7 @@ pub struct Colored<'a, T: Scalar> {
     /// Number of shares, and for each of them the number of chunks that were handed out.
     shares: usize,
     next: [Counter; MOST_SHARES],
-    vertices: *mut Vertex<T>,
+    vertices: SharedStore<'a, T>,
     multipliers: *mut T,
     keeps_multipliers: bool,
     borrow: PhantomData<&'a mut [T]>,
@@ -110,7 +116,7 @@ impl<'a, T: Scalar> Colored<'a, T> {
             step,
             shares: workers.clamp(1, MOST_SHARES),
             next: Default::default(),
-            vertices: vertices.as_mut_ptr(),
+            vertices: SharedStore::new(vertices),
             multipliers: multipliers.as_mut_ptr(),
             keeps_multipliers,
             borrow: PhantomData,
@@ -123,7 +129,10 @@ impl<'a, T: Scalar> Colored<'a, T> {
     /// The vertices there stay in the cache of its processor.
     pub fn project_next_chunk(&self, worker: usize) -> bool {
         let mut shares = (0..self.shares).map(|n| (worker % self.shares + n) % self.shares);
-        let next = |share: usize| next_chunk(&self.next[share].0, &self.share(share), CHUNK);
+        let next = |share: usize| {
+            let number = self.next[share].0.fetch_add(1, Ordering::Relaxed);
+            chunk(number, &self.share(share), CHUNK)
+        };
         let Some(range) = shares.find_map(next) else { return false };
         let multipliers: &mut [T] = if self.keeps_multipliers {
             // SAFETY: the range lies within the set, and there is one multiplier per constraint of
@@ -132,8 +141,7 @@ impl<'a, T: Scalar> Colored<'a, T> {
         } else {
             &mut []
         };
-        let vertices = SharedVertices { vertices: self.vertices, borrow: PhantomData };
-        let chunk = ConstraintChunk { range, vertices, step: self.step, multipliers };
+        let chunk = ConstraintChunk { range, vertices: self.vertices.clone(), step: self.step, multipliers };
         self.set.project_shared(self.level, chunk);
         true
     }
@@ -243,7 +251,7 @@ impl<'a, T: Scalar> ColoredVertices<'a, T> {
     }
 
     fn shared(&self) -> SharedVertices<'_, T> {
-        SharedVertices { vertices: self.vertices, borrow: PhantomData }
+        SharedVertices::new(self.vertices)
     }
 
     /// Returns the number of chunks, which is an upper bound of the threads that can help.
@@ -322,62 +330,11 @@ fn vector<L: Lanes<T>, T: Scalar>(component: impl Fn(usize, usize) -> T) -> Vect
     )
 }
 
-/// Takes the next `size` elements of `range`, or the rest of it. Each element is handed out once.
-fn next_chunk(next: &AtomicUsize, range: &Range<usize>, size: usize) -> Option<Range<usize>> {
-    chunk(next.fetch_add(1, Ordering::Relaxed), range, size)
-}
-
 /// Chunk `number` of `range`, which has `size` elements, or the rest. `None` after the last one.
 fn chunk(number: usize, range: &Range<usize>, size: usize) -> Option<Range<usize>> {
     let start = range.start + number.saturating_mul(size).min(range.len());
     let end = range.end.min(start.saturating_add(size));
     (start < end).then_some(start..end)
-}
-
-/// The vertices as seen by one chunk. Only a batch can access vertices through it, with indices
-/// that the batch has checked.
-pub struct SharedVertices<'a, T> {
-    vertices: *mut Vertex<T>,
-    borrow: PhantomData<&'a mut Vertex<T>>,
-}
-
-impl<T: Copy> Load<T> for SharedVertices<'_, T> {
-    #[inline(always)]
-    fn load(&self, index: u32) -> Vertex<T> {
-        // SAFETY: a batch and a team pass only indices of constraints, which are below the number
-        // of vertices. No other thread moves a vertex of the constraint at hand (see the top of the
-        // file).
-        unsafe { *self.vertices.add(index as usize) }
-    }
-}
-
-impl<T: Copy> Store<T> for SharedVertices<'_, T> {
-    #[inline(always)]
-    fn store(&mut self, index: u32, vertex: Vertex<T>) {
-        // SAFETY: the conditions of `load` hold. No other thread reads this vertex meanwhile.
-        unsafe { *self.vertices.add(index as usize) = vertex }
-    }
-}
-
-impl<T: Scalar> Blocks<T> for SharedVertices<'_, T> {
-    #[inline(always)]
-    fn block(&self, first: u32, offset: usize, count: usize) -> &[T] {
-        // SAFETY: a batch passes only vertices of constraints that it projects, to which the
-        // conditions of `load` apply. A vertex is four numbers.
-        unsafe {
-            let numbers = self.vertices.add(first as usize + offset).cast::<T>();
-            std::slice::from_raw_parts(numbers, 4 * count)
-        }
-    }
-
-    #[inline(always)]
-    fn block_mut(&mut self, first: u32, offset: usize, count: usize) -> &mut [T] {
-        // SAFETY: the conditions of `block` hold. No other thread reads these vertices meanwhile.
-        unsafe {
-            let numbers = self.vertices.add(first as usize + offset).cast::<T>();
-            std::slice::from_raw_parts_mut(numbers, 4 * count)
-        }
-    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
+use crate::columns::ColumnBlock;
 use crate::loads::load_of;
 use crate::{Formulation, Settings, Vertex};
 
@@ -17,6 +18,8 @@ pub struct VertexBlock<'a, T: Scalar> {
     pub velocities: &'a mut [Vector3<T>],
     /// Constant forces in N; empty if there are none.
     pub loads: &'a [Vector3<T>],
+    /// The vertices by column, if a step keeps them in this form.
+    pub(crate) columns: Option<ColumnBlock<'a, T>>,
 }
 
 impl<'a, T: Scalar> VertexBlock<'a, T> {
@@ -33,19 +36,22 @@ impl<'a, T: Scalar> VertexBlock<'a, T> {
     /// Splits the block into the first `middle` vertices and the rest.
     ///
     /// # Panics
-    /// Panics if there are fewer than `middle` vertices.
+    /// Panics if there are fewer than `middle` vertices, or if `middle` is odd.
     pub fn split_at(self, middle: usize) -> (Self, Self) {
+        assert!(middle.is_multiple_of(2), "vertices by column are divided in pairs");
         let (vertices, later_vertices) = self.vertices.split_at_mut(middle);
         let (previous, later_previous) = self.previous.split_at_mut(middle);
         let (velocities, later_velocities) = self.velocities.split_at_mut(middle);
         let (loads, later_loads) = self.loads.split_at(middle.min(self.loads.len()));
+        let (columns, later_columns) = self.columns.map(|columns| columns.split_at(middle)).unzip();
         let later = Self {
             vertices: later_vertices,
             previous: later_previous,
             velocities: later_velocities,
             loads: later_loads,
+            columns: later_columns,
         };
-        (Self { vertices, previous, velocities, loads }, later)
+        (Self { vertices, previous, velocities, loads, columns }, later)
     }
 }
 
@@ -114,7 +120,21 @@ impl<T: Scalar> Integrator<T> {
     /// Runs one pass over a block. Vertices do not depend on each other, so the result does not
     /// depend on the size of the blocks.
     pub(crate) fn run(&self, pass: VertexPass, block: VertexBlock<'_, T>) {
-        let VertexBlock { vertices, previous, velocities, loads } = block;
+        let VertexBlock { vertices, previous, velocities, loads, columns } = block;
+        match columns {
+            Some(columns) => self.run_by_column(pass, columns, vertices, previous, velocities, loads),
+            None => self.run_in_place(pass, vertices, previous, velocities, loads),
+        }
+    }
+
+    fn run_in_place(
+        &self,
+        pass: VertexPass,
+        vertices: &mut [Vertex<T>],
+        previous: &mut [Point3<T>],
+        velocities: &mut [Vector3<T>],
+        loads: &[Vector3<T>],
+    ) {
         let positions = vertices.iter_mut().zip(previous);
         match pass {
             VertexPass::Predict => {
@@ -139,6 +159,39 @@ impl<T: Scalar> Integrator<T> {
                     *v = Vector3::zeros();
                 }
             }
+        }
+    }
+
+    /// The first prediction reads `vertices`, and the last velocity update writes them. In between
+    /// only the columns are up to date.
+    fn run_by_column(
+        &self,
+        pass: VertexPass,
+        mut columns: ColumnBlock<'_, T>,
+        vertices: &mut [Vertex<T>],
+        previous: &mut [Point3<T>],
+        velocities: &mut [Vector3<T>],
+        loads: &[Vector3<T>],
+    ) {
+        let count = vertices.len();
+        let (previous, velocities) = (&mut previous[..count], &mut velocities[..count]);
+        match pass {
+            VertexPass::Predict => columns.update(count, |i, _| {
+                let mut x = vertices[i];
+                self.predict(&mut x, &mut previous[i], velocities[i], load_of(loads, i));
+                x
+            }),
+            VertexPass::FinishAndPredict => columns.update(count, |i, mut x| {
+                let v = self.finish(&x, &previous[i]);
+                self.predict(&mut x, &mut previous[i], v, load_of(loads, i));
+                x
+            }),
+            VertexPass::Finish => columns.update(count, |i, x| {
+                vertices[i] = x;
+                velocities[i] = self.finish(&x, &previous[i]);
+                x
+            }),
+            VertexPass::Restore => self.run_in_place(pass, vertices, previous, velocities, loads),
         }
     }
 }

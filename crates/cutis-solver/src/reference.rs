@@ -1,11 +1,13 @@
 //! The reference solver: one constraint after the other, in safe scalar code on one thread.
 
+use std::ops::Range;
+
 use cutis_constraints::Scalar;
 use nalgebra::{Point3, Vector3};
 
 use crate::{
     Change, ConstraintColor, Execute, Settings, Simulation, Solver, SolverError, StepProfile, System, Timed,
-    Vertex, VertexBlock, VertexColor,
+    VertexBlock, VertexColor,
 };
 
 /// Runs every pass on the calling thread, in ascending order.
@@ -25,8 +27,12 @@ impl<T: Scalar> Execute<T> for Serial {
         color.descend();
     }
 
-    fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {
-        vertices.iter().position(|vertex| !vertex.is_finite())
+    fn find_first(
+        &self,
+        count: usize,
+        find: &(dyn Fn(Range<usize>) -> Option<usize> + Sync),
+    ) -> Option<usize> {
+        find(0..count)
     }
 }
 

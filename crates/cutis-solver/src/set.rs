@@ -39,6 +39,9 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     /// Returns the constraints of `color` in `tile` as a range of indices. The range is empty for a
     /// color or a tile that does not exist.
     fn part(&self, color: usize, tile: usize) -> Range<usize>;
+    /// Returns the number of constraints that are in long enough rows of constraints whose vertices
+    /// advance by two. SIMD lanes read them fastest from [`Columns`](crate::Columns).
+    fn constraints_in_rows(&self) -> usize;
     /// Returns the vertices of all constraints, `arity` of them in a row.
     fn indices(&self) -> &[u32];
     /// Returns the number of parameters of one constraint.

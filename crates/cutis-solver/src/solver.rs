@@ -127,6 +127,7 @@ pub trait Solver<T: Scalar>: Send {
             ("multipliers", simulation.multiplier_bytes()),
             ("incidences", simulation.incidence_bytes()),
             ("teams", simulation.team_bytes()),
+            ("columns", simulation.column_bytes()),
         ];
         let more = more.into_iter().filter(|(_, bytes)| *bytes > 0);
         parts.extend(more.map(|(name, bytes)| MemoryPart { name, bytes }));

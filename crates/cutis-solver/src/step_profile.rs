@@ -1,11 +1,12 @@
 //! Optional per-part timing of a step.
 
 use std::cell::RefCell;
+use std::ops::Range;
 use std::time::Instant;
 
 use cutis_constraints::Scalar;
 
-use crate::{ConstraintColor, Execute, Vertex, VertexBlock, VertexColor};
+use crate::{ConstraintColor, Execute, VertexBlock, VertexColor};
 
 /// Time of one part of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,8 +104,12 @@ impl<T: Scalar, E: Execute<T>> Execute<T> for Timed<'_, E> {
         self.profile.borrow_mut().time(part, || self.inner.serial(part, work));
     }
 
-    fn first_not_finite(&self, vertices: &[Vertex<T>]) -> Option<usize> {
-        self.profile.borrow_mut().time(StepProfile::CHECK, || self.inner.first_not_finite(vertices))
+    fn find_first(
+        &self,
+        count: usize,
+        find: &(dyn Fn(Range<usize>) -> Option<usize> + Sync),
+    ) -> Option<usize> {
+        self.profile.borrow_mut().time(StepProfile::CHECK, || self.inner.find_first(count, find))
     }
 }
 

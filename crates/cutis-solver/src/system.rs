@@ -114,6 +114,7 @@ impl<T: Scalar> System<T> {
             previous: &mut self.previous,
             velocities: &mut self.velocities,
             loads: &self.loads,
+            columns: None,
         }
     }
 

@@ -36,22 +36,6 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
-            fn transposed(vectors: [Self; 4]) -> [Self; 4] {
-                let rows: [[$number; 4]; 4] = vectors.map(|vector| vector.into());
-                std::array::from_fn(|column| Self::from_lanes(|row| rows[row][column]))
-            }
-
-            #[inline(always)]
-            fn interleaved(self) -> Self {
-                self
-            }
-
-            #[inline(always)]
-            fn sequential(self) -> Self {
-                self
-            }
-
-            #[inline(always)]
             fn columns(row: impl Fn(usize) -> [$number; 4]) -> [Self; 4] {
                 let rows: [[$number; 4]; 4] = std::array::from_fn(row);
                 std::array::from_fn(|column| Self::from_lanes(|lane| rows[lane][column]))

@@ -45,18 +45,6 @@ pub trait Lanes<T: Scalar>: Real + SimdValue<Element = T> {
     /// Panics if there are fewer numbers than lanes.
     fn write_to(self, numbers: &mut [T]);
 
-    /// Transposes the blocks of 4 × 4 numbers that four vectors have at the same quad.
-    ///
-    /// If the vectors hold rows of four numbers, a row after the other, the results hold the
-    /// columns. Their lanes are then in the order of [`interleaved`](Self::interleaved).
-    fn transposed(vectors: [Self; 4]) -> [Self; 4];
-
-    /// Moves lane `n · LANES/4 + p` to lane `4p + n`, for all `n` below 4.
-    fn interleaved(self) -> Self;
-
-    /// The inverse of [`interleaved`](Self::interleaved).
-    fn sequential(self) -> Self;
-
     /// Reads four numbers per lane: `row(lane)` gives those of one lane. Returns the first numbers
     /// of all lanes, the second ones, and so on.
     fn columns(row: impl Fn(usize) -> [T; 4]) -> [Self; 4];

@@ -53,10 +53,6 @@ pub trait Register: Copy + Send + Sync + 'static {
     fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self;
     /// Transposes the blocks of 4 × 4 numbers that four registers have at the same place.
     fn transposed(registers: [Self; 4]) -> [Self; 4];
-    /// Moves lane `n · LANES/4 + p` to lane `4p + n`, for all `n` below 4.
-    fn interleaved(self) -> Self;
-    /// The inverse of `interleaved`.
-    fn sequential(self) -> Self;
 }
 
 /// A number with one value per lane of a register.
@@ -116,22 +112,6 @@ impl<R: Register> Lanes<f32> for Pack<R> {
     #[inline(always)]
     fn write_to(self, numbers: &mut [f32]) {
         numbers[..R::LANES].copy_from_slice(self.0.to_array().as_ref());
-    }
-
-    #[inline(always)]
-    fn transposed(vectors: [Self; 4]) -> [Self; 4] {
-        let [a, b, c, d] = R::transposed([vectors[0].0, vectors[1].0, vectors[2].0, vectors[3].0]);
-        [Self(a), Self(b), Self(c), Self(d)]
-    }
-
-    #[inline(always)]
-    fn interleaved(self) -> Self {
-        Self(self.0.interleaved())
-    }
-
-    #[inline(always)]
-    fn sequential(self) -> Self {
-        Self(self.0.sequential())
     }
 
     #[inline(always)]

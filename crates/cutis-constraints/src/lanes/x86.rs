@@ -152,18 +152,6 @@ impl Register for __m256 {
             _mm256_insertf128_ps::<1>(low, quad(numbers(1)))
         }
     }
-
-    #[inline(always)]
-    fn interleaved(self) -> Self {
-        // SAFETY: as above.
-        unsafe { _mm256_permutevar8x32_ps(self, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7)) }
-    }
-
-    #[inline(always)]
-    fn sequential(self) -> Self {
-        // SAFETY: as above.
-        unsafe { _mm256_permutevar8x32_ps(self, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7)) }
-    }
 }
 
 impl Register for __m512 {
@@ -224,20 +212,5 @@ impl Register for __m512 {
             let quads = _mm512_insertf32x4::<2>(quads, quad(numbers(2)));
             _mm512_insertf32x4::<3>(quads, quad(numbers(3)))
         }
-    }
-
-    #[inline(always)]
-    fn interleaved(self) -> Self {
-        // SAFETY: as above.
-        unsafe {
-            let lanes = _mm512_setr_epi32(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
-            _mm512_permutexvar_ps(lanes, self)
-        }
-    }
-
-    #[inline(always)]
-    fn sequential(self) -> Self {
-        // With sixteen lanes the numbers form a square, whose transposition is its own inverse.
-        self.interleaved()
     }
 }

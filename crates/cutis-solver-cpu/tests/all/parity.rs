@@ -106,14 +106,27 @@ fn results_equal_the_reference_for_any_number_of_threads_and_lanes() {
     parity::<f64>(Formulation::Vbd, 2);
 }
 
-/// In a lattice most vertices are in teams, which vertex block descent moves together.
+/// In a lattice most vertices are in teams, which vertex block descent moves together, and most
+/// constraints are in rows, which projections read by column.
 #[test]
-fn teams_of_a_lattice_have_the_bits_of_the_reference() {
+fn a_lattice_has_the_bits_of_the_reference() {
+    for (formulation, iterations) in
+        [(Formulation::Vbd, 2), (Formulation::Xpbd, 1), (Formulation::Xpbd, 2), (Formulation::Pbd, 2)]
+    {
+        assert_lattice(settings(formulation, iterations));
+    }
+}
+
+fn assert_lattice(settings: Settings) {
     let lattice = Kuhn::new([40, 5, 5], 0.1);
     let masses: Vec<f32> = lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 }).collect();
     let groups = |colors: &[u16]| Groups::from_colors(colors).unwrap();
     let each = |base: f32, count: usize| {
-        Stiffness::Compliance(Values::Each((0..count).map(|n| base * (1.0 + (n % 7) as f32)).collect()))
+        let values = (0..count).map(|n| 1.0 + (n % 7) as f32);
+        match settings.formulation {
+            Formulation::Pbd => Stiffness::Pbd(Values::Each(values.map(|value| 0.1 * value).collect())),
+            _ => Stiffness::Compliance(Values::Each(values.map(|value| base * value).collect())),
+        }
     };
     let sum = |p: &Point3<f64>| ((p.x + p.y + p.z) / 0.1).round() as u16 % 4;
     let colors: Vec<u16> = lattice.positions.iter().map(sum).collect();
@@ -134,8 +147,9 @@ fn teams_of_a_lattice_have_the_bits_of_the_reference() {
         )
         .unwrap()
         .vertex_groups(groups(&colors))
+        .handle(Handle { vertices: vec![39, 79, 84], move_m: [0.1, 0.2, 0.0], at_s: 0.0, over_s: 0.03 })
+        .unwrap()
         .build();
-    let settings = settings(Formulation::Vbd, 2);
     let reference = || SolverReference::new(system.clone(), settings).unwrap();
     // A change that removes some edges ends the runs there.
     let (edges, colors): (Vec<[u32; 2]>, Vec<u16>) = lattice
@@ -157,14 +171,55 @@ fn teams_of_a_lattice_have_the_bits_of_the_reference() {
         solver.step(2).unwrap();
         solver.positions().unwrap().iter().map(|p| p.coords.map(f32::to_bits)).collect::<Vec<_>>()
     };
+    let descends = settings.formulation == Formulation::Vbd;
     for level in SimdLevel::available() {
         let solver = || SolverCpu::new(system.clone(), settings, Some(2)).unwrap().with_level(level);
+        let simulation = solver();
+        let simulation = simulation.simulation();
+        assert_eq!((simulation.team_bytes() > 0, simulation.column_bytes() > 0), (descends, !descends));
         assert!(bits(solver(), &[3]) == bits(reference(), &[3]), "{level:?}");
         assert!(changed(Box::new(solver())) == changed(Box::new(reference())), "{level:?}, after a change");
     }
-    let other = Settings { relaxation: 1.2, ..settings };
+    let other = Settings { dt_s: 1.001 * settings.dt_s, ..settings };
     let control = SolverReference::new(system.clone(), other).unwrap();
     assert!(bits(control, &[3]) != bits(reference(), &[3]), "control");
+}
+
+/// After a step that is not finite the body is at the start of the substep, at rest.
+#[test]
+fn a_body_that_is_not_finite_returns_to_the_same_state() {
+    let lattice = Kuhn::new([40, 5, 5], 0.1);
+    // The largest velocity leaves the range of the number type in one substep.
+    let settings = Settings { dt_s: 10.0, substeps: 1, ..settings(Formulation::Xpbd, 1) };
+    let groups = Groups::from_colors(&lattice.edge_colors).unwrap();
+    let system = SystemBuilder::<f32>::new(&lattice.positions, &vec![1.0; lattice.positions.len()])
+        .unwrap()
+        .add_from_rest::<Distance, 2>(
+            &lattice.edges,
+            &Default::default(),
+            Stiffness::compliance(1e-4),
+            &groups,
+        )
+        .unwrap()
+        .build();
+    let state = |mut solver: Box<dyn Solver<f32>>| {
+        solver.step(1).unwrap();
+        let (positions, mut velocities) =
+            (solver.positions().unwrap(), solver.velocities().unwrap().to_vec());
+        velocities[777].y = f32::MAX;
+        velocities[778].x = f32::MAX;
+        solver.restore(&positions, &velocities, 1).unwrap();
+        let error = solver.step(1).unwrap_err();
+        let stopped = (solver.positions().unwrap(), solver.velocities().unwrap().to_vec());
+        solver.step(1).unwrap();
+        (error.to_string(), stopped, solver.positions().unwrap())
+    };
+    let expected = state(Box::new(SolverReference::new(system.clone(), settings).unwrap()));
+    for threads in [1, 3] {
+        let solver = SolverCpu::new(system.clone(), settings, Some(threads)).unwrap();
+        assert!(solver.simulation().column_bytes() > 0);
+        assert_eq!(state(Box::new(solver)), expected);
+    }
 }
 
 #[test]
@@ -223,7 +278,15 @@ fn a_timed_step_has_the_same_bits_and_reports_its_parts() {
                 [&["vertices", "handles"], clear, &["distance", "stc", "volume", "check"]].concat();
             assert_eq!(names, expected);
             assert!(profile.parts().iter().all(|part| part.seconds > 0.0));
-            assert!(profile.total_s() <= wall && profile.total_s() > 0.5 * wall, "{profile:?} of {wall} s");
+            assert!(profile.total_s() <= wall, "{profile:?} of {wall} s");
+            // Another process may interrupt a step between two parts, so the best of many counts.
+            let share = |solver: &mut Box<dyn Solver<f32>>| {
+                let (mut profile, start) = (StepProfile::default(), Instant::now());
+                solver.step_timed(1, &mut profile).unwrap();
+                profile.total_s() / start.elapsed().as_secs_f64()
+            };
+            let best = (0..50).map(|_| share(solver)).find(|share| *share > 0.5);
+            assert!(best.is_some(), "the parts are most of a step");
         }
     }
 }

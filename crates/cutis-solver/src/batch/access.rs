@@ -1,5 +1,7 @@
 //! Access to vertices for the loops over constraints, exclusive or shared between threads.
 
+use cutis_constraints::{Lanes, Scalar};
+
 use crate::Vertex;
 
 /// Reads vertices.
@@ -14,12 +16,28 @@ pub trait Store<T>: Load<T> {
     fn store(&mut self, index: u32, vertex: Vertex<T>);
 }
 
-/// Reads and writes vertices one behind the other.
-pub trait Blocks<T>: Store<T> {
-    /// Returns the numbers of `count` vertices, from vertex `first + offset` on.
-    fn block(&self, first: u32, offset: usize, count: usize) -> &[T];
-    /// Returns the numbers of `count` vertices, from vertex `first + offset` on, to replace them.
-    fn block_mut(&mut self, first: u32, offset: usize, count: usize) -> &mut [T];
+/// Reads and writes a corner of as many constraints as there are lanes.
+///
+/// `PIECE` constraints, one after the other, have vertices that advance by two, see
+/// [`Runs`](super::runs::Runs).
+pub trait LaneAccess<T: Scalar>: Store<T> {
+    /// Whether pieces of rows are read faster than other constraints.
+    const READS_ROWS: bool;
+
+    /// Returns x, y, z and the inverse mass of vertex `corner` of each constraint.
+    fn read<L: Lanes<T>, const N: usize, const PIECE: usize>(
+        &self,
+        tuples: &[[u32; N]],
+        corner: usize,
+    ) -> [L; 4];
+
+    /// Replaces vertex `corner` of each constraint. The inverse masses are those that were read.
+    fn write<L: Lanes<T>, const N: usize, const PIECE: usize>(
+        &mut self,
+        tuples: &[[u32; N]],
+        corner: usize,
+        numbers: [L; 4],
+    );
 }
 
 impl<T: Copy> Load<T> for &[Vertex<T>] {

@@ -15,14 +15,15 @@ use cutis_coloring::{Groups, Incidence};
 use cutis_constraints::{Constraint, Scalar, SimdLevel};
 use nalgebra::Point3;
 
-use crate::colored::SharedVertices;
+use crate::colored::{SharedStore, SharedVertices};
 use crate::teams::TeamConstraints;
-use crate::{SolverError, Step, Stiffness, Vertex, VertexForce};
+use crate::{SolverError, Step, Stiffness, Vertex, VertexForce, VertexStore};
 
 use runs::Runs;
 use tiles::Tiles;
 
-pub use access::{Blocks, Load, Store};
+pub use access::{LaneAccess, Load, Store};
+pub(crate) use runs::{QUAD, ROW};
 pub use vertex_force::TeamForces;
 
 /// Upper bound of the number of SIMD lanes over all levels and number types.
@@ -56,10 +57,10 @@ pub struct VertexChunk<'a, T, V> {
 /// neither implement nor call this trait.
 pub trait Project<T: Scalar> {
     /// Projects the constraints one after the other, in ascending order.
-    fn project(&self, chunk: ConstraintChunk<'_, T, &mut [Vertex<T>]>);
+    fn project(&self, chunk: ConstraintChunk<'_, T, VertexStore<'_, T>>);
     /// Projects with SIMD lanes while other threads project other constraints. No two constraints
     /// that are projected at the same time may share a vertex.
-    fn project_shared(&self, level: SimdLevel, chunk: ConstraintChunk<'_, T, SharedVertices<'_, T>>);
+    fn project_shared(&self, level: SimdLevel, chunk: ConstraintChunk<'_, T, SharedStore<'_, T>>);
     /// Adds the forces of this kind on each vertex, one vertex after the other.
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>);
     /// Adds the forces with SIMD lanes while other threads move other vertices. No thread may
@@ -78,6 +79,9 @@ pub(crate) struct Batch<C, const N: usize, T, P> {
     offsets: Vec<u32>,
     tiles: Tiles,
     runs: Runs,
+    /// The vertices of the first constraint of each long piece of `runs`, so that loops over pieces
+    /// read less memory.
+    rows: Vec<[u32; N]>,
     indices: Vec<[u32; N]>,
     params: Vec<P>,
     stiffness: Stiffness<T>,
@@ -126,6 +130,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             vertex_count,
             offsets: groups.offsets.clone(),
             tiles,
+            rows: runs.rows(count).map(|place| indices[order[place] as usize]).collect(),
             runs,
             indices: order.iter().map(|&k| indices[k as usize]).collect(),
             params: order.iter().map(|&k| params[k as usize]).collect(),

@@ -5,18 +5,11 @@ use std::ops::Range;
 use cutis_constraints::{Constraint, LaneTask, Lanes, Params, Scalar, SimdLevel};
 use nalgebra::Point3;
 
-use super::runs::BLOCK;
-use super::{Batch, Blocks, ConstraintChunk, MAX_LANES, Project, Store, TeamForces, VertexChunk};
-use crate::colored::SharedVertices;
+use super::runs::{QUAD, ROW};
+use super::{Batch, ConstraintChunk, LaneAccess, MAX_LANES, Project, Store, TeamForces, VertexChunk};
+use crate::colored::{SharedStore, SharedVertices};
 use crate::teams::TeamConstraints;
-use crate::{Step, Values, Vertex, project};
-
-/// Each vertex has its own index.
-const INDEXED: u8 = 0;
-/// The vertices of a block are one behind the other.
-const CONTIGUOUS: u8 = 1;
-/// The vertices of a block have a stride.
-const STRIDED: u8 = 2;
+use crate::{Step, Values, Vertex, VertexStore, project};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     /// Projects one constraint after the other.
@@ -43,7 +36,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     /// has the same bits as that of the scalar loop, because the constraints share no vertex and
     /// each lane executes the scalar operations.
     #[inline(always)]
-    fn project_in_lanes<L: Lanes<T>, S: Blocks<T>>(&self, chunk: ConstraintChunk<'_, T, S>) {
+    fn project_in_lanes<L: Lanes<T>, S: LaneAccess<T>>(&self, chunk: ConstraintChunk<'_, T, S>) {
         let ConstraintChunk { range, mut vertices, step, multipliers } = chunk;
         let rule = match step {
             Step::Pbd => Step::Pbd,
@@ -52,13 +45,17 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         let (start, keeps) = (range.start, !multipliers.is_empty());
         let mut first = start;
         while first < range.end {
-            let (stride, part) = self.runs.part(first..range.end);
+            let (piece, part) = match S::READS_ROWS {
+                true => self.runs.part(first..range.end),
+                false => (1, range.clone()),
+            };
             let whole = first..part.end - part.len() % L::LANES;
             let own = if keeps { &mut multipliers[first - start..] } else { &mut [][..] };
-            match stride {
-                0 => self.project_run::<L, S, INDEXED>(whole.clone(), stride, &mut vertices, rule, own),
-                1 => self.project_run::<L, S, CONTIGUOUS>(whole.clone(), stride, &mut vertices, rule, own),
-                _ => self.project_run::<L, S, STRIDED>(whole.clone(), stride, &mut vertices, rule, own),
+            match piece {
+                ROW if keeps => self.project_rows::<L, S, true>(whole.clone(), &mut vertices, rule, own),
+                ROW => self.project_rows::<L, S, false>(whole.clone(), &mut vertices, rule, own),
+                QUAD => self.project_run::<L, S, QUAD>(whole.clone(), &mut vertices, rule, own),
+                _ => self.project_run::<L, S, 1>(whole.clone(), &mut vertices, rule, own),
             }
             first = whole.end;
             let multipliers =
@@ -70,13 +67,12 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         }
     }
 
-    /// Projects constraints of one stride, whose number is a multiple of the lanes. The first
-    /// multipliers are theirs, if there are any.
+    /// Projects constraints in pieces of one length, whose number is a multiple of the lanes. The
+    /// first multipliers are theirs, if there are any.
     #[inline(always)]
-    fn project_run<L: Lanes<T>, S: Blocks<T>, const ACCESS: u8>(
+    fn project_run<L: Lanes<T>, S: LaneAccess<T>, const PIECE: usize>(
         &self,
         range: Range<usize>,
-        stride: usize,
         vertices: &mut S,
         rule: Step<L>,
         multipliers: &mut [T],
@@ -89,20 +85,56 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         };
         for (n, (tuples, params)) in tuples.zip(params).enumerate() {
             let first = n * L::LANES;
-            let stiffness = if each.is_empty() { same } else { L::from_slice(&each[first..]).interleaved() };
+            let stiffness = if each.is_empty() { same } else { L::from_slice(&each[first..]) };
             let multipliers = if multipliers.is_empty() { &mut [] } else { &mut multipliers[first..] };
-            let group = Group { tuples, params, stiffness, stride };
-            group.project::<C, T, S, ACCESS>(vertices, rule, multipliers);
+            let group = Group { tuples, params, stiffness };
+            group.project::<C, T, S, PIECE>(vertices, rule, multipliers);
+        }
+    }
+
+    /// Projects long pieces of rows, or a part of one. The first multipliers are theirs, if there
+    /// are any. This is the inner loop of a lattice: it has no bounds to check and few branches.
+    #[inline(always)]
+    fn project_rows<L: Lanes<T>, S: LaneAccess<T>, const KEEPS: bool>(
+        &self,
+        range: Range<usize>,
+        vertices: &mut S,
+        rule: Step<L>,
+        multipliers: &mut [T],
+    ) {
+        if range.is_empty() {
+            return;
+        }
+        let first = self.runs.rows_before(range.start);
+        let rows = self.rows[first..].iter().zip(self.params[range.clone()].chunks(ROW));
+        let same = [T::zero(); ROW];
+        let (same, each) = match self.stiffness.values() {
+            Values::Uniform(value) => (same.map(|_| *value), &[][..]),
+            Values::Each(values) => (same, &values[range]),
+        };
+        let mut each = each.chunks(ROW);
+        let mut multipliers = multipliers.chunks_mut(ROW);
+        for (row, params) in rows {
+            let stiffness = each.next().unwrap_or(&same);
+            let multipliers = if KEEPS { multipliers.next().unwrap_or_default() } else { &mut [] };
+            for place in (0..params.len()).step_by(L::LANES) {
+                let tuples = &[row.map(|vertex| vertex + 2 * place as u32)];
+                let params = &params[place..place + L::LANES];
+                let stiffness = L::from_slice(&stiffness[place..]);
+                let group = Group { tuples, params, stiffness };
+                let multipliers = if KEEPS { &mut multipliers[place..] } else { &mut [] };
+                group.project::<C, T, S, ROW>(vertices, rule, multipliers);
+            }
         }
     }
 }
 
-/// As many constraints of one stride as there are lanes.
+/// As many constraints as there are lanes.
 struct Group<'a, P, L, const N: usize> {
+    /// The vertices of each constraint, or of the first one in a long piece.
     tuples: &'a [[u32; N]],
     params: &'a [P],
     stiffness: L,
-    stride: usize,
 }
 
 /// Repeats a statement for each corner `$i` below `$n`, with a constant `$i` for the first four.
@@ -125,102 +157,49 @@ macro_rules! for_each_corner {
 
 impl<P, L, const N: usize> Group<'_, P, L, N> {
     /// Projects the constraints. The first multipliers are theirs, if there are any.
-    ///
-    /// The lanes are [interleaved](Lanes::interleaved), so that vertices are read and written in
-    /// rows.
     #[inline(always)]
-    fn project<C, T, S, const ACCESS: u8>(&self, vertices: &mut S, rule: Step<L>, multipliers: &mut [T])
+    fn project<C, T, S, const PIECE: usize>(&self, vertices: &mut S, rule: Step<L>, multipliers: &mut [T])
     where
         C: Constraint<N, Params<T> = P>,
         P: Params<T>,
         T: Scalar,
         L: Lanes<T>,
-        S: Blocks<T>,
+        S: LaneAccess<T>,
     {
-        let Self { tuples, params, stiffness, stride } = self;
+        let Self { tuples, params, stiffness } = self;
         let mut x = [Point3::origin(); N];
         let mut w = [L::splat(T::zero()); N];
         for_each_corner!(i, N, {
-            let [a, b, c, d] = L::transposed(rows::<L, T, S, N, ACCESS>(vertices, tuples, i, *stride));
+            let [a, b, c, d] = vertices.read::<L, N, PIECE>(tuples, i);
             (x[i], w[i]) = (Point3::new(a, b, c), d);
         });
         let params = if P::LEN == 1 {
-            Params::from_fn(|_| L::from_slice(P::flat(params)).interleaved())
+            Params::from_fn(|_| L::from_slice(P::flat(params)))
         } else {
-            Params::from_fn(|j| L::from_lanes(|lane| params[lane].as_ref()[j]).interleaved())
+            Params::from_fn(|j| L::from_lanes(|lane| params[lane].as_ref()[j]))
         };
         let keeps = !multipliers.is_empty();
-        let multiplier = if keeps { L::from_slice(multipliers).interleaved() } else { L::splat(T::zero()) };
+        let multiplier = if keeps { L::from_slice(multipliers) } else { L::splat(T::zero()) };
         let projection = project::<C, N, L, _>(&x, &w, &params, rule, *stiffness, multiplier);
         if keeps {
             let sum: L = multiplier + projection.multiplier;
-            sum.sequential().write_to(multipliers);
+            sum.write_to(multipliers);
         }
         for_each_corner!(i, N, {
             let moved = x[i] + projection.corrections[i];
-            let moved = L::transposed([moved.x, moved.y, moved.z, w[i]]);
-            write_rows::<L, T, S, N, ACCESS>(vertices, tuples, i, *stride, moved);
+            vertices.write::<L, N, PIECE>(tuples, i, [moved.x, moved.y, moved.z, w[i]]);
         });
-    }
-}
-
-/// Reads vertex `i` of each constraint. Each of the four results has those of a quarter of the
-/// constraints, a vertex after the other.
-#[inline(always)]
-fn rows<L: Lanes<T>, T: Scalar, S: Blocks<T>, const N: usize, const ACCESS: u8>(
-    vertices: &S,
-    tuples: &[[u32; N]],
-    i: usize,
-    stride: usize,
-) -> [L; 4] {
-    let quarter = L::LANES / 4;
-    let mut rows = [L::splat(T::zero()); 4];
-    for (n, row) in rows.iter_mut().enumerate() {
-        let (k, place) = (n * quarter, n * quarter % BLOCK);
-        let first = tuples[k - place][i];
-        *row = match ACCESS {
-            INDEXED => L::from_quads(|p| vertices.load(tuples[k + p][i]).components()),
-            CONTIGUOUS => L::from_slice(vertices.block(first, place, quarter)),
-            _ => L::from_quads(|p| {
-                let numbers = vertices.block(first, (place + p) * stride, 1);
-                [numbers[0], numbers[1], numbers[2], numbers[3]]
-            }),
-        };
-    }
-    rows
-}
-
-/// The inverse of [`rows`].
-#[inline(always)]
-fn write_rows<L: Lanes<T>, T: Scalar, S: Blocks<T>, const N: usize, const ACCESS: u8>(
-    vertices: &mut S,
-    tuples: &[[u32; N]],
-    i: usize,
-    stride: usize,
-    rows: [L; 4],
-) {
-    let quarter = L::LANES / 4;
-    for (n, row) in rows.into_iter().enumerate() {
-        let (k, place) = (n * quarter, n * quarter % BLOCK);
-        let first = tuples[k - place][i];
-        match ACCESS {
-            INDEXED => row.quads(|p, quad| vertices.store(tuples[k + p][i], Vertex::from_components(quad))),
-            CONTIGUOUS => row.write_to(vertices.block_mut(first, place, quarter)),
-            _ => row.quads(|p, quad| {
-                vertices.block_mut(first, (place + p) * stride, 1).copy_from_slice(&quad);
-            }),
-        }
     }
 }
 
 /// The projection of a chunk, for any number of lanes.
-struct ProjectTask<'a, 'b, B, T: Scalar> {
+struct ProjectTask<'a, B, T, S> {
     batch: &'a B,
-    chunk: ConstraintChunk<'a, T, SharedVertices<'b, T>>,
+    chunk: ConstraintChunk<'a, T, S>,
 }
 
-impl<C: Constraint<N>, const N: usize, T: Scalar> LaneTask<T>
-    for ProjectTask<'_, '_, Batch<C, N, T, C::Params<T>>, T>
+impl<C: Constraint<N>, const N: usize, T: Scalar, S: LaneAccess<T>> LaneTask<T>
+    for ProjectTask<'_, Batch<C, N, T, C::Params<T>>, T, S>
 {
     #[inline(always)]
     fn run<L: Lanes<T>>(self) {
@@ -267,14 +246,30 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> LaneTask<T>
 }
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, C::Params<T>> {
-    fn project(&self, chunk: ConstraintChunk<'_, T, &mut [Vertex<T>]>) {
-        let ConstraintChunk { range, mut vertices, step, multipliers } = chunk;
-        let chunk = ConstraintChunk { range, vertices: &mut vertices, step, multipliers };
-        self.project_scalar(chunk);
+    fn project(&self, chunk: ConstraintChunk<'_, T, VertexStore<'_, T>>) {
+        let ConstraintChunk { range, vertices, step, multipliers } = chunk;
+        match vertices {
+            VertexStore::Vertices(mut vertices) => {
+                self.project_scalar(ConstraintChunk { range, vertices: &mut vertices, step, multipliers });
+            }
+            VertexStore::Columns(mut vertices) => {
+                self.project_scalar(ConstraintChunk { range, vertices: &mut vertices, step, multipliers });
+            }
+        }
     }
 
-    fn project_shared(&self, level: SimdLevel, chunk: ConstraintChunk<'_, T, SharedVertices<'_, T>>) {
-        T::in_lanes(level, ProjectTask { batch: self, chunk });
+    fn project_shared(&self, level: SimdLevel, chunk: ConstraintChunk<'_, T, SharedStore<'_, T>>) {
+        let ConstraintChunk { range, vertices, step, multipliers } = chunk;
+        match vertices {
+            SharedStore::Vertices(vertices) => {
+                let chunk = ConstraintChunk { range, vertices, step, multipliers };
+                T::in_lanes(level, ProjectTask { batch: self, chunk });
+            }
+            SharedStore::Columns(vertices) => {
+                let chunk = ConstraintChunk { range, vertices, step, multipliers };
+                T::in_lanes(level, ProjectTask { batch: self, chunk });
+            }
+        }
     }
 
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>) {

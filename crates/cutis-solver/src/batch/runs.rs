@@ -1,65 +1,96 @@
-//! Runs: constraints in a row whose vertices advance by one stride.
+//! Runs: constraints in a row whose vertices advance by two.
 //!
-//! A block is four constraints, one after the other, whose vertices all advance by the same stride:
-//! constraint `n` of the block has the vertices of its first constraint plus `n` times the stride.
-//! SIMD lanes then read the vertices of a block with one index per corner, and side by side if the
-//! stride is 1. Meshes with rows of vertices have such blocks. The constraints of a color may be in
-//! any order, so that [`arrange`] puts the blocks of each stride behind each other.
+//! A color has every second constraint of a row of vertices, because neighbors share a vertex. So
+//! the vertices of one constraint are those of the constraint before plus two, and in
+//! [`Columns`](crate::Columns) they are adjacent. Edges that are not along a row may start at every
+//! vertex: then those at even vertices are one row and those at odd vertices another one. Any mesh
+//! whose indices follow rows of vertices has runs. The constraints of a color may be in any order,
+//! so that [`arrange`] cuts the rows into pieces of one length and puts these behind each other.
 
 use std::ops::Range;
 
-/// Number of constraints of a block.
-pub(super) const BLOCK: usize = 4;
+/// Number of constraints of a long piece. It fills SIMD lanes of every width.
+pub(crate) const ROW: usize = super::MAX_LANES;
 
-/// The largest stride that counts.
-const MOST_STRIDE: usize = 8;
+/// Number of constraints of a short piece, for what is left of a row.
+pub(crate) const QUAD: usize = 4;
 
-/// The number of constraints of a run is a multiple of this, so that each run fills SIMD lanes of
-/// every width.
-const RUN: usize = super::MAX_LANES;
-
-/// Constraints from `start` up to the start of the next run.
+/// Constraints from `start` up to the start of the next run, in pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Run {
     start: u32,
-    /// 0 if the constraints have no common stride.
-    stride: u32,
+    /// [`ROW`], [`QUAD`], or 1 for constraints in no row.
+    piece: u32,
+    /// Number of long pieces in all runs before this one.
+    rows_before: u32,
 }
 
 /// The runs of a kind, in ascending order.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Runs(Vec<Run>);
+pub(super) struct Runs {
+    list: Vec<Run>,
+    /// Number of long pieces.
+    rows: u32,
+}
 
 impl Runs {
-    /// Returns the stride of the first constraints in `range`, 0 if they have none, and which ones
-    /// have it. Counted from their start, each four of them are a block if the stride is not 0. A
-    /// range that starts within a block has no stride up to the next one.
+    /// Returns the length of the pieces of the first constraints in `range`, and which constraints
+    /// are in such pieces. The pieces count from the start of these constraints. A range that
+    /// starts within a piece has pieces of length 1 up to the next one.
     #[inline]
     pub(super) fn part(&self, range: Range<usize>) -> (usize, Range<usize>) {
-        let next = self.0.partition_point(|run| run.start as usize <= range.start);
-        let end = self.0.get(next).map_or(range.end, |run| range.end.min(run.start as usize));
-        let Some(run) = next.checked_sub(1).map(|last| self.0[last]) else { return (0, range.start..end) };
-        match (range.start - run.start as usize) % BLOCK {
-            0 => (run.stride as usize, range.start..end),
-            _ if run.stride == 0 => (0, range.start..end),
-            place => (0, range.start..end.min(range.start + BLOCK - place)),
+        let next = self.list.partition_point(|run| run.start as usize <= range.start);
+        let end = self.list.get(next).map_or(range.end, |run| range.end.min(run.start as usize));
+        let Some(run) = next.checked_sub(1).map(|last| self.list[last]) else { return (1, range.start..end) };
+        let piece = run.piece as usize;
+        match (range.start - run.start as usize) % piece {
+            0 => (piece, range.start..end),
+            place => (1, range.start..end.min(range.start + piece - place)),
         }
+    }
+
+    /// Returns the number of long pieces before the constraint at `place`, which is in a long
+    /// piece.
+    #[inline]
+    pub(super) fn rows_before(&self, place: usize) -> usize {
+        let last = self.list.partition_point(|run| run.start as usize <= place) - 1;
+        self.list[last].rows_before as usize + (place - self.list[last].start as usize) / ROW
+    }
+
+    /// Returns the places of the first constraints of all long pieces of `count` constraints.
+    pub(super) fn rows(&self, count: usize) -> impl Iterator<Item = usize> {
+        let ends = self.list.iter().skip(1).map(|run| run.start as usize).chain([count]);
+        let long = self.list.iter().zip(ends).filter(|(run, _)| run.piece as usize == ROW);
+        long.flat_map(|(run, end)| (run.start as usize..end).step_by(ROW))
+    }
+
+    /// Returns how many of `count` constraints are in pieces of rows.
+    pub(super) fn constraints_in_rows(&self, count: usize) -> usize {
+        let ends = self.list.iter().skip(1).map(|run| run.start as usize).chain([count]);
+        let lengths = self.list.iter().zip(ends).map(|(run, end)| (run.piece, end - run.start as usize));
+        lengths.filter(|&(piece, _)| piece > 1).map(|(_, length)| length).sum()
     }
 
     /// Returns the memory in bytes.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
+        size_of_val(self.list.as_slice())
     }
 }
 
-/// Lists of constraints by stride, kept between calls of [`arrange`].
+/// Lists of constraints by the length of their pieces, kept between calls of [`arrange`].
 #[derive(Default)]
 pub(super) struct Scratch {
-    of_stride: [Vec<u32>; MOST_STRIDE + 1],
+    /// Constraints whose first vertex is even, and those whose first vertex is odd.
+    halves: [Vec<u32>; 2],
+    /// Pieces of the rows in each half.
+    rows: [Vec<u32>; 2],
+    quads: [Vec<u32>; 2],
+    others: Vec<u32>,
 }
 
-/// Sorts `constraints`, which will be at place `start` of the kind, into runs: first the blocks of
-/// stride 1, of stride 2 and so on, then all other constraints in ascending order.
+/// Sorts `constraints`, which will be at place `start` of the kind, into runs: first the long
+/// pieces of rows, then the short ones, then all other constraints. Each run is in ascending order
+/// of its first constraints, so that adjacent constraints stay close to each other.
 pub(super) fn arrange<const N: usize>(
     constraints: &mut [u32],
     start: usize,
@@ -67,75 +98,83 @@ pub(super) fn arrange<const N: usize>(
     runs: &mut Runs,
     scratch: &mut Scratch,
 ) {
-    let Scratch { of_stride } = scratch;
-    of_stride.iter_mut().for_each(Vec::clear);
-    let mut place = 0;
-    while place < constraints.len() {
-        let block = constraints.get(place..place + BLOCK);
-        match block.and_then(|block| Some((block, stride(block, indices)?))) {
-            Some((block, stride)) => {
-                of_stride[stride].extend_from_slice(block);
-                place += BLOCK;
-            }
-            None => {
-                of_stride[0].push(constraints[place]);
-                place += 1;
-            }
+    let Scratch { halves, rows, quads, others } = scratch;
+    halves.iter_mut().chain(&mut *rows).chain(&mut *quads).chain([&mut *others]).for_each(Vec::clear);
+    for &k in &*constraints {
+        halves[(indices[k as usize][0] & 1) as usize].push(k);
+    }
+    let follows = |a: &u32, b: &u32| {
+        let (a, b) = (&indices[*a as usize], &indices[*b as usize]);
+        a.iter().zip(b).all(|(a, b)| a.checked_add(2) == Some(*b))
+    };
+    for ((half, rows), quads) in halves.iter().zip(&mut *rows).zip(&mut *quads) {
+        for row in half.chunk_by(follows) {
+            let (long, rest) = row.split_at(row.len() / ROW * ROW);
+            let (short, rest) = rest.split_at(rest.len() / QUAD * QUAD);
+            rows.extend_from_slice(long);
+            quads.extend_from_slice(short);
+            others.extend_from_slice(rest);
         }
     }
-    let (others, of_stride) = of_stride.split_first_mut().expect("a list for stride 0");
     let mut filled = 0;
-    let mut append = |list: &[u32], stride: usize| {
+    let mut append = |list: &[u32], piece: usize| {
         if !list.is_empty() {
-            runs.0.push(Run { start: (start + filled) as u32, stride: stride as u32 });
+            let rows_before = runs.rows;
+            runs.list.push(Run { start: (start + filled) as u32, piece: piece as u32, rows_before });
+            runs.rows += if piece == ROW { (list.len() / ROW) as u32 } else { 0 };
             constraints[filled..filled + list.len()].copy_from_slice(list);
             filled += list.len();
         }
     };
-    for (list, stride) in of_stride.iter().zip(1..) {
-        let (run, rest) = list.split_at(list.len() / RUN * RUN);
-        append(run, stride);
-        others.extend_from_slice(rest);
-    }
+    append(&merged(rows, ROW), ROW);
+    let quads = merged(quads, QUAD);
+    // Only whole groups of lanes are read in pieces.
+    let (whole, rest) = quads.split_at(quads.len() / ROW * ROW);
+    append(whole, QUAD);
+    others.extend_from_slice(rest);
     others.sort_unstable();
-    append(others, 0);
+    append(others, 1);
 }
 
-/// The stride of four constraints, if all of their vertices advance by the same small one.
-fn stride<const N: usize>(block: &[u32], indices: &[[u32; N]]) -> Option<usize> {
-    let first = &indices[block[0] as usize];
-    let stride = indices[block[1] as usize].first()?.checked_sub(*first.first()?)?;
-    let advances = |(n, &k): (u32, &u32)| {
-        let tuple = &indices[k as usize];
-        tuple.iter().zip(first).all(|(&vertex, &first)| first.checked_add(n * stride) == Some(vertex))
-    };
-    let fits = (1..=MOST_STRIDE).contains(&(stride as usize)) && (0..).zip(block).all(advances);
-    fits.then_some(stride as usize)
+/// The pieces of two ascending lists, in ascending order of their first constraints.
+fn merged(lists: &[Vec<u32>; 2], piece: usize) -> Vec<u32> {
+    let mut heads = lists.each_ref().map(|list| list.chunks_exact(piece).peekable());
+    let mut all = Vec::with_capacity(lists[0].len() + lists[1].len());
+    loop {
+        let [even, odd] = heads.each_mut().map(|head| head.peek().map(|piece| piece[0]));
+        let next = match (even, odd) {
+            (Some(even), Some(odd)) => usize::from(odd < even),
+            (Some(_), None) => 0,
+            (None, Some(_)) => 1,
+            (None, None) => return all,
+        };
+        all.extend_from_slice(heads[next].next().unwrap_or_default());
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The order of the constraints `0..count`, and how many constraints of each stride there are.
-    fn arranged<const N: usize>(indices: &[[u32; N]]) -> (Vec<u32>, [usize; MOST_STRIDE + 1]) {
+    /// The order of the constraints `0..count`, and how many are in long pieces, in short ones and
+    /// in none.
+    fn arranged<const N: usize>(indices: &[[u32; N]]) -> (Vec<u32>, [usize; 3]) {
         let mut order: Vec<u32> = (0..indices.len() as u32).collect();
         let mut runs = Runs::default();
         arrange(&mut order, 0, indices, &mut runs, &mut Scratch::default());
-        let (mut counts, mut first) = ([0; MOST_STRIDE + 1], 0);
+        let (mut counts, mut first) = ([0; 3], 0);
         while first < indices.len() {
-            let (stride, part) = runs.part(first..indices.len());
-            counts[stride] += part.len();
-            if stride > 0 {
-                for block in order[part.clone()].chunks(BLOCK) {
-                    let tuples = block.iter().map(|&k| indices[k as usize]);
-                    let start = indices[block[0] as usize];
-                    let expected = (0..).map(|n| start.map(|vertex| vertex + n * stride as u32));
-                    assert!(tuples.eq(expected.take(BLOCK)), "stride {stride}");
-                }
+            let (piece, part) = runs.part(first..indices.len());
+            counts[[ROW, QUAD, 1].iter().position(|&length| length == piece).unwrap()] += part.len();
+            for piece in order[part.clone()].chunks(piece) {
+                let tuples = piece.iter().map(|&k| indices[k as usize]);
+                let start = indices[piece[0] as usize];
+                let expected = (0..).map(|n| start.map(|vertex| vertex + 2 * n));
+                assert!(tuples.eq(expected.take(piece.len())), "{piece:?}");
             }
             first = part.end;
         }
+        assert_eq!(runs.constraints_in_rows(indices.len()), counts[0] + counts[1]);
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert!(sorted.into_iter().eq(0..indices.len() as u32), "each constraint has one place");
@@ -148,53 +187,47 @@ mod tests {
     }
 
     #[test]
-    fn constraints_in_rows_are_runs() {
-        for stride in 1..=MOST_STRIDE as u32 {
-            let (order, counts) = arranged(&rows::<4>((0..40).map(|k| k * stride)));
-            let mut expected = [0; MOST_STRIDE + 1];
-            (expected[0], expected[stride as usize]) = (8, 32);
-            assert_eq!(counts, expected, "two whole runs and a remainder");
-            assert!(order.into_iter().eq(0..40));
-        }
+    fn every_second_vertex_starts_a_row() {
+        let (order, counts) = arranged(&rows::<4>((0..40).map(|k| 2 * k)));
+        assert_eq!(counts, [32, 0, 8], "two long pieces, and too few short ones");
+        assert!(order.into_iter().eq(0..40));
+        let (order, counts) = arranged(&rows::<2>((0..80).map(|k| k + 3)));
+        assert_eq!(counts, [64, 16, 0], "even and odd vertices make a row each");
+        let starts = [0, 15, 16, 31, 32].map(|place| order[place]);
+        assert_eq!(starts, [0, 30, 1, 31, 32], "the pieces of both rows take turns");
     }
 
     #[test]
-    fn other_constraints_are_no_runs() {
-        let alone = |indices: &[[u32; 2]]| arranged(indices).1[0] == indices.len();
-        assert!(!alone(&rows((0..40).map(|k| 3 * k))), "the check can fail");
-        assert!(alone(&rows((0..40).map(|k| 9 * k))), "a long stride");
+    fn other_constraints_are_in_no_row() {
+        let alone = |indices: &[[u32; 2]]| arranged(indices).1 == [0, 0, indices.len()];
+        assert!(!alone(&rows((0..40).map(|k| 2 * k))), "the check can fail");
+        assert!(alone(&rows((0..40).map(|k| 3 * k))), "another stride");
         assert!(alone(&rows((0..40).rev())), "a stride below zero");
         assert!(alone(&rows((0..40).map(|k| k * k))), "no stride");
-        assert!(alone(&(0..40).map(|k| [k, 1000 + 2 * k]).collect::<Vec<_>>()), "two strides");
-        assert!(alone(&rows(0..12)), "too few constraints");
+        assert!(alone(&(0..40).map(|k| [2 * k, 1000 + 3 * k]).collect::<Vec<_>>()), "two strides");
+        assert!(alone(&rows((0..12).map(|k| 2 * k))), "too few constraints");
         assert!(alone(&[]));
     }
 
     #[test]
-    fn rows_of_any_length_make_blocks_and_a_remainder() {
-        // Rows of 11 vertices with gaps have two blocks and three other constraints each.
-        let broken = rows::<2>((0..110).map(|k| 20 * (k / 11) + k % 11));
+    fn rows_of_any_length_make_pieces_and_a_remainder() {
+        // Rows of 11 constraints with gaps have two short pieces and three other constraints each.
+        let broken = rows::<2>((0..110).map(|k| 40 * (k / 11) + 2 * (k % 11)));
         let (order, counts) = arranged(&broken);
-        assert_eq!((counts[0], counts[1]), (30, 80), "five runs of 16");
+        assert_eq!(counts, [0, 80, 30], "five groups of 16");
         assert!(order[80..].is_sorted(), "the remainder is in ascending order");
-        // A row of stride 2 between rows of stride 1.
-        let mixed = rows::<2>((0..32).chain((0..20).map(|k| 100 + 2 * k)).chain(200..216));
-        let (order, counts) = arranged(&mixed);
-        assert_eq!((counts[0], counts[1], counts[2]), (4, 48, 16));
-        assert_eq!(order[48], 32);
     }
 
     #[test]
-    fn only_a_range_in_step_with_its_blocks_has_a_stride() {
-        let indices = rows::<2>(0..32);
+    fn only_a_range_in_step_with_its_pieces_has_pieces() {
+        let indices = rows::<2>((0..32).map(|k| 2 * k));
         let mut order: Vec<u32> = (0..32).collect();
         let mut runs = Runs::default();
         arrange(&mut order, 100, &indices, &mut runs, &mut Scratch::default());
-        assert_eq!(runs.part(100..132), (1, 100..132));
-        assert_eq!(runs.part(112..120), (1, 112..120));
-        assert_eq!(runs.part(113..120), (0, 113..116));
-        assert_eq!(runs.part(116..120), (1, 116..120));
-        assert_eq!(runs.part(118..119), (0, 118..119));
-        assert_eq!(runs.part(3..120), (0, 3..100), "before the first run");
+        assert_eq!(runs.part(100..132), (ROW, 100..132));
+        assert_eq!(runs.part(116..120), (ROW, 116..120));
+        assert_eq!(runs.part(104..132), (1, 104..116));
+        assert_eq!(runs.part(118..119), (1, 118..119));
+        assert_eq!(runs.part(3..120), (1, 3..100), "before the first run");
     }
 }

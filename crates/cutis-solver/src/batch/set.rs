@@ -38,6 +38,10 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
         self.tiles.offsets[first] as usize..self.tiles.offsets[first + 1] as usize
     }
 
+    fn constraints_in_rows(&self) -> usize {
+        self.runs.constraints_in_rows(self.indices.len())
+    }
+
     fn indices(&self) -> &[u32] {
         self.indices.as_flattened()
     }
@@ -108,6 +112,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
             offsets: self.offsets.clone(),
             tiles: self.tiles.clone(),
             runs: self.runs.clone(),
+            rows: self.rows.clone(),
             indices: self.indices.clone(),
             params: self.params.iter().map(to_f64).collect(),
             stiffness: self.stiffness.to_f64(),
@@ -123,6 +128,7 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
         size_of_val(self.offsets.as_slice())
             + size_of_val(self.tiles.offsets.as_slice())
             + self.runs.bytes()
+            + size_of_val(self.rows.as_slice())
             + size_of_val(self.indices.as_slice())
             + size_of_val(self.params.as_slice())
             + stiffness

@@ -6,7 +6,7 @@ use cutis_constraints::{Constraint, Distance, Volume};
 use nalgebra::Point3;
 
 use super::*;
-use crate::{Formulation, Settings, Simulation, Stiffness, SystemBuilder};
+use crate::{Columns, Formulation, Settings, Simulation, Stiffness, SystemBuilder, VertexStore};
 
 /// Two tetrahedra that share no vertex, connected by an edge. All are deformed.
 fn system(each: bool) -> System<f64> {
@@ -38,8 +38,23 @@ fn on_threads(threads: usize, work: &(dyn Fn(usize) + Sync)) {
     });
 }
 
+/// Runs `work` with the vertices in one of the two forms.
+fn stored<T: Scalar>(vertices: &mut [Vertex<T>], by_column: bool, work: impl FnOnce(VertexStore<'_, T>)) {
+    if !by_column {
+        return work(vertices.into());
+    }
+    let mut columns = Columns::of(vertices);
+    work((&mut columns).into());
+    (0..).zip(vertices).for_each(|(index, vertex)| *vertex = columns.get(index));
+}
+
 /// All vertices after one sweep over all colors, and the multipliers of the kinds.
-fn swept(each: bool, keeps_multipliers: bool, run: impl Fn(ConstraintColor<'_, f64>)) -> Vec<Vec<f64>> {
+fn swept(
+    each: bool,
+    keeps_multipliers: bool,
+    by_column: bool,
+    run: impl Fn(ConstraintColor<'_, f64>),
+) -> Vec<Vec<f64>> {
     let mut system = system(each);
     let (vertices, kinds) = system.projection_parts();
     let step = Step::Xpbd { inverse_h_squared: 100.0 };
@@ -48,7 +63,10 @@ fn swept(each: bool, keeps_multipliers: bool, run: impl Fn(ConstraintColor<'_, f
         let set = &**kind;
         let mut multipliers = vec![0.25; if keeps_multipliers { set.len() } else { 0 }];
         for color in 0..set.colors() {
-            run(ConstraintColor { set, color, tile: None, vertices, step, multipliers: &mut multipliers });
+            stored(vertices, by_column, |vertices| {
+                let multipliers = &mut multipliers;
+                run(ConstraintColor { set, color, tile: None, vertices, step, multipliers });
+            });
         }
         kept.push(multipliers);
     }
@@ -59,9 +77,10 @@ fn swept(each: bool, keeps_multipliers: bool, run: impl Fn(ConstraintColor<'_, f
 #[test]
 fn shared_constraints_have_the_bits_of_serial_ones() {
     for (each, keeps_multipliers) in [(false, false), (false, true), (true, true)] {
-        let serial = swept(each, keeps_multipliers, |color| color.project());
-        for threads in [1, 2] {
-            let shared = swept(each, keeps_multipliers, |color| {
+        let serial = swept(each, keeps_multipliers, false, |color| color.project());
+        assert_eq!(swept(each, keeps_multipliers, true, |color| color.project()), serial);
+        for (threads, by_column) in [(1, false), (1, true), (2, false), (2, true)] {
+            let shared = swept(each, keeps_multipliers, by_column, |color| {
                 let color = Colored::new(color, SimdLevel::best(), threads);
                 on_threads(threads, &|worker| while color.project_next_chunk(worker) {});
                 assert!(!color.project_next_chunk(0), "no chunk is left");
@@ -120,7 +139,7 @@ fn threads_take_each_chunk_once() {
             set: &*kinds[0],
             color: 0,
             tile: None,
-            vertices,
+            vertices: vertices.into(),
             step,
             multipliers: &mut multipliers,
         });
@@ -144,6 +163,7 @@ type Swept<T> = (Vec<Vertex<T>>, Vec<T>);
 fn in_rows<T: Scalar, C: Constraint<N>, const N: usize>(
     places: &[u32],
     varied: bool,
+    by_column: bool,
     scale: f64,
     run: impl Fn(ConstraintColor<'_, T>),
 ) -> Swept<T>
@@ -175,7 +195,10 @@ where
     let (vertices, kinds) = system.projection_parts();
     let step = Step::Xpbd { inverse_h_squared: T::constant(100.0) };
     let set = &*kinds[0];
-    run(ConstraintColor { set, color: 0, tile: None, vertices, step, multipliers: &mut multipliers });
+    stored(vertices, by_column, |vertices| {
+        let multipliers = &mut multipliers;
+        run(ConstraintColor { set, color: 0, tile: None, vertices, step, multipliers });
+    });
     (system.vertices, multipliers)
 }
 
@@ -186,16 +209,16 @@ where
 {
     // Miri takes the case with most reads.
     for varied in if cfg!(miri) { vec![true] } else { vec![false, true] } {
-        let serial = in_rows::<T, C, N>(places, varied, 0.5, |color| color.project());
+        let serial = in_rows::<T, C, N>(places, varied, false, 0.5, |color| color.project());
         assert!(serial.1.iter().any(|&multiplier| multiplier != T::zero()));
-        for level in SimdLevel::available() {
+        for (level, by_column) in SimdLevel::available().into_iter().flat_map(|l| [(l, false), (l, true)]) {
             let shared = |scale| {
-                in_rows::<T, C, N>(places, varied, scale, |color| {
+                in_rows::<T, C, N>(places, varied, by_column, scale, |color| {
                     let color = Colored::new(color, level, 2);
                     on_threads(2, &|worker| while color.project_next_chunk(worker) {});
                 })
             };
-            assert!(shared(0.5) == serial, "{level:?}, varied: {varied}");
+            assert!(shared(0.5) == serial, "{level:?}, varied: {varied}, by column: {by_column}");
             assert!(shared(0.50001) != serial, "the comparison can fail");
         }
     }
@@ -203,7 +226,7 @@ where
 
 #[test]
 fn runs_of_every_stride_have_the_bits_of_serial_constraints() {
-    let (count, strides) = if cfg!(miri) { (21, vec![1, 2]) } else { (1100, vec![1, 2, 4, 5, 9]) };
+    let (count, strides) = if cfg!(miri) { (41, vec![1, 2]) } else { (1100, vec![1, 2, 4, 5, 9]) };
     for stride in strides {
         let row: Vec<u32> = (0..count).map(|k| k * stride).collect();
         check_rows::<f32, Distance, 2>(&row);
@@ -251,6 +274,7 @@ fn tiled(tiles: Option<fn(usize) -> Vec<usize>>, project: fn(ConstraintColor<'_,
             tiles.map_or_else(|| vec![None], |order| order(set.tiles()).into_iter().map(Some).collect());
         for tile in order {
             for color in 0..set.colors() {
+                let vertices = (&mut *vertices).into();
                 project(ConstraintColor { set, color, tile, vertices, step, multipliers: &mut [] });
             }
         }
@@ -280,7 +304,7 @@ fn tiles_have_the_bits_of_whole_colors() {
 fn a_set_for_more_vertices_is_rejected() {
     let mut system = system(false);
     let (vertices, kinds) = system.projection_parts();
-    let (vertices, step) = (&mut vertices[..7], Step::Pbd);
+    let (vertices, step) = ((&mut vertices[..7]).into(), Step::Pbd);
     Colored::new(
         ConstraintColor { set: &*kinds[0], color: 0, tile: None, vertices, step, multipliers: &mut [] },
         SimdLevel::best(),
@@ -293,7 +317,7 @@ fn a_set_for_more_vertices_is_rejected() {
 fn too_few_multipliers_are_rejected() {
     let mut system = system(false);
     let (vertices, kinds) = system.projection_parts();
-    let (multipliers, step) = (&mut [0.0; 6][..], Step::Pbd);
+    let (vertices, multipliers, step) = (vertices.into(), &mut [0.0; 6][..], Step::Pbd);
     Colored::new(
         ConstraintColor { set: &*kinds[0], color: 0, tile: None, vertices, step, multipliers },
         SimdLevel::best(),

@@ -132,7 +132,7 @@ impl Body {
                     set: kind,
                     color: sweep.color,
                     tile: None,
-                    vertices: &mut vertices,
+                    vertices: vertices.as_mut_slice().into(),
                     step,
                     multipliers: &mut multipliers,
                 });

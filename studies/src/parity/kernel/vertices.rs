@@ -119,7 +119,8 @@ fn check(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
                 place[n % 3] = value;
                 vertices[vertex].set_position(place);
             }
-            let expected = Serial.first_not_finite(&vertices).map_or(NONE, |vertex| vertex as u32);
+            let expected =
+                vertices.iter().position(|vertex| !vertex.is_finite()).map_or(NONE, |vertex| vertex as u32);
             let buffers = Buffers::new(gpu, &vertices, &velocities(vertices.len()), settings(1))?;
             buffers.run(gpu, source, "check", &[0, 4, 5])?;
             let found = gpu.read(&buffers.status, 0..1)?[0];
