@@ -16,7 +16,7 @@ use crate::{
 /// If each thread moves more bytes of vertices than this, colors are projected tile by tile: the
 /// vertices of a thread then do not fit the cache. Otherwise whole colors are faster, because the
 /// vertices stay in the cache of the same processor. Results do not depend on it.
-const CACHE: usize = 16 << 20;
+const CACHE: usize = 6 << 20;
 
 /// Executes the passes of a substep on the host, with one thread or with several.
 pub trait Execute<T: Scalar> {
