@@ -7,8 +7,8 @@
 
 use cutis_constraints::Scalar;
 
-use crate::Vertex;
 use crate::batch::{Load, Store};
+use crate::{System, Vertex};
 
 /// Length of a column is twice an odd multiple of this, so that columns do not compete for the same
 /// place of a cache.
@@ -22,11 +22,26 @@ pub struct Columns<T> {
     numbers: Vec<T>,
 }
 
+/// Length of half a column of `count` vertices.
+fn half(count: usize) -> usize {
+    let lines = count.div_ceil(2).div_ceil(LINE);
+    LINE * (lines + (lines + 1) % 2)
+}
+
+impl<T: Scalar> System<T> {
+    /// Returns the memory in bytes that the vertices take by column, or 0 if most constraints are
+    /// in no rows, so that columns make their projection no faster.
+    pub fn column_bytes(&self) -> usize {
+        let all: usize = self.kinds.iter().map(|kind| kind.len()).sum();
+        let in_rows: usize = self.kinds.iter().map(|kind| kind.constraints_in_rows()).sum();
+        if in_rows > all / 2 { 8 * half(self.vertices.len()) * size_of::<T>() } else { 0 }
+    }
+}
+
 impl<T: Scalar> Columns<T> {
     /// Returns columns for `count` vertices at the origin with infinite mass.
     pub fn new(count: usize) -> Self {
-        let lines = count.div_ceil(2).div_ceil(LINE);
-        let half = LINE * (lines + (lines + 1) % 2);
+        let half = half(count);
         Self { count, half, numbers: vec![T::zero(); 8 * half] }
     }
 

@@ -128,10 +128,7 @@ impl<T: Scalar> Simulation<T> {
     /// lanes read them faster. Projections take this form, and vertex block descent does not. The
     /// bits do not change.
     pub fn with_columns(mut self) -> Self {
-        let kinds = &self.system.kinds;
-        let all: usize = kinds.iter().map(|kind| kind.len()).sum();
-        let in_rows: usize = kinds.iter().map(|kind| kind.constraints_in_rows()).sum();
-        if matches!(self.method, Method::Project(_)) && in_rows > all / 2 {
+        if matches!(self.method, Method::Project(_)) && self.system.column_bytes() > 0 {
             self.columns = Some(Columns::new(self.system.vertices.len()));
         }
         self

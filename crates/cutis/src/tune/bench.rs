@@ -183,7 +183,7 @@ impl<'a> Bench<'a> {
     pub(super) fn bytes(&self, setting: Setting) -> Result<CostReport, Error> {
         let settings = setting.settings(&self.settings);
         let mut estimate = CostEstimate::of(self.system, &settings)?;
-        estimate.add_teams(self.backend, self.system);
+        estimate.add_threaded(self.backend, self.system);
         let on_device = constraints::device_memory(self.backend, self.system, &settings);
         Ok(CostReport::of_memory(&estimate.memory, &on_device, "not measured"))
     }

@@ -74,7 +74,7 @@ impl Model for ConstraintModel {
             CostEstimate::of(system, settings).map_err(|e| input.file.blame("solver")(Error::Solver(e)))?;
         let work = estimate.work(system, settings, scene.run.frames);
         let backend = request.settle(input.file, &scene.solver, &work)?;
-        estimate.add_teams(&backend, system);
+        estimate.add_threaded(&backend, system);
         let colors = match estimate.vertex_colors() {
             Some(number) => BTreeMap::from([(StepProfile::DESCENT.to_owned(), number)]),
             None => self.colors.clone(),
