@@ -55,6 +55,7 @@ pub use gpu::{GpuRaymarcher, raymarch_gpu};
 pub use image::{Image, Rgb};
 pub use lines::{LineField, draw_lines};
 pub use raymarch::{draw_annotations, raymarch};
+pub use shade::tissue_color;
 pub use side::{Axes, Side};
 pub use slice::{Plane, SliceView, slice};
 pub use view::{Focus, View};

@@ -149,6 +149,12 @@ impl<'a> Shader<'a> {
     }
 }
 
+/// Color of the tissue in a wound by its HU, as pictures show it: fat, connective tissue, muscle, bone
+/// and what lies between them.
+pub fn tissue_color(hu: f32) -> Rgb {
+    encode(tissue(hu))
+}
+
 /// Color of tissue by HU.
 fn tissue(hu: f32) -> Light {
     let after = TISSUE.partition_point(|(at, _)| *at < hu);

@@ -60,7 +60,8 @@ const AREA: [f64; 4] = [76.0, 44.0, 700.0, 384.0];
 const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 
 /// Draws a chart as an SVG document with title, axes, ticks and legend. The legend is in the
-/// emptiest corner of the plot, or next to the plot if there are more than [`INSIDE`] series.
+/// emptiest corner of the plot, or next to the plot if there are more than [`INSIDE`] series. The
+/// attributes `data-area` and `data-x` of the document place values on a linear x axis.
 ///
 /// ```
 /// use cutis_render::plot::{Axis, Mark, Scale, Series, line_chart};
@@ -79,7 +80,8 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
         if outside { [WIDTH + legend_width, HEIGHT.max(top + legend_height)] } else { [WIDTH, HEIGHT] };
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-         font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+         font-family=\"sans-serif\" font-size=\"13\"{}>\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+        place_of_values(&across)
     );
     let mut add = |text: std::fmt::Arguments<'_>| {
         // Writing to a String cannot fail.
@@ -129,6 +131,16 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
     }
     svg.push_str("</svg>\n");
     svg
+}
+
+/// SVG attributes that say where a value on the x axis is, for programs that mark one: the left, top,
+/// right and bottom of the plot area, and the values at its left and right. None for a logarithmic
+/// axis.
+fn place_of_values(across: &Span) -> String {
+    let [left, top, right, bottom] = AREA;
+    across.linear_ends().map_or_else(String::new, |[low, high]| {
+        format!(" data-area=\"{left} {top} {right} {bottom}\" data-x=\"{low} {high}\"")
+    })
 }
 
 /// SVG attributes of the line of a series.
@@ -230,6 +242,37 @@ mod tests {
         assert!(legend(&rising) < 120.0, "top left is free under a rising line");
         let left: Vec<[f64; 2]> = [[0.0, 0.0], [0.0, 1.0], [0.001, 1.0], [0.001, 0.0], [9.0, 0.5]].into();
         assert!(legend(&left) > 400.0, "both left corners are taken");
+    }
+
+    #[test]
+    fn the_document_says_where_values_are() {
+        let chart = |scale| {
+            let axis = |label| Axis { label, scale };
+            let points = [[0.0, 1.0], [2.0, 3.0]];
+            line_chart(
+                "",
+                axis("x"),
+                axis("y"),
+                &[Series { name: "name", points: &points, mark: Mark::Line }],
+            )
+        };
+        let svg = chart(Scale::Linear);
+        let attribute = |name: &str| -> Vec<f64> {
+            let text = svg.split(&format!(" {name}=\"")).nth(1).and_then(|s| s.split('"').next());
+            text.unwrap_or_default().split(' ').filter_map(|number| number.parse().ok()).collect()
+        };
+        let (area, ends) = (attribute("data-area"), attribute("data-x"));
+        let place = |x: f64| area[0] + (x - ends[0]) / (ends[1] - ends[0]) * (area[2] - area[0]);
+        let path = svg.split("<path d=\"M").find(|tag| tag.contains('L')).unwrap_or_default();
+        let xs: Vec<f64> = path
+            .split('"')
+            .next()
+            .unwrap_or_default()
+            .split('L')
+            .filter_map(|point| point.split(' ').next()?.parse().ok())
+            .collect();
+        assert!((xs[0] - place(0.0)).abs() < 0.01 && (xs[1] - place(2.0)).abs() < 0.01, "{xs:?}");
+        assert!(!chart(Scale::Log).contains("data-x"));
     }
 
     #[test]

@@ -30,6 +30,11 @@ impl Span {
         Some(self.pixels[0] + part * (self.pixels[1] - self.pixels[0]))
     }
 
+    /// Values at both ends of a linear axis.
+    pub(super) fn linear_ends(&self) -> Option<[f64; 2]> {
+        (self.scale == Scale::Linear).then_some([self.low, self.high])
+    }
+
     /// Labels and positions of ticks: about six round numbers, or decades.
     pub(super) fn ticks(&self) -> Vec<(String, f64)> {
         let rough = (self.high - self.low) / 6.0;

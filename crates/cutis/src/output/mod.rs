@@ -7,10 +7,13 @@ pub mod report;
 mod resample_run;
 pub mod rest_report;
 mod skin_lines;
+mod slices;
 pub mod step_report;
+pub(crate) mod surface;
 pub mod suture_report;
 mod warp;
 pub(crate) mod warp_mesh;
+mod wound_place;
 
 use std::path::Path;
 
@@ -26,8 +29,10 @@ use crate::run::files::{self, RunFolder};
 use crate::scene::{OutputSection, Scene};
 
 use html::Figure;
+use pictures::Pictures;
 use report::Resample;
 use skin_lines::SkinLines;
+use slices::SlicePair;
 use warp::BodyWarp;
 
 pub use resample_run::{ResampleRequest, resample_run};
@@ -55,6 +60,7 @@ fn last_cut_s(scene: &Scene, frames: u32) -> f64 {
 pub(crate) struct OutputResults {
     pub(crate) resample: Option<Resample>,
     pub(crate) figures: Vec<Figure>,
+    pub(crate) slices: Vec<SlicePair>,
     pub(crate) warnings: Vec<String>,
 }
 
@@ -95,12 +101,13 @@ pub(crate) fn write(
         clock.stage("write deformed.nii.gz", 0, |_| Ok(nifti::write(folder.volume(), &volume)?))?;
     }
     if output.pictures {
-        results.figures = clock.stage_placed("pictures", 0, |progress| {
+        let Pictures { figures, slices } = clock.stage_placed("pictures", 0, |progress| {
             Ok((pictures::draw(deformed, &warp, &volume, stages, progress)?, stages.place()))
         })?;
-        for figure in &results.figures {
+        for figure in &figures {
             files::write(&(figure.path)(folder), &figure.png)?;
         }
+        (results.figures, results.slices) = (figures, slices);
     }
     results.warnings.append(&mut stages.notes);
     Ok(results)

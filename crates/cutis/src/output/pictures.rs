@@ -1,10 +1,9 @@
 //! The pictures of a run: the skin before and after, a slice across the wound, and the lines of
 //! tension on the skin.
 
-use cutis_mesh::Slit;
 use cutis_render::{
-    Contour, Focus, Image, LineField, Plane, Rgb, Side, SliceView, View, bare_sides, draw_annotations,
-    draw_lines, side_by_side, skin_depth, slice,
+    Contour, Image, LineField, Plane, Rgb, Side, SliceView, View, bare_sides, draw_annotations, draw_lines,
+    side_by_side, skin_depth, slice,
 };
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
@@ -12,7 +11,9 @@ use nalgebra::{Point3, Vector3};
 use super::DeformedBody;
 use super::html::Figure;
 use super::skin_lines::SkinLines;
+use super::slices::{self, SlicePair};
 use super::warp::BodyWarp;
+use super::wound_place::{WoundPlace, position};
 use crate::backend::Stages;
 use crate::body::{Body, Membrane};
 use crate::run::files::RunFolder;
@@ -21,8 +22,6 @@ use crate::{Error, Progress};
 
 /// Pixels along each side of the skin pictures.
 const PIXELS: usize = 900;
-/// Size of a close-up, in lengths of the incision.
-const CLOSE_UP: f64 = 1.5;
 /// Depth below which all tissue has the same color, mm.
 const DEEPEST_MM: f64 = 20.0;
 /// Voxels around the walls of wounds for which the depth is known.
@@ -32,6 +31,14 @@ const MARGIN: f64 = 4.0;
 const COLORS: [Rgb; 2] = [[90, 160, 255], [255, 170, 60]];
 /// Color of the lines of tension.
 const LINES: Rgb = [20, 50, 120];
+
+/// What was drawn.
+pub(super) struct Pictures {
+    /// The pictures of the run folder.
+    pub(super) figures: Vec<Figure>,
+    /// Slices for the report; none without it.
+    pub(super) slices: Vec<SlicePair>,
+}
 
 /// Draws a run: the skin before and after, a slice before and after, and the lines of tension of a
 /// membrane. Before, the CT has the cuts from the start. `after` is the deformed CT.
@@ -44,7 +51,7 @@ pub(super) fn draw(
     after: &Volume,
     stages: &mut Stages,
     progress: &dyn Progress,
-) -> Result<Vec<Figure>, Error> {
+) -> Result<Pictures, Error> {
     let DeformedBody { body, ct, scene, .. } = *deformed;
     let air_below_hu = scene.tissue.air_below_hu;
     let before = warp.cut_at_rest(ct, stages, progress)?;
@@ -53,14 +60,8 @@ pub(super) fn draw(
         None => None,
     };
 
-    let frame = &body.mesh.frame;
-    let pieces = body.cut.pieces.iter().map(|piece| std::slice::from_ref(piece.axis()));
-    let wounds: Vec<&[Slit]> = body.cut.incisions().chain(pieces).collect();
-    // Incisions next to an excision make a flap, which is seen as a whole. Otherwise the first
-    // incision is seen.
-    let flap = wounds.len() > 1 && !body.cut.pieces.is_empty();
-    let wound = wounds.first().map(|slits| Wound::of(slits, frame));
-    let focus = wound.as_ref().map(|w| Focus { center_mm: w.middle_mm, size_mm: CLOSE_UP * w.length_mm });
+    let place = WoundPlace::of(body);
+    let focus = place.as_ref().map(|place| place.slice);
     let (start, end) = (body.skin_at_start(), body.whole_skin(deformed.positions));
     let contour = |(positions, triangles), color| Contour {
         origin_mm: body.mesh.frame.origin_mm,
@@ -70,8 +71,8 @@ pub(super) fn draw(
     };
     let rest = contour((&start.0, &start.1), COLORS[0]);
     let moved = contour((&end.0, &end.1), COLORS[1]);
-    let (plane, middle_mm) = match &wound {
-        Some(wound) => (wound.plane_across(), wound.middle_mm),
+    let (plane, middle_mm) = match &place {
+        Some(place) => (place.plane_across(), place.middle_mm),
         None => (Plane::Axial, body.mesh.frame.origin_mm.into()),
     };
     let cross = |volume: &Volume, contours: &[Contour<'_>]| {
@@ -87,13 +88,19 @@ pub(super) fn draw(
     let after_slice = cross(after, &[rest, moved])?;
     let slices = side_by_side(&[(&before_slice, "before"), (&after_slice, "after")])?;
 
+    let skins = [(&start.0[..], &start.1[..]), (&end.0[..], &end.1[..])];
+    let slices_of_planes = match scene.output.report {
+        true => slices::pairs([&before, after], skins, COLORS, &body.mesh.frame, place.as_ref())?,
+        false => Vec::new(),
+    };
+
     let view = View {
         width: PIXELS,
         height: PIXELS,
-        focus: if flap { Some(around(&wounds, frame)) } else { focus },
+        focus: place.as_ref().map(|place| place.close_up),
         depth: depth.as_ref().map(|(at_rest, _)| at_rest),
         threshold_hu: air_below_hu,
-        ..View::new(wound.as_ref().map_or(Side::Anterior, |w| Side::From(w.outward)))
+        ..View::new(place.as_ref().map_or(Side::Anterior, |place| Side::From(place.outward)))
     };
     // The picture of the lines has the same skin. It is drawn without letters, which the lines
     // would cross.
@@ -128,7 +135,7 @@ pub(super) fn draw(
             png: picture.to_png()?,
         });
     }
-    Ok(figures)
+    Ok(Pictures { figures, slices: slices_of_planes })
 }
 
 /// Draws the lines of tension of a membrane on a picture of the body at rest.
@@ -170,66 +177,4 @@ fn depths(
     let at_rest = skin_depth(ct, air_below_hu, finest, DEEPEST_MM, within)?;
     let deformed = warp.apply_to_centers(&at_rest, stages, progress)?.0;
     Ok((at_rest, bare_sides(deformed, ct.grid())?))
-}
-
-/// A close-up of several wounds: the middle of the box around their ends, and its diagonal.
-fn around(wounds: &[&[Slit]], frame: &cutis_mesh::Frame) -> Focus {
-    let ends = wounds.iter().flat_map(|slits| *slits);
-    let ends = ends.flat_map(|slit| [slit.skin_at(0.0), slit.skin_at(slit.length())]);
-    let (mut low, mut high) = (Point3::from([f64::INFINITY; 3]), Point3::from([f64::NEG_INFINITY; 3]));
-    for end in ends {
-        (low, high) = (low.inf(&end), high.sup(&end));
-    }
-    let middle = frame.origin_mm + nalgebra::center(&low, &high).coords * 1000.0;
-    Focus { center_mm: middle.into(), size_mm: CLOSE_UP * (high - low).norm() * 1000.0 }
-}
-
-/// The place of a wound, for the choice of a view.
-struct Wound {
-    middle_mm: [f64; 3],
-    length_mm: f64,
-    along: Vector3<f64>,
-    outward: [f64; 3],
-}
-
-impl Wound {
-    /// The wound of an incision, seen at the middle of the segment that holds half of its path.
-    fn of(slits: &[Slit], frame: &cutis_mesh::Frame) -> Self {
-        let length: f64 = slits.iter().map(Slit::length).sum();
-        let mut half = 0.5 * length;
-        let mut at = &slits[0];
-        for slit in slits {
-            at = slit;
-            if half <= slit.length() {
-                break;
-            }
-            half -= slit.length();
-        }
-        let middle = at.middle();
-        let middle_mm: Point3<f64> = frame.origin_mm + middle.coords * 1000.0;
-        Self {
-            middle_mm: middle_mm.into(),
-            length_mm: length * 1000.0,
-            along: at.along(),
-            outward: (-at.inward()).into(),
-        }
-    }
-
-    /// The anatomical plane most nearly perpendicular to the slit.
-    fn plane_across(&self) -> Plane {
-        match self.along.iamax() {
-            0 => Plane::Sagittal,
-            1 => Plane::Coronal,
-            _ => Plane::Axial,
-        }
-    }
-}
-
-/// Position of a point along the normal of a plane, mm.
-fn position(plane: Plane, [x, y, z]: [f64; 3]) -> f64 {
-    match plane {
-        Plane::Sagittal => x,
-        Plane::Coronal => y,
-        Plane::Axial => z,
-    }
 }

@@ -16,6 +16,7 @@ use super::timing::{PartTimes, Timing};
 use crate::backend::{DeviceMeter, DevicePositions};
 use crate::model::{Simulation, SimulationEnd};
 use crate::output::rest_report::RestReport;
+use crate::output::surface::Recorder;
 use crate::scene::{RunEnd, RunSection};
 use crate::{Error, Progress};
 
@@ -72,6 +73,7 @@ impl RunLoop<'_> {
         &self,
         simulation: &mut dyn Simulation,
         place: &'static str,
+        mut recorder: Option<&mut Recorder>,
         clock: &mut Clock<'_>,
     ) -> Result<RunResult, Error> {
         let saved = self.resumed.map(|frame| (frame, self.folder.checkpoint()));
@@ -82,21 +84,30 @@ impl RunLoop<'_> {
         if rows.is_empty() {
             rows.push(self.row(simulation, &lips, self.done(), None)?);
         }
-        let mut frames = |simulation: &mut dyn Simulation, progress: &dyn Progress| {
-            let done = self.frames(simulation, &lips, &mut times, progress, &mut at, &mut rows);
-            done.map_err(|error| at.name(error))
-        };
+        if let Some(recorder) = &mut recorder {
+            recorder.start(&rows[0], self.resumed);
+            if let (0, Some(_), Some(last)) = (self.count(), self.resumed, rows.last()) {
+                recorder.frame(simulation, last)?;
+            }
+        }
+        let mut frames =
+            |simulation: &mut dyn Simulation, recorder: Option<&mut Recorder>, progress: &dyn Progress| {
+                let done = self.frames(simulation, &lips, &mut times, recorder, progress, &mut at, &mut rows);
+                done.map_err(|error| at.name(error))
+            };
         let (settled, (end, on_device)) = if self.run.until == RunEnd::Frames {
             let ended = clock.stage_on(place, "simulate", self.count(), |progress| {
-                frames(simulation, progress)?;
+                frames(simulation, recorder, progress)?;
                 self.end(simulation)
             })?;
             (None, ended)
         } else {
             if self.count() > 0 {
-                clock.stage_on(place, "simulate", self.count(), |progress| frames(simulation, progress))?;
+                clock.stage_on(place, "simulate", self.count(), |progress| {
+                    frames(simulation, recorder.as_deref_mut(), progress)
+                })?;
             }
-            let (settled, ended) = self.settle(simulation, &lips, clock)?;
+            let (settled, ended) = self.settle(simulation, &lips, recorder, clock)?;
             (Some(settled), ended)
         };
         if self.count() > 0 {
@@ -116,6 +127,7 @@ impl RunLoop<'_> {
         &self,
         simulation: &mut dyn Simulation,
         lips: &Lips<'_>,
+        mut recorder: Option<&mut Recorder>,
         clock: &mut Clock<'_>,
     ) -> Result<(Settled, Ended), Error> {
         let now_s = simulation.time_s();
@@ -133,6 +145,9 @@ impl RunLoop<'_> {
                 let ms = start.elapsed().as_secs_f64() * 1e3;
                 let row = self.row(simulation, lips, self.run.frames, Some(ms))?;
                 let done = n.checked_sub(1).map(|n| stops[n].done.clone()).unwrap_or_default();
+                if let Some(recorder) = &mut recorder {
+                    recorder.rest([n + 1, times_s.len()], &done, simulation, &row)?;
+                }
                 settled.add(RestReport::of(&rest, ms), row, done);
                 progress.advance(before + SEARCH);
             }
@@ -159,6 +174,7 @@ impl RunLoop<'_> {
         simulation: &mut dyn Simulation,
         lips: &Lips<'_>,
         times: &mut PartTimes,
+        mut recorder: Option<&mut Recorder>,
         progress: &dyn Progress,
         at: &mut Position,
         rows: &mut Vec<FrameRow>,
@@ -174,7 +190,11 @@ impl RunLoop<'_> {
                 simulation.step()?;
             }
             let ms = start.elapsed().as_secs_f64() * 1e3;
-            rows.push(self.row(simulation, lips, frame, Some(ms))?);
+            let row = self.row(simulation, lips, frame, Some(ms))?;
+            if let Some(recorder) = &mut recorder {
+                recorder.frame(simulation, &row)?;
+            }
+            rows.push(row);
             if every > 0 && (frame % every == 0 || frame == frames) {
                 let saved = Checkpoint { history: rows.clone(), ..simulation.save(frame)? };
                 saved.write(&self.folder.checkpoint(), &self.fingerprint)?;

@@ -15,7 +15,8 @@ use crate::body::{Body, Membrane};
 use crate::cost::Plan;
 use crate::ct::source::Source;
 use crate::model::{Model, ModelInput, Simulation, Started};
-use crate::scene::LoadedScene;
+use crate::output::surface::Recorder;
+use crate::scene::{LoadedScene, RunEnd};
 use crate::{Error, Progress};
 
 /// A run before its first frame.
@@ -34,6 +35,8 @@ pub(super) struct Simulated {
     /// The GPU that the simulation ran on, if it ran on one.
     pub(super) device: Option<DeviceMeter>,
     pub(super) result: RunResult,
+    /// States of the skin for the report; none without a report or without a skin.
+    pub(super) recorder: Option<Recorder>,
 }
 
 /// Runs the frames.
@@ -75,11 +78,16 @@ pub(super) fn simulate(
         resamples: scene.output.volume || scene.output.pictures,
         device: device.as_ref(),
     };
-    let result = run_loop.run(&mut *simulation, backend.place(), clock)?;
+    let rests = if scene.run.until == RunEnd::Rest { 1 + run_loop.stops.len() } else { 0 };
+    let mut recorder = match scene.output.report {
+        true => Recorder::new(body, &source.volume, scene.run.frames, rests),
+        false => None,
+    };
+    let result = run_loop.run(&mut *simulation, backend.place(), recorder.as_mut(), clock)?;
     // This frees the simulation's memory on the GPU for the stages that follow.
     drop(simulation);
     warn(&mut plan, &result.end.warnings, clock.progress);
-    Ok(Simulated { plan, device, result })
+    Ok(Simulated { plan, device, result, recorder })
 }
 
 /// Adds warnings to the plan, and shows them to the user.

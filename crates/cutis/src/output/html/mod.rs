@@ -1,0 +1,71 @@
+//! `report.html`: the report for people, one file with pictures, plots and a view of the skin that
+//! turns and plays.
+//!
+//! The page needs no other file and no network: its policy forbids both. Its script and its style
+//! are the files in `assets`. Without scripts or WebGL 2 the pictures stay.
+
+mod data;
+mod page;
+mod plots;
+mod summary;
+mod tables;
+mod text;
+
+use std::path::PathBuf;
+
+use super::report::Report;
+use super::slices::SlicePair;
+use super::surface::Recorder;
+use crate::Error;
+use crate::body::Body;
+use crate::run::files::{self, RunFolder};
+use crate::run::frames::FrameRow;
+
+use data::Data;
+use page::Page;
+use plots::Quantity;
+
+/// A picture of the page.
+pub(crate) struct Figure {
+    /// Its file in the run folder.
+    pub(crate) path: fn(&RunFolder) -> PathBuf,
+    pub(crate) caption: &'static str,
+    /// Whether it takes the whole width of the page instead of half.
+    pub(crate) wide: bool,
+    /// The picture as a PNG file.
+    pub(crate) png: Vec<u8>,
+}
+
+/// What the page shows in addition to the report.
+pub(crate) struct Shown<'a> {
+    pub(crate) body: &'a Body,
+    pub(crate) rows: &'a [FrameRow],
+    pub(crate) figures: &'a [Figure],
+    pub(crate) slices: &'a [SlicePair],
+    /// None without a skin.
+    pub(crate) recorder: Option<&'a Recorder>,
+}
+
+/// Writes `report.html`.
+///
+/// # Errors
+/// [`Error::File`] if it cannot be written.
+pub(crate) fn write(report: &Report, shown: &Shown<'_>, folder: &RunFolder) -> Result<(), Error> {
+    let rows = plots::shown_rows(shown.rows);
+    let quantities = shown.rows.first().map(Quantity::of).unwrap_or_default();
+    let mut plots = plots::over_time(&quantities, &rows);
+    let has_time = !plots.is_empty();
+    plots.extend(report.rest.as_ref().and_then(plots::search));
+    let data = shown.recorder.map(|recorder| Data::of(shown.body, recorder, &quantities, &rows));
+    let page = Page {
+        report,
+        figures: shown.figures,
+        slices: shown.slices,
+        plots: &plots,
+        has_time,
+        data: data.as_ref(),
+        resumed: shown.recorder.and_then(|recorder| recorder.resumed),
+        scene: &toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string()),
+    };
+    files::write(&folder.html(), page.html().as_bytes())
+}

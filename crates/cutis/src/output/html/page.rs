@@ -1,0 +1,187 @@
+//! The page as HTML.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use cutis_render::Plane;
+use sha2::{Digest, Sha256};
+
+use super::Figure;
+use super::data::Data;
+use super::summary::summary;
+use super::tables::tables;
+use super::text::{escape, items};
+use crate::output::report::Report;
+use crate::output::slices::SlicePair;
+
+const STYLE: &str = include_str!("assets/page.css");
+
+/// The files of the script, in order. They share one scope.
+const SCRIPT: [&str; 8] = [
+    include_str!("assets/math.js"),
+    include_str!("assets/surface.js"),
+    include_str!("assets/shaders.js"),
+    include_str!("assets/renderer.js"),
+    include_str!("assets/camera.js"),
+    include_str!("assets/time.js"),
+    include_str!("assets/compare.js"),
+    include_str!("assets/main.js"),
+];
+
+/// The interactive view. The script shows what is hidden here.
+const VIEW: &str = include_str!("assets/view.html");
+
+/// The parts of a page.
+pub(super) struct Page<'a> {
+    pub(super) report: &'a Report,
+    pub(super) figures: &'a [Figure],
+    pub(super) slices: &'a [SlicePair],
+    pub(super) plots: &'a [String],
+    /// Whether there are plots over time.
+    pub(super) has_time: bool,
+    pub(super) data: Option<&'a Data>,
+    /// The frame from which the run resumed.
+    pub(super) resumed: Option<u32>,
+    pub(super) scene: &'a str,
+}
+
+impl Page<'_> {
+    pub(super) fn html(&self) -> String {
+        let report = self.report;
+        let script = format!("(() => {{\n\"use strict\";\n{}}})();\n", SCRIPT.join("\n"));
+        let mut out = String::new();
+        let mut put = |text: &str| out.push_str(text);
+        put("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n");
+        put(&policy(STYLE, &script));
+        put("<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n");
+        put("<meta name=\"color-scheme\" content=\"light dark\">\n");
+        put(&format!(
+            "<title>{}</title>\n<style>{STYLE}</style></head>\n<body><main>",
+            escape(&title(report))
+        ));
+        put("<h1>Cutis run</h1>");
+        put(&summary(report));
+        if !report.warnings.is_empty() {
+            put(&format!("<div class=\"warn\"><b>Note</b><ul>{}</ul></div>", items(&report.warnings)));
+        }
+        if self.data.is_some() {
+            put(VIEW);
+            put(&self.view_notes());
+        }
+        put(&slices(self.slices));
+        put(&pictures(self.figures));
+        put(&self.plots());
+        put(&tables(report));
+        if !report.left_out.is_empty() {
+            put(&format!("<h2>Left out by the scene</h2><ul>{}</ul>", items(&report.left_out)));
+        }
+        put(&format!("<h2>Scene as it ran</h2><pre tabindex=\"0\">{}</pre></main>\n", escape(self.scene)));
+        if let Some(data) = self.data {
+            put(&data.elements());
+        }
+        put(&format!("<script>{script}</script></body></html>\n"));
+        out
+    }
+
+    /// What a reader of the view has to know.
+    fn view_notes(&self) -> String {
+        let resumed = self.resumed.map(|frame| {
+            format!(
+                "<p class=\"note\">The run resumed from a checkpoint: the view has no state between the scan and \
+                 frame {frame}.</p>"
+            )
+        });
+        resumed.unwrap_or_default()
+    }
+
+    fn plots(&self) -> String {
+        let mut out = String::new();
+        if self.has_time {
+            out.push_str("<h2>Over time</h2><p id=\"at-time\" class=\"readings\" hidden></p>");
+        }
+        for plot in self.plots {
+            let _ = write!(out, "<figure class=\"plot\">{plot}</figure>");
+        }
+        out
+    }
+}
+
+/// The policy of the page: nothing is loaded, and only this style and this script are used.
+fn policy(style: &str, script: &str) -> String {
+    let hash = |text: &str| STANDARD.encode(Sha256::digest(text));
+    format!(
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
+         style-src 'sha256-{}'; script-src 'sha256-{}'; base-uri 'none'; form-action 'none'\">\n",
+        hash(style),
+        hash(script)
+    )
+}
+
+/// The name of the scene, so that the pages of several runs differ.
+fn title(report: &Report) -> String {
+    let scene = report.inputs.first().and_then(|input| Path::new(&input.path).file_stem());
+    scene.map_or_else(|| "Cutis run".into(), |name| format!("{} - Cutis run", name.to_string_lossy()))
+}
+
+fn image(png: &[u8], alt: &str) -> String {
+    format!("<img alt=\"{}\" src=\"data:image/png;base64,{}\">", escape(alt), STANDARD.encode(png))
+}
+
+fn pictures(figures: &[Figure]) -> String {
+    if figures.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("<h2>Pictures</h2><div class=\"pair\">");
+    for Figure { caption, wide, png, .. } in figures {
+        let class = if *wide { "wide" } else { "half" };
+        let (image, caption) = (image(png, caption), escape(caption));
+        let _ = write!(out, "<figure class=\"{class}\">{image}<figcaption>{caption}</figcaption></figure>");
+    }
+    out + "</div>"
+}
+
+/// The slices in three planes. Without the script the two of a plane are next to each other.
+fn slices(pairs: &[SlicePair]) -> String {
+    if pairs.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from(
+        "<section aria-labelledby=\"slices-title\"><h2 id=\"slices-title\">The CT before and after</h2>\
+         <p>Lines: the skin of the model <b class=\"before\">before</b> and <b class=\"after\">after</b>.</p>\
+         <div class=\"slices\">",
+    );
+    for SlicePair { plane, at_mm, png: [before, after] } in pairs {
+        let (name, axis) = match plane {
+            Plane::Axial => ("Axial", 'z'),
+            Plane::Coronal => ("Coronal", 'y'),
+            Plane::Sagittal => ("Sagittal", 'x'),
+        };
+        let [before, after] = [(before, "before"), (after, "after")]
+            .map(|(png, when)| image(png, &format!("{name} slice of the CT {when}")));
+        let _ = write!(
+            out,
+            "<figure class=\"compare\"><div class=\"two\">{before}{after}</div>\
+             <label hidden>before <input type=\"range\" min=\"0\" max=\"100\" value=\"50\" \
+             aria-label=\"{name} slice: share that shows the CT after, in percent\"> after</label>\
+             <figcaption>{name}, {axis} = {at_mm:.1} mm</figcaption></figure>"
+        );
+    }
+    out + "</div></section>"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_policy_names_the_hashes_of_style_and_script() {
+        // `printf x | openssl dgst -sha256 -binary | base64`
+        let hash = "LXEWQrcmsEQBYnyp+6wy9chTD7GQPMTbAiWHF5IaSIE=";
+        let policy = policy("x", "y");
+        assert!(policy.contains(&format!("style-src 'sha256-{hash}'")), "{policy}");
+        assert!(!policy.contains(&format!("script-src 'sha256-{hash}'")), "{policy}");
+        assert!(policy.contains("default-src 'none'"));
+    }
+}

@@ -1,0 +1,56 @@
+//! Slices of the CT in the three planes of the patient, before and after, for the report.
+
+use cutis_mesh::Frame;
+use cutis_render::{Contour, Plane, Rgb, SliceView, slice};
+use cutis_volume::Volume;
+use nalgebra::Point3;
+
+use super::wound_place::{WoundPlace, position};
+use crate::Error;
+
+/// Pixels along the longer side of a slice. A slice of this size has at most 1.1 MB.
+const PIXELS: usize = 600;
+
+/// One plane, before and after.
+pub(crate) struct SlicePair {
+    pub(crate) plane: Plane,
+    /// Position along the normal of the plane, world mm.
+    pub(crate) at_mm: f64,
+    /// PNG files of the slice before and after.
+    pub(crate) png: [Vec<u8>; 2],
+}
+
+/// A skin in local meters: positions and triangles.
+pub(super) type Skin<'a> = (&'a [Point3<f32>], &'a [[u32; 3]]);
+
+/// Slices through the wound, or through the middle of the body. `volumes` and `skins` are those
+/// before and after. The skins are drawn as lines.
+///
+/// # Errors
+/// The errors of the renderer.
+pub(super) fn pairs(
+    volumes: [&Volume; 2],
+    skins: [Skin<'_>; 2],
+    colors: [Rgb; 2],
+    frame: &Frame,
+    place: Option<&WoundPlace>,
+) -> Result<Vec<SlicePair>, Error> {
+    let middle_mm = place.map_or(frame.origin_mm.into(), |place| place.middle_mm);
+    let mut pairs = Vec::new();
+    for plane in [Plane::Axial, Plane::Coronal, Plane::Sagittal] {
+        let at_mm = position(plane, middle_mm);
+        let draw = |n: usize| {
+            let (positions, triangles) = skins[n];
+            let contour = Contour { origin_mm: frame.origin_mm, positions, triangles, color: colors[n] };
+            let view = SliceView {
+                contours: &[contour],
+                focus: place.map(|place| place.slice),
+                long_side: Some(PIXELS),
+                ..SliceView::new(plane, at_mm)
+            };
+            Ok::<_, Error>(slice(volumes[n], &view)?.to_png()?)
+        };
+        pairs.push(SlicePair { plane, at_mm, png: [draw(0)?, draw(1)?] });
+    }
+    Ok(pairs)
+}
