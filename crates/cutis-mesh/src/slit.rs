@@ -243,7 +243,7 @@ impl Slit {
     }
 
     /// Depth below the skin in m.
-    pub(crate) fn depth(&self) -> f64 {
+    pub fn depth(&self) -> f64 {
         self.depth
     }
 

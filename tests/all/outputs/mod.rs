@@ -14,4 +14,5 @@ mod page;
 mod pictures;
 mod report;
 mod tension;
+mod view;
 pub mod vtu;

@@ -54,7 +54,7 @@ fn the_first_sentence_has_the_counts_and_the_time() {
 
 /// Cells of the rows of a table under its heading.
 fn table(heading: &str) -> Vec<Vec<String>> {
-    let table = between(html(), &format!("<h2>{heading}</h2><table>"), "</table>");
+    let table = between(html(), &format!("<h2>{heading}</h2><div class=\"scroll\"><table>"), "</table>");
     let row = |row: &str| {
         let cells = row.split("<td").skip(1);
         cells.map(|cell| between(cell, ">", "</td>").to_owned()).collect::<Vec<_>>()
@@ -136,7 +136,7 @@ fn lists_and_the_scene_are_shown_in_full() {
     for line in ["surface:", "tissue:", "pictures:", "report:", "incision:", "handle:", "stc:"] {
         assert!(!list.contains(&format!("<li>{line}")), "{line} is in this scene: {list}");
     }
-    let scene = between(html(), "<h2>Scene as it ran</h2><pre>", "</pre>");
+    let scene = between(html(), "<h2>Scene as it ran</h2><pre tabindex=\"0\">", "</pre>");
     for line in ["rest_area_scale = 0.8", "over_s = 0.1", "frames = 12", "depth_mm = 15.0"] {
         assert!(scene.contains(line), "{line} is not in {scene}");
     }
@@ -146,7 +146,7 @@ fn lists_and_the_scene_are_shown_in_full() {
 /// frame.
 #[test]
 fn the_chart_shows_the_openings_over_time() {
-    let svg = between(html(), "<figure><svg", "</svg>");
+    let svg = between(html(), "<figure class=\"plot\"><svg", "</svg>");
     for text in [">Opening of the wound<", ">time / s<", ">distance of the lips / mm<"] {
         assert!(svg.contains(text), "no {text}");
     }

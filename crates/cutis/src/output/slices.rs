@@ -35,10 +35,10 @@ pub(super) fn pairs(
     frame: &Frame,
     place: Option<&WoundPlace>,
 ) -> Result<Vec<SlicePair>, Error> {
-    let middle_mm = place.map_or(frame.origin_mm.into(), |place| place.middle_mm);
+    let through_mm = place.map_or(frame.origin_mm.into(), |place| place.inside_mm);
     let mut pairs = Vec::new();
     for plane in [Plane::Axial, Plane::Coronal, Plane::Sagittal] {
-        let at_mm = position(plane, middle_mm);
+        let at_mm = position(plane, through_mm);
         let draw = |n: usize| {
             let (positions, triangles) = skins[n];
             let contour = Contour { origin_mm: frame.origin_mm, positions, triangles, color: colors[n] };

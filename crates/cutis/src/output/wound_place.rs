@@ -11,8 +11,10 @@ const CLOSE_UP: f64 = 1.5;
 
 /// The wound that pictures show.
 pub(super) struct WoundPlace {
-    /// World mm.
+    /// The middle of the wound on the skin, world mm.
     pub(super) middle_mm: [f64; 3],
+    /// The place half as deep as the wound below that, world mm.
+    pub(super) inside_mm: [f64; 3],
     /// Direction out of the body.
     pub(super) outward: [f64; 3],
     along: Vector3<f64>,
@@ -32,11 +34,13 @@ impl WoundPlace {
         let slits = wounds.first()?;
         let length: f64 = slits.iter().map(Slit::length).sum();
         let at = middle_segment(slits, length);
-        let middle_mm: [f64; 3] = (frame.origin_mm + at.middle().coords * 1000.0).into();
+        let world = |local: Point3<f64>| <[f64; 3]>::from(frame.origin_mm + local.coords * 1000.0);
+        let middle_mm = world(at.middle());
         let slice = Focus { center_mm: middle_mm, size_mm: CLOSE_UP * length * 1000.0 };
         let flap = wounds.len() > 1 && !body.cut.pieces.is_empty();
         Some(Self {
             middle_mm,
+            inside_mm: world(at.middle() + at.inward() * (0.5 * at.depth())),
             outward: (-at.inward()).into(),
             along: at.along(),
             slice,

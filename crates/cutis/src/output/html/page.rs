@@ -87,13 +87,20 @@ impl Page<'_> {
 
     /// What a reader of the view has to know.
     fn view_notes(&self) -> String {
-        let resumed = self.resumed.map(|frame| {
-            format!(
-                "<p class=\"note\">The run resumed from a checkpoint: the view has no state between the scan and \
-                 frame {frame}.</p>"
-            )
-        });
-        resumed.unwrap_or_default()
+        let mut out = String::new();
+        if let Some(frame) = self.resumed {
+            let _ = write!(
+                out,
+                "<p class=\"note\">The run resumed from a checkpoint: the view has no state between the scan \
+                 and frame {frame}.</p>"
+            );
+        }
+        if !self.report.scene.excision.is_empty() {
+            out.push_str(
+                "<p class=\"note\">The view shows no tissue that is taken out, also before that.</p>",
+            );
+        }
+        out
     }
 
     fn plots(&self) -> String {

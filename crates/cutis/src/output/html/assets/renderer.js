@@ -29,6 +29,7 @@ class Renderer {
     this.places = new Map();
     this.attribute(0, this.buffer(surface.rest), 3, gl.FLOAT, false, 12);
     this.attribute(1, this.buffer(surface.tissue), 4, gl.UNSIGNED_BYTE, true, 4);
+    this.attribute(6, this.buffer(surface.depths()), 1, gl.FLOAT, false, 4);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, surface.triangles, gl.STATIC_DRAW);
     gl.enable(gl.DEPTH_TEST);

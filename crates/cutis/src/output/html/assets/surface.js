@@ -27,6 +27,32 @@ class Surface {
     this.known = new Map();
   }
 
+  // Depth in mm of the points in wounds below the skin, along the walls, and 0 for those on the skin.
+  depths() {
+    const { rest, tissue, triangles } = this;
+    const key = (n) => rest.subarray(3 * n, 3 * n + 3).join();
+    const onSkin = (n) => tissue[4 * n + 3] > 0;
+    const lips = new Set();
+    const depths = new Float32Array(rest.length / 3);
+    for (let n = 0; n < depths.length; n++) if (onSkin(n)) lips.add(key(n));
+    for (let n = 0; n < depths.length; n++) if (!onSkin(n)) depths[n] = lips.has(key(n)) ? 0 : Infinity;
+    const edges = [];
+    for (let t = 0; t < triangles.length; t++) {
+      const [a, b] = [triangles[t], triangles[t % 3 === 2 ? t - 2 : t + 1]];
+      if (onSkin(a) || onSkin(b)) continue;
+      const along = [0, 1, 2].map((axis) => rest[3 * a + axis] - rest[3 * b + axis]);
+      edges.push([a, b, Math.hypot(...along)]);
+    }
+    for (let changed = true, round = 0; changed && round < 100; round++) {
+      changed = false;
+      for (const [a, b, length] of edges) {
+        if (depths[b] > depths[a] + length) [depths[b], changed] = [depths[a] + length, true];
+        if (depths[a] > depths[b] + length) [depths[a], changed] = [depths[b] + length, true];
+      }
+    }
+    return depths.map((depth) => (isFinite(depth) ? depth : 0));
+  }
+
   // Unit normals of a state as signed bytes, four for each point.
   normals(state) {
     if (!this.known.has(state)) this.known.set(state, this.computeNormals(state));
@@ -49,11 +75,21 @@ class Surface {
         sums[corner + 2] += z;
       }
     }
-    const normals = new Int8Array((4 * rest.length) / 3);
-    for (let n = 0; n < rest.length / 3; n++) {
-      const length = Math.hypot(sums[3 * n], sums[3 * n + 1], sums[3 * n + 2]) || 1;
-      for (let axis = 0; axis < 3; axis++) normals[4 * n + axis] = Math.round((127 * sums[3 * n + axis]) / length);
+    // The steps of the lattice disappear from the light if each normal is the mean of those around it.
+    let smooth = normalizedAll(sums);
+    for (let round = 0; round < 3; round++) {
+      const mean = new Float32Array(smooth.length);
+      for (let t = 0; t < triangles.length; t += 3) {
+        const corners = [3 * triangles[t], 3 * triangles[t + 1], 3 * triangles[t + 2]];
+        for (let axis = 0; axis < 3; axis++) {
+          const sum = smooth[corners[0] + axis] + smooth[corners[1] + axis] + smooth[corners[2] + axis];
+          for (const corner of corners) mean[corner + axis] += sum;
+        }
+      }
+      smooth = normalizedAll(mean);
     }
+    const normals = new Int8Array((4 * rest.length) / 3);
+    smooth.forEach((value, n) => (normals[4 * Math.floor(n / 3) + (n % 3)] = Math.round(127 * value)));
     return normals;
   }
 
@@ -67,4 +103,14 @@ class Surface {
     }
     return Math.sqrt(most) * this.about.moved_step_mm;
   }
+}
+
+// Unit vectors, three numbers each.
+function normalizedAll(vectors) {
+  const units = new Float32Array(vectors.length);
+  for (let n = 0; n < vectors.length; n += 3) {
+    const length = Math.hypot(vectors[n], vectors[n + 1], vectors[n + 2]) || 1;
+    for (let axis = 0; axis < 3; axis++) units[n + axis] = vectors[n + axis] / length;
+  }
+  return units;
 }
