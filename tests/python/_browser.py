@@ -54,8 +54,14 @@ class Browser:
         os.close(to_browser)
         os.close(from_browser)
         self.pending, self.number, self.session = b"", 0, None
-        # What the page wrote to the console, the errors of its scripts, and what it requested.
-        self.console, self.requests = [], []
+        # What the page wrote to the console, and the errors of its scripts.
+        self.console = []
+        self.sent = {}
+
+    @property
+    def requests(self):
+        """The addresses that the page requested and its policy did not refuse."""
+        return list(self.sent.values())
 
     def __enter__(self):
         targets = self.call("Target.getTargets")["targetInfos"]
@@ -123,7 +129,9 @@ class Browser:
                 if "GPU stall due to ReadPixels" not in entry["text"]:
                     self.console.append(f"{entry['level']}: {entry['text']}")
             case "Network.requestWillBeSent":
-                self.requests.append(parameters["request"]["url"])
+                self.sent[parameters["requestId"]] = parameters["request"]["url"]
+            case "Network.loadingFailed" if parameters.get("blockedReason") == "csp":
+                self.sent.pop(parameters["requestId"], None)
 
     def size(self, width, height, scale=1, mobile=False):
         """Sets the size of the page in pixels of CSS."""

@@ -51,6 +51,24 @@ fn scripts(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(scripts)
 }
 
+/// The browsers that `report.py` can use.
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+
+/// The version of the browser in which `report.html` is checked.
+///
+/// # Errors
+/// There is none. The error says what to install.
+pub fn require_browser(workspace: &Workspace) -> Result<String> {
+    for browser in BROWSERS {
+        if let Ok(output) = workspace.command(browser).arg("--version").output()
+            && output.status.success()
+        {
+            return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
+        }
+    }
+    bail!("Chromium is missing; on Debian: apt-get install -y chromium")
+}
+
 /// Installs the packages of a file. Returns whether all of them are installed.
 type Install = fn(&Workspace, python: &Path, requirements: &Path) -> Result<bool>;
 
@@ -139,7 +157,7 @@ mod tests {
             .iter()
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
-        assert_eq!(names, ["awkward.py", "cantilever.py", "dicom.py", "formats.py", "outputs.py"]);
+        assert_eq!(names, ["awkward.py", "cantilever.py", "dicom.py", "formats.py", "outputs.py", "report.py"]);
     }
 
     #[test]

@@ -15,6 +15,7 @@ pub fn require(workspace: &Workspace, slow_steps: bool) -> Result<()> {
     println!("rustfmt, clippy and cargo-deny are installed; adapters for GPU tests: {adapters}");
     if slow_steps {
         let python = python::require(workspace)?;
+        println!("the report is checked in {}", python::require_browser(workspace)?);
         println!("{python} with venv is installed; unsafe code is checked by {}", miri::require(workspace)?);
     }
     Ok(())

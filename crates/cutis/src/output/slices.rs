@@ -8,8 +8,12 @@ use nalgebra::Point3;
 use super::wound_place::{WoundPlace, position};
 use crate::Error;
 
-/// Pixels along the longer side of a slice. A slice of this size has at most 1.1 MB.
-const PIXELS: usize = 600;
+/// Pixels along the longer side of a slice: the first of these with which all slices together have no
+/// more than [`MOST_BYTES`]. Six slices of 200 × 200 pixels have at most 0.73 MB.
+const PIXELS: [usize; 4] = [600, 450, 300, 200];
+
+/// Bytes of all slices.
+const MOST_BYTES: usize = 1_800_000;
 
 /// One plane, before and after.
 pub(crate) struct SlicePair {
@@ -37,6 +41,26 @@ pub(super) fn pairs(
 ) -> Result<Vec<SlicePair>, Error> {
     let through_mm = place.map_or(frame.origin_mm.into(), |place| place.inside_mm);
     let mut pairs = Vec::new();
+    for pixels in PIXELS {
+        pairs = of_size(pixels, through_mm, volumes, skins, colors, frame, place)?;
+        let bytes: usize = pairs.iter().flat_map(|pair| &pair.png).map(Vec::len).sum();
+        if bytes <= MOST_BYTES {
+            break;
+        }
+    }
+    Ok(pairs)
+}
+
+fn of_size(
+    pixels: usize,
+    through_mm: [f64; 3],
+    volumes: [&Volume; 2],
+    skins: [Skin<'_>; 2],
+    colors: [Rgb; 2],
+    frame: &Frame,
+    place: Option<&WoundPlace>,
+) -> Result<Vec<SlicePair>, Error> {
+    let mut pairs = Vec::new();
     for plane in [Plane::Axial, Plane::Coronal, Plane::Sagittal] {
         let at_mm = position(plane, through_mm);
         let draw = |n: usize| {
@@ -45,7 +69,7 @@ pub(super) fn pairs(
             let view = SliceView {
                 contours: &[contour],
                 focus: place.map(|place| place.slice),
-                long_side: Some(PIXELS),
+                long_side: Some(pixels),
                 ..SliceView::new(plane, at_mm)
             };
             Ok::<_, Error>(slice(volumes[n], &view)?.to_png()?)

@@ -28,7 +28,7 @@ pub(super) fn report(
     clock: Clock<'_>,
 ) -> Result<Report, Error> {
     let Setup { loaded, folder, source, body, .. } = *setup;
-    let Simulated { mut plan, device, result, recorder } = simulated;
+    let Simulated { mut plan, device, result, mut recorder } = simulated;
     let (rows, end) = (result.rows, result.end);
     let Settled { stops, last } = result.settled.unwrap_or_default();
     let (settling, settled) = last.unzip();
@@ -79,14 +79,8 @@ pub(super) fn report(
     };
     if loaded.scene.output.report {
         files::write(&folder.frames(), frames_csv(&rows).as_bytes())?;
-        let shown = html::Shown {
-            body,
-            rows: &rows,
-            figures: &outputs.figures,
-            slices: &outputs.slices,
-            recorder: recorder.as_ref(),
-        };
-        html::write(&report, &shown, folder)?;
+        let shown = html::Shown { body, rows: &rows, figures: &outputs.figures, slices: &outputs.slices };
+        html::write(&report, &shown, recorder.as_mut(), folder)?;
         report.write(&folder.report())?;
     }
     Ok(report)

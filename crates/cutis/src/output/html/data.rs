@@ -90,10 +90,14 @@ impl Data {
     /// The script elements that hold the data.
     pub(super) fn elements(&self) -> String {
         format!(
-            "<script type=\"application/json\" id=\"data\">{}</script>\n\
-             <script type=\"text/plain\" id=\"surface\">{}</script>\n",
-            text::json(self),
+            "{}<script type=\"text/plain\" id=\"surface\">{}</script>\n",
+            self.elements_without_surface(),
             STANDARD.encode(&self.surface.bytes)
         )
+    }
+
+    /// The script element that holds all but the bytes of the surface.
+    pub(super) fn elements_without_surface(&self) -> String {
+        format!("<script type=\"application/json\" id=\"data\">{}</script>\n", text::json(self))
     }
 }

@@ -42,30 +42,45 @@ pub(crate) struct Shown<'a> {
     pub(crate) rows: &'a [FrameRow],
     pub(crate) figures: &'a [Figure],
     pub(crate) slices: &'a [SlicePair],
-    /// None without a skin.
-    pub(crate) recorder: Option<&'a Recorder>,
 }
 
-/// Writes `report.html`.
+/// Bytes of a page above which states of the surface are left out.
+const MOST_BYTES: usize = 8_000_000;
+
+/// Writes `report.html`, with the states of the surface that fit. There is no surface without a
+/// skin.
 ///
 /// # Errors
 /// [`Error::File`] if it cannot be written.
-pub(crate) fn write(report: &Report, shown: &Shown<'_>, folder: &RunFolder) -> Result<(), Error> {
+pub(crate) fn write(
+    report: &Report,
+    shown: &Shown<'_>,
+    recorder: Option<&mut Recorder>,
+    folder: &RunFolder,
+) -> Result<(), Error> {
     let rows = plots::shown_rows(shown.rows);
     let quantities = shown.rows.first().map(Quantity::of).unwrap_or_default();
     let mut plots = plots::over_time(&quantities, &rows);
     let has_time = !plots.is_empty();
     plots.extend(report.rest.as_ref().and_then(plots::search));
-    let data = shown.recorder.map(|recorder| Data::of(shown.body, recorder, &quantities, &rows));
     let page = Page {
         report,
         figures: shown.figures,
         slices: shown.slices,
         plots: &plots,
         has_time,
-        data: data.as_ref(),
-        resumed: shown.recorder.and_then(|recorder| recorder.resumed),
+        has_view: recorder.is_some(),
+        resumed: recorder.as_ref().and_then(|recorder| recorder.resumed),
         scene: &toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string()),
     };
-    files::write(&folder.html(), page.html().as_bytes())
+    let data = |bytes: usize| {
+        recorder.map_or_else(String::new, |recorder| {
+            let data = |recorder: &Recorder| Data::of(shown.body, recorder, &quantities, &rows);
+            // Base64 has four letters for three bytes.
+            let rest = bytes + data(recorder).elements_without_surface().len();
+            recorder.thin(MOST_BYTES.saturating_sub(rest) / 4 * 3);
+            data(recorder).elements()
+        })
+    };
+    files::write(&folder.html(), page.html(data).as_bytes())
 }

@@ -9,7 +9,6 @@ use cutis_render::Plane;
 use sha2::{Digest, Sha256};
 
 use super::Figure;
-use super::data::Data;
 use super::summary::summary;
 use super::tables::tables;
 use super::text::{escape, items};
@@ -41,14 +40,17 @@ pub(super) struct Page<'a> {
     pub(super) plots: &'a [String],
     /// Whether there are plots over time.
     pub(super) has_time: bool,
-    pub(super) data: Option<&'a Data>,
+    /// Whether the page has data for the view.
+    pub(super) has_view: bool,
     /// The frame from which the run resumed.
     pub(super) resumed: Option<u32>,
     pub(super) scene: &'a str,
 }
 
 impl Page<'_> {
-    pub(super) fn html(&self) -> String {
+    /// The page. `data` returns the script elements with its data, and receives the length of the
+    /// page without them in bytes.
+    pub(super) fn html(&self, data: impl FnOnce(usize) -> String) -> String {
         let report = self.report;
         let script = format!("(() => {{\n\"use strict\";\n{}}})();\n", SCRIPT.join("\n"));
         let mut out = String::new();
@@ -66,7 +68,7 @@ impl Page<'_> {
         if !report.warnings.is_empty() {
             put(&format!("<div class=\"warn\"><b>Note</b><ul>{}</ul></div>", items(&report.warnings)));
         }
-        if self.data.is_some() {
+        if self.has_view {
             put(VIEW);
             put(&self.view_notes());
         }
@@ -77,11 +79,9 @@ impl Page<'_> {
         if !report.left_out.is_empty() {
             put(&format!("<h2>Left out by the scene</h2><ul>{}</ul>", items(&report.left_out)));
         }
-        put(&format!("<h2>Scene as it ran</h2><pre tabindex=\"0\">{}</pre></main>\n", escape(self.scene)));
-        if let Some(data) = self.data {
-            put(&data.elements());
-        }
-        put(&format!("<script>{script}</script></body></html>\n"));
+        put(&format!("<h2>Scene as it ran</h2><pre tabindex=\"0\">{}</pre></main>\n", scene(self.scene)));
+        out.push_str(&data(out.len() + script.len()));
+        let _ = writeln!(out, "<script>{script}</script></body></html>");
         out
     }
 
@@ -130,6 +130,19 @@ fn policy(style: &str, script: &str) -> String {
 fn title(report: &Report) -> String {
     let scene = report.inputs.first().and_then(|input| Path::new(&input.path).file_stem());
     scene.map_or_else(|| "Cutis run".into(), |name| format!("{} - Cutis run", name.to_string_lossy()))
+}
+
+/// Largest number of bytes of a scene that the page shows.
+const MOST_OF_SCENE: usize = 200_000;
+
+/// A scene as text. The rest of a long one is left out, which the page says.
+fn scene(toml: &str) -> String {
+    if toml.len() <= MOST_OF_SCENE {
+        return escape(toml);
+    }
+    let end = toml.floor_char_boundary(MOST_OF_SCENE);
+    let left = toml.len() - end;
+    format!("{}\n# {left} more bytes are in report.json", escape(&toml[..end]))
 }
 
 fn image(png: &[u8], alt: &str) -> String {
@@ -181,6 +194,16 @@ fn slices(pairs: &[SlicePair]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_long_scene_is_cut_between_letters() {
+        assert_eq!(scene("a < b"), "a &lt; b");
+        let long = "ä".repeat(MOST_OF_SCENE);
+        let shown = scene(&long);
+        assert!(
+            shown.len() < MOST_OF_SCENE + 100 && shown.ends_with("# 200000 more bytes are in report.json")
+        );
+    }
 
     #[test]
     fn the_policy_names_the_hashes_of_style_and_script() {

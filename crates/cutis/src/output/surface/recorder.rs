@@ -75,6 +75,18 @@ impl Recorder {
         }
     }
 
+    /// Keeps as many states as fit into a number of bytes, before base64: the one in the scan, the last
+    /// one, and others at equal distances.
+    pub(crate) fn thin(&mut self, bytes: usize) {
+        let most = bytes.saturating_sub(self.surface.bytes()) / self.surface.state_bytes().max(1);
+        let quota = Quota { count: self.states.len().saturating_sub(1) as u64, most: most.max(1) as u64 };
+        let mut number = 0;
+        self.states.retain(|_| {
+            number += 1;
+            number == 1 || quota.keeps(number - 1)
+        });
+    }
+
     /// Begins with the body in the scan. With `resumed` the run begins after that frame.
     pub(crate) fn start(&mut self, row: &FrameRow, resumed: Option<u32>) {
         let name = "in the scan".to_owned();
@@ -144,6 +156,33 @@ mod tests {
             }
         }
         assert!(!(1..=9).any(|n| Quota { count: 9, most: 0 }.keeps(n)));
+    }
+
+    #[test]
+    fn thinned_states_fit_and_the_last_one_stays() {
+        let surface = Surface {
+            rest: vec![nalgebra::Point3::origin(); 10],
+            moving: vec![cutis_mesh::sever::Embedded::node(0); 10],
+            ..Surface::default()
+        };
+        let row = |frame| FrameRow {
+            frame,
+            time_s: 0.0,
+            ms: None,
+            gapes: vec![],
+            sutures: vec![],
+            handles: vec![],
+        };
+        for (bytes, left) in [(0, 2), (100 + 60, 2), (100 + 4 * 60, 5), (100 + 100 * 60, 13)] {
+            let mut recorder = Recorder::of(surface.clone(), 12, 0);
+            recorder.start(&row(0), None);
+            let state = |frame| State { name: String::new(), row: row(frame), moved_mm: vec![] };
+            recorder.states.extend((1..=12).map(state));
+            recorder.thin(bytes);
+            assert_eq!(recorder.states.len(), left, "{bytes}");
+            let frames: Vec<u32> = recorder.states.iter().map(|state| state.row.frame).collect();
+            assert_eq!((frames[0], frames[left - 1]), (0, 12));
+        }
     }
 
     /// Frames and states of rest share the memory.

@@ -62,7 +62,13 @@ prepareComparisons();
 if (element("data")) {
   const data = JSON.parse(element("data").textContent);
   const surface = new Surface(data.surface, element("surface").textContent);
-  const show = prepareView(data, surface);
+  let show = null;
+  try {
+    show = prepareView(data, surface);
+  } catch (error) {
+    // The pictures stay.
+    console.error(error);
+  }
   const player = new Player(data, (at) => show && show(at));
   player.followPlots();
   player.show();
