@@ -18,7 +18,8 @@ PROGRAMS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
 QUIET = [
     "--headless=new", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--mute-audio",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--disable-default-apps", "--disable-extensions", "--disable-dev-shm-usage", "--remote-debugging-pipe",
+    "--disable-default-apps", "--disable-extensions", "--disable-dev-shm-usage",
+    "--remote-debugging-pipe",
 ]
 
 # WebGL on the processor.
@@ -218,7 +219,8 @@ class Browser:
             copy.drawImage(source, 0, 0);
             const values = copy.getImageData(0, 0, source.width, source.height).data;
             let text = "";
-            for (let n = 0; n < values.length; n += 30000) text += String.fromCharCode(...values.subarray(n, n + 30000));
+            for (let n = 0; n < values.length; n += 30000)
+                text += String.fromCharCode(...values.subarray(n, n + 30000));
             return [source.width, source.height, btoa(text)];
         }})()""")
         return np.frombuffer(base64.b64decode(text), np.uint8).reshape(height, width, 4)

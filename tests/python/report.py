@@ -85,7 +85,7 @@ def picture_problems(browser):
 
 
 def time_problems(browser, table):
-    """The slider shows the states by keys, with the values of `frames.csv` and a mark in the plots."""
+    """The slider shows the states by keys, with the values of `frames.csv`, and marks the plots."""
     problems = []
     after = browser.canvas()
     browser.focus("#time")

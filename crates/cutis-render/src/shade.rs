@@ -149,8 +149,8 @@ impl<'a> Shader<'a> {
     }
 }
 
-/// Color of the tissue in a wound by its HU, as pictures show it: fat, connective tissue, muscle, bone
-/// and what lies between them.
+/// Color of the tissue in a wound by its HU, as pictures show it: fat, connective tissue, muscle,
+/// bone and what lies between them.
 pub fn tissue_color(hu: f32) -> Rgb {
     encode(tissue(hu))
 }

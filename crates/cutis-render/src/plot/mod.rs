@@ -133,9 +133,9 @@ pub fn line_chart(title: &str, x: Axis<'_>, y: Axis<'_>, series: &[Series<'_>]) 
     svg
 }
 
-/// SVG attributes that say where a value on the x axis is, for programs that mark one: the left, top,
-/// right and bottom of the plot area, and the values at its left and right. None for a logarithmic
-/// axis.
+/// SVG attributes that say where a value on the x axis is, for programs that mark one: the left,
+/// top, right and bottom of the plot area, and the values at its left and right. None for a
+/// logarithmic axis.
 fn place_of_values(across: &Span) -> String {
     let [left, top, right, bottom] = AREA;
     across.linear_ends().map_or_else(String::new, |[low, high]| {

@@ -8,8 +8,8 @@ use nalgebra::Point3;
 use super::wound_place::{WoundPlace, position};
 use crate::Error;
 
-/// Pixels along the longer side of a slice: the first of these with which all slices together have no
-/// more than [`MOST_BYTES`]. Six slices of 200 × 200 pixels have at most 0.73 MB.
+/// Pixels along the longer side of a slice: the first of these with which all slices together have
+/// no more than [`MOST_BYTES`]. Six slices of 200 × 200 pixels have at most 0.73 MB.
 const PIXELS: [usize; 4] = [600, 450, 300, 200];
 
 /// Bytes of all slices.

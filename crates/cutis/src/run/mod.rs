@@ -161,6 +161,40 @@ mod tests {
         assert!(html.contains("have collapsed"));
     }
 
+    /// States of the surface are kept for the report, and only for it.
+    #[test]
+    fn a_run_without_a_report_keeps_no_states() {
+        let kept = |output: &str| {
+            let here = tempfile::tempdir().unwrap();
+            let set = |(key, value): (&str, &str)| Override { key: key.into(), value: value.into() };
+            let keys = [
+                ("volume.phantom", "{ size = [48, 48, 32], seed = 1 }"),
+                ("lattice.spacing_mm", "16.0"),
+                ("solver.backend", "\"cpu\""),
+                ("run", "{ frames = 2 }"),
+                ("output", output),
+            ];
+            let loaded = crate::demo(&keys.map(set)).unwrap();
+            let mut clock = Clock::new(&crate::Silent);
+            let request = Request::of(&loaded).unwrap();
+            let prepare::Prepared { source, body, model, backend, plan } =
+                prepare(&loaded, request, &mut clock).unwrap();
+            let options = RunOptions { out: here.path().into(), resume: false };
+            let folder = RunFolder(options.out.clone());
+            let setup = simulate::Setup {
+                loaded: &loaded,
+                options: &options,
+                folder: &folder,
+                source: &source,
+                body: &body,
+            };
+            let simulated = simulate(&setup, model, &backend, plan, &mut clock).unwrap();
+            simulated.recorder.map(|recorder| recorder.states.len())
+        };
+        assert_eq!(kept("{ report = true }"), Some(3));
+        assert_eq!(kept("{ volume = true, surface = true, pictures = true }"), None);
+    }
+
     /// The checkpoint of an interrupted run is resampled with a piece that is taken out later in
     /// its place. Control: at the end of the run it is out.
     #[test]

@@ -75,8 +75,8 @@ impl Recorder {
         }
     }
 
-    /// Keeps as many states as fit into a number of bytes, before base64: the one in the scan, the last
-    /// one, and others at equal distances.
+    /// Keeps as many states as fit into a number of bytes, before base64: the one in the scan, the
+    /// last one, and others at equal distances.
     pub(crate) fn thin(&mut self, bytes: usize) {
         let most = bytes.saturating_sub(self.surface.bytes()) / self.surface.state_bytes().max(1);
         let quota = Quota { count: self.states.len().saturating_sub(1) as u64, most: most.max(1) as u64 };
@@ -105,8 +105,8 @@ impl Recorder {
         self.keep(format!("after frame {}", row.frame), simulation, row)
     }
 
-    /// Keeps state of rest `number` of `count`, from 1 on, which follows what was `done`. It does so
-    /// if it is one of those that are kept.
+    /// Keeps state of rest `number` of `count`, from 1 on, if it is one of those that are kept. It
+    /// follows what was `done`.
     ///
     /// # Errors
     /// The errors of the simulation.
