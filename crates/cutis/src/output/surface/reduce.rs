@@ -174,7 +174,8 @@ mod tests {
         let reduced = reduce(&rest, &triangles, &|_| 0.0, 144);
         assert_eq!(reduced.points, (0..144).collect::<Vec<u32>>());
         let mut found = reduced.triangles;
-        (triangles.sort_unstable(), found.sort_unstable());
+        triangles.sort_unstable();
+        found.sort_unstable();
         assert_eq!(found, triangles);
     }
 
