@@ -219,6 +219,9 @@ mod tests {
         let lower = |v: &u32| reduced.points[*v as usize] < 6400;
         let mixed = reduced.triangles.iter().filter(|t| t.iter().any(lower) != t.iter().all(lower));
         assert_eq!(mixed.count(), 0);
+        let of_lower = (0..reduced.points.len() as u32).filter(lower).count();
+        let of_upper = reduced.points.len() - of_lower;
+        assert!(of_lower > 500 && of_lower.abs_diff(of_upper) < 10, "{of_lower} and {of_upper} points");
         let share = |range: std::ops::Range<f32>| {
             let within = |point: &Point3<f32>| range.contains(&point.x);
             let left = reduced.points.iter().filter(|&&v| within(&rest[v as usize])).count();
