@@ -47,7 +47,8 @@ pub(super) fn reduce(
     };
     let levels: Vec<i32> = rest.iter().map(level).collect();
     let (low, high) = bounds(rest);
-    let extent = f64::from((high - low).amax()).max(f64::MIN_POSITIVE);
+    let extent = f64::from((high - low).amax());
+    let extent = if extent.is_finite() && extent > 0.0 { extent } else { 1.0 };
     // A surface of `most` points has cells of about this width.
     let mut width = extent / (most.max(1) as f64).sqrt() / 8.0;
     while !fits(&reduced, most) {
@@ -200,10 +201,18 @@ mod tests {
         let apart: Vec<[u32; 3]> = (0..2000).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
         let place = |of: &dyn Fn(f32) -> f32| (0..6000).map(|n| Point3::from([of(n as f32); 3])).collect();
         let places: [Vec<Point3<f32>>; 3] = [place(&|n| n * 1e-3), place(&|_| f32::NAN), place(&|_| 0.0)];
-        for rest in places {
+        for rest in &places {
             for distance in [0.0, f64::NAN, f64::INFINITY] {
-                assert!(reduce(&rest, &apart, &|_| distance, 50).points.len() <= 50);
+                assert!(reduce(rest, &apart, &|_| distance, 50).points.len() <= 50);
             }
+        }
+        // The corners of each triangle have cells of three widths, so that none becomes a line.
+        let distance = |point: Point3<f32>| [0.0, 0.05, 0.2][(point.x * 1e3).round() as usize % 3];
+        for first in [0.0, f32::INFINITY, f32::NAN] {
+            let mut rest = places[0].clone();
+            rest[0].x = first;
+            let left = reduce(&rest, &apart, &distance, 50).points.len();
+            assert!((1..=50).contains(&left), "{left} points");
         }
     }
 
