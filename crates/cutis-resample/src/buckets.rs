@@ -19,31 +19,40 @@ struct Chunk {
 }
 
 impl Buckets {
-    /// Sorts the tets `0..count`. `tiles_of` gives the tiles that a tet touches.
-    pub fn new(count: usize, tiling: &Tiling, tiles_of: impl Fn(usize) -> TileBox + Sync) -> Self {
+    /// Sorts the tets `0..count`. `tiles_of` gives the tiles that a tet touches; none for a tet that
+    /// is left out.
+    pub fn new(count: usize, tiling: &Tiling, tiles_of: impl Fn(usize) -> Option<TileBox> + Sync) -> Self {
         let tiles = tiling.len();
-        let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
+        let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().filter_map(|chunk| {
             let tets = chunk * CHUNK..count.min((chunk + 1) * CHUNK);
-            let touched: Vec<TileBox> = tets.clone().map(&tiles_of).collect();
+            let touched = || tets.clone().filter_map(|tet| Some((tet as u32, tiles_of(tet)?)));
             let mut offsets = vec![0_u32; tiles + 1];
-            for touched in &touched {
-                tiling.each(touched, |tile| offsets[tile + 1] += 1);
+            for (_, touched) in touched() {
+                tiling.each(&touched, |tile| offsets[tile + 1] += 1);
             }
             for tile in 0..tiles {
                 offsets[tile + 1] += offsets[tile];
             }
+            if offsets[tiles] == 0 {
+                return None;
+            }
             let mut next = offsets.clone();
             let mut order = vec![0; offsets[tiles] as usize];
-            for (tet, touched) in tets.zip(&touched) {
-                tiling.each(touched, |tile| {
+            for (tet, touched) in touched() {
+                tiling.each(&touched, |tile| {
                     let slot = &mut next[tile];
-                    order[*slot as usize] = tet as u32;
+                    order[*slot as usize] = tet;
                     *slot += 1;
                 });
             }
-            Chunk { order, offsets }
+            Some(Chunk { order, offsets })
         });
         Self { chunks: chunks.collect() }
+    }
+
+    /// Whether a tile has tets.
+    pub fn any(&self, tile: usize) -> bool {
+        self.chunks.iter().any(|chunk| chunk.offsets[tile] < chunk.offsets[tile + 1])
     }
 
     /// The tets of a tile in ascending order.
@@ -58,7 +67,7 @@ impl Buckets {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tiling::TILE;
+    use crate::tiling::{TILE, TilesNear};
 
     #[test]
     fn every_tile_lists_its_tets_in_ascending_order() {
@@ -68,10 +77,11 @@ mod tests {
         let buckets = Buckets::new(count, &tiling, |tet| {
             let slices = range(tet);
             if slices.is_empty() {
-                return TileBox::default();
+                return None;
             }
             let [low, high] = [slices.start, slices.end - 1].map(|tile| (TILE[2] * tile) as f64 + 7.0);
-            tiling.touched([1.0, 1.0, low], [2.0, 2.0, high])
+            let corners = [[1.0, 1.0, low], [2.0, 2.0, high]].map(|corner| tiling.near(corner, 0.0));
+            Some(TilesNear::around(&corners, &[0, 0, 1, 1]))
         });
         for tile in 0..7 {
             let expected: Vec<u32> =

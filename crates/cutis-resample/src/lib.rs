@@ -44,9 +44,12 @@
 #![forbid(unsafe_code)]
 
 mod buckets;
+mod clear_rows;
 mod error;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod group;
+mod inverted;
 mod lanes;
 mod partial_volume;
 mod raster;
@@ -56,6 +59,7 @@ mod rows;
 mod sample;
 mod samples;
 mod space;
+mod spans;
 mod tile;
 mod tiling;
 mod warp;

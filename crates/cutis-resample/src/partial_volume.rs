@@ -10,7 +10,7 @@ use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::raster::{Rasters, TetRaster, in_all_lanes};
+use crate::raster::{Rasters, RestMaps, TetRaster, in_all_lanes};
 use crate::sample::{scanned_range, stored_air, trilinear};
 use crate::space::IndexSpace;
 use crate::{ResampleError, Warp};
@@ -140,7 +140,7 @@ impl Walls<'_> {
                     }
                     let moved = warp.tet_moved(tet as usize);
                     let at_rest = || in_all_lanes(&self.corners(warp.rest, vertices));
-                    let map = moved.then(|| rasters.rest_maps(&at_rest()));
+                    let map = moved.then(|| RestMaps::new(&rasters, &at_rest()));
                     for point in bits(own) {
                         let point = points[point];
                         sum += value_at(map.as_ref().map_or(point, |map| map.at(0, point.into()).into()));

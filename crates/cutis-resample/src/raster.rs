@@ -44,12 +44,11 @@ pub struct TetRaster<'a> {
 }
 
 impl Rasters {
-    /// Prepares a group of tets.
-    #[inline(always)]
-    pub fn new(corners: &Corners, tolerance: f64) -> Self {
+    /// A group without tets.
+    pub fn empty() -> Self {
         let zero = [0.0; GROUP];
-        let mut all = Self {
-            constant: [[1.0; GROUP], zero, zero, zero],
+        Self {
+            constant: [zero; 4],
             gradient: [[zero; 3]; 4],
             at: [zero; 4],
             by_j: [zero; 4],
@@ -57,78 +56,95 @@ impl Rasters {
             slack: [zero; 4],
             low: [zero; 3],
             high: [zero; 3],
-            valid: [true; GROUP],
-        };
+            valid: [false; GROUP],
+        }
+    }
+
+    /// Prepares a group of tets.
+    pub fn new(corners: &Corners, tolerance: f64) -> Self {
+        let mut all = Self::empty();
+        all.fill(corners, tolerance);
+        all
+    }
+
+    /// Prepares a group of tets in place of the ones before.
+    #[inline(always)]
+    pub fn fill(&mut self, corners: &Corners, tolerance: f64) {
         let [a, b, c, d] = corners;
+        let zero = [[0.0; GROUP]; 3];
+        let (mut ab, mut ac, mut ad) = (zero, zero, zero);
+        for axis in 0..3 {
+            for n in 0..GROUP {
+                ab[axis][n] = b[axis][n] - a[axis][n];
+                ac[axis][n] = c[axis][n] - a[axis][n];
+                ad[axis][n] = d[axis][n] - a[axis][n];
+            }
+        }
+        // The normals of the faces at the first corner.
+        let (mut of_b, mut of_c, mut of_d) = (zero, zero, zero);
+        for x in 0..3 {
+            let (y, z) = ((x + 1) % 3, (x + 2) % 3);
+            for n in 0..GROUP {
+                of_b[x][n] = ac[y][n] * ad[z][n] - ac[z][n] * ad[y][n];
+                of_c[x][n] = ad[y][n] * ab[z][n] - ad[z][n] * ab[y][n];
+                of_d[x][n] = ab[y][n] * ac[z][n] - ab[z][n] * ac[y][n];
+            }
+        }
+        let mut scale = [0.0; GROUP];
         for n in 0..GROUP {
-            let edge = |end: &[Each; 3]| [end[0][n] - a[0][n], end[1][n] - a[1][n], end[2][n] - a[2][n]];
-            let (ab, ac, ad) = (edge(b), edge(c), edge(d));
-            let (n1, n2, n3) = (cross(ac, ad), cross(ad, ab), cross(ab, ac));
-            let scale = 1.0 / dot(ab, n1);
-            for axis in 0..3 {
-                let (g1, g2, g3) = (n1[axis] * scale, n2[axis] * scale, n3[axis] * scale);
-                all.gradient[0][axis][n] = -((g1 + g2) + g3);
-                all.gradient[1][axis][n] = g1;
-                all.gradient[2][axis][n] = g2;
-                all.gradient[3][axis][n] = g3;
+            scale[n] = 1.0 / ((ab[0][n] * of_b[0][n] + ab[1][n] * of_b[1][n]) + ab[2][n] * of_b[2][n]);
+        }
+        let [g0, g1, g2, g3] = &mut self.gradient;
+        for axis in 0..3 {
+            for n in 0..GROUP {
+                let (b, c, d) =
+                    (of_b[axis][n] * scale[n], of_c[axis][n] * scale[n], of_d[axis][n] * scale[n]);
+                g0[axis][n] = -((b + c) + d);
+                g1[axis][n] = b;
+                g2[axis][n] = c;
+                g3[axis][n] = d;
+            }
+        }
+        let mut sums = [0.0; GROUP];
+        for [x, y, z] in &self.gradient {
+            for n in 0..GROUP {
+                sums[n] += x[n].abs() + y[n].abs() + z[n].abs();
             }
         }
         for n in 0..GROUP {
-            let mut sum = 0.0;
-            for gradient in &all.gradient {
-                sum += gradient[0][n].abs() + gradient[1][n].abs() + gradient[2][n].abs();
-            }
-            all.valid[n] = sum.is_finite();
+            self.valid[n] = sums[n].is_finite();
         }
         for corner in 0..4 {
+            let [x, y, z] = &self.gradient[corner];
+            let constant_at_corner = if corner == 0 { 1.0 } else { 0.0 };
             for n in 0..GROUP {
-                let g = [0, 1, 2].map(|axis| all.gradient[corner][axis][n]);
-                let constant = all.constant[corner][n] - dot(g, [a[0][n], a[1][n], a[2][n]]);
-                all.constant[corner][n] = constant;
+                let constant = constant_at_corner - ((x[n] * a[0][n] + y[n] * a[1][n]) + z[n] * a[2][n]);
+                self.constant[corner][n] = constant;
                 // A row parallel to the face crosses it far away, on the side that keeps or drops
                 // the whole row. The lower bound of 1e-200 keeps the products finite.
-                let along = if g[0].abs() < 1e-200 { 1e-200 } else { g[0] };
+                let along = if x[n].abs() < 1e-200 { 1e-200 } else { x[n] };
                 let per_column = 1.0 / along;
-                let slack = tolerance * dot(g, g).sqrt() * per_column;
-                all.slack[corner][n] = slack;
-                all.at[corner][n] = -constant * per_column - slack;
-                all.by_j[corner][n] = -g[1] * per_column;
-                all.by_k[corner][n] = -g[2] * per_column;
+                let length = ((x[n] * x[n] + y[n] * y[n]) + z[n] * z[n]).sqrt();
+                let slack = tolerance * length * per_column;
+                self.slack[corner][n] = slack;
+                self.at[corner][n] = -constant * per_column - slack;
+                self.by_j[corner][n] = -y[n] * per_column;
+                self.by_k[corner][n] = -z[n] * per_column;
             }
         }
         for axis in 0..3 {
-            let [a, b, c, d] = [a, b, c, d].map(|corner| &corner[axis]);
+            let (a, b, c, d) = (&a[axis], &b[axis], &c[axis], &d[axis]);
             for n in 0..GROUP {
-                all.low[axis][n] = less(less(a[n], b[n]), less(c[n], d[n])) - tolerance;
-                all.high[axis][n] = more(more(a[n], b[n]), more(c[n], d[n])) + tolerance;
+                self.low[axis][n] = less(less(a[n], b[n]), less(c[n], d[n])) - tolerance;
+                self.high[axis][n] = more(more(a[n], b[n]), more(c[n], d[n])) + tolerance;
             }
         }
-        all
     }
 
     /// One of the tets. `None` if it has no volume.
     #[inline(always)]
     pub fn tet(&self, lane: usize) -> Option<TetRaster<'_>> {
         self.valid[lane].then_some(TetRaster { all: self, lane })
-    }
-
-    /// For each tet the map from deformed to rest indices, for these corners at rest.
-    #[inline(always)]
-    pub fn rest_maps(&self, rest: &Corners) -> RestMaps {
-        let mut linear = [[[0.0; GROUP]; 3]; 3];
-        let mut offset = rest[0];
-        for corner in 1..4 {
-            for row in 0..3 {
-                for n in 0..GROUP {
-                    let edge = rest[corner][row][n] - rest[0][row][n];
-                    for column in 0..3 {
-                        linear[row][column][n] += edge * self.gradient[corner][column][n];
-                    }
-                    offset[row][n] += edge * self.constant[corner][n];
-                }
-            }
-        }
-        RestMaps { linear, offset }
     }
 }
 
@@ -139,6 +155,43 @@ pub struct RestMaps {
 }
 
 impl RestMaps {
+    /// A group without tets.
+    pub fn empty() -> Self {
+        Self { linear: [[[0.0; GROUP]; 3]; 3], offset: [[0.0; GROUP]; 3] }
+    }
+
+    /// For each tet the map from deformed to rest indices, for these corners at rest.
+    pub fn new(rasters: &Rasters, rest: &Corners) -> Self {
+        let mut maps = Self::empty();
+        maps.fill(rasters, rest);
+        maps
+    }
+
+    /// Does the same in place of the maps before.
+    #[inline(always)]
+    pub fn fill(&mut self, rasters: &Rasters, rest: &Corners) {
+        let Self { linear, offset } = self;
+        *linear = [[[0.0; GROUP]; 3]; 3];
+        *offset = rest[0];
+        for corner in 1..4 {
+            for row in 0..3 {
+                let mut edge = [0.0; GROUP];
+                for n in 0..GROUP {
+                    edge[n] = rest[corner][row][n] - rest[0][row][n];
+                }
+                for column in 0..3 {
+                    let (sum, gradient) = (&mut linear[row][column], &rasters.gradient[corner][column]);
+                    for n in 0..GROUP {
+                        sum[n] += edge[n] * gradient[n];
+                    }
+                }
+                for n in 0..GROUP {
+                    offset[row][n] += edge[n] * rasters.constant[corner][n];
+                }
+            }
+        }
+    }
+
     /// The matrix of one map by rows, and its offset.
     #[inline(always)]
     pub fn map(&self, lane: usize) -> ([[f64; 3]; 3], [f64; 3]) {
@@ -196,11 +249,6 @@ impl TetRaster<'_> {
 #[inline(always)]
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A resampler that keeps its output between the states of a mesh.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
 use cutis_volume::Volume;
@@ -9,11 +9,13 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::buckets::Buckets;
+use crate::group::Group;
+use crate::inverted::inverted_tets;
 use crate::report::ResampleReport;
 use crate::sample::Sampler;
 use crate::space::IndexSpace;
 use crate::tile::{Source, Tile};
-use crate::tiling::{TILE, TileBox, Tiling};
+use crate::tiling::{TILE, TilesNear, Tiling};
 use crate::warp::check_finite;
 use crate::{ResampleError, Warp};
 
@@ -48,6 +50,10 @@ const MARGIN: f64 = 1.0 / 64.0;
 pub struct Resampler<'a> {
     volume: &'a Volume,
     warp: Warp<'a>,
+    level: SimdLevel,
+    sampler: Sampler<'a>,
+    /// Stored value of air.
+    air: i16,
     tiling: Tiling,
     /// Continuous voxel indices of the vertices at rest.
     rest: Vec<Point3<f64>>,
@@ -60,7 +66,7 @@ pub struct Resampler<'a> {
     /// The tolerance of the state before. `None` before the first one.
     tolerance: Option<f64>,
     /// The tiles that a moved tet touches, deformed or at rest, in the state before.
-    touched: Vec<AtomicBool>,
+    touched: Vec<bool>,
     /// Counts of each tile.
     reports: Vec<ResampleReport>,
 }
@@ -77,16 +83,20 @@ impl<'a> Resampler<'a> {
         let space = IndexSpace::new(&grid.affine, warp.origin_mm, [warp.rest, &[]]);
         let rest = space.indices(warp.rest);
         let margin = MARGIN.max(2.0 * space.tolerance);
+        let (sampler, air) = Sampler::new(volume);
         Ok(Self {
             volume,
             warp: *warp,
+            level: SimdLevel::best(),
+            sampler,
+            air,
             still: buckets(&tiling, warp.tets, &rest, margin),
             removed: buckets(&tiling, warp.removed, &rest, margin),
             rest,
             margin,
             values: vec![0; volume.voxels().len()],
             tolerance: None,
-            touched: (0..tiling.len()).map(|_| AtomicBool::new(false)).collect(),
+            touched: vec![false; tiling.len()],
             reports: vec![ResampleReport::default(); tiling.len()],
             tiling,
         })
@@ -120,25 +130,19 @@ impl<'a> Resampler<'a> {
             self.removed = buckets(&tiling, warp.removed, &self.rest, self.margin);
         }
         let places = space.indices(deformed);
-        let touched: Vec<AtomicBool> = (0..tiling.len()).map(|_| AtomicBool::new(false)).collect();
-        let touch = |tiles: &TileBox| tiling.each(tiles, |tile| touched[tile].store(true, Ordering::Relaxed));
         let is_moved = warp.moved_tets();
+        let any_moved = is_moved.par_iter().any(|&moved| moved);
+        let near = if any_moved { tiles_near(&tiling, &places, space.tolerance) } else { Vec::new() };
         let moved = Buckets::new(warp.tets.len(), &tiling, |tet| {
-            if !is_moved[tet] {
-                return TileBox::default();
-            }
-            let corners = &warp.tets[tet];
-            touch(&tiles_of(&tiling, corners, &self.rest, space.tolerance));
-            let tiles = tiles_of(&tiling, corners, &places, space.tolerance);
-            touch(&tiles);
-            tiles
+            is_moved[tet].then(|| TilesNear::around(&near, &warp.tets[tet]))
         });
+        let left = |tile| any_moved && self.still.tile(tile).any(|tet| is_moved[tet as usize]);
+        let touched = (0..tiling.len()).into_par_iter().map(|tile| moved.any(tile) || left(tile)).collect();
         let all = self.tolerance != Some(space.tolerance);
         let before = std::mem::replace(&mut self.touched, touched);
-        let is_stale =
-            |tile: usize| all || [&before, &self.touched].iter().any(|set| set[tile].load(Ordering::Relaxed));
+        let is_stale = |tile: usize| all || before[tile] || self.touched[tile];
 
-        let (sampler, air) = Sampler::new(self.volume);
+        let (sampler, air) = (self.sampler, self.air);
         let source = Source {
             sampler,
             air,
@@ -148,7 +152,7 @@ impl<'a> Resampler<'a> {
             deformed: &places,
             tolerance: space.tolerance,
         };
-        let level = SimdLevel::best();
+        let level = self.level;
         let mut blocks = blocks(&tiling, &mut self.values, &mut self.reports);
         blocks.retain(|block| (0..tiling.counts[0]).any(|i| is_stale(block.first + i)));
         let (done, total) = (AtomicUsize::new(0), blocks.len());
@@ -158,15 +162,26 @@ impl<'a> Resampler<'a> {
                 let number = first + i;
                 scratch.list(&source, &self.still, &moved, &self.removed, number);
                 let region = tiling.region([i, block.tile[0], block.tile[1]]);
-                f32::in_lanes(level, TileTask { scratch, source: &source, region });
-                scratch.tile.finish(grid.shape[0], &mut block.slices);
+                // Without motion the tets are only counted.
+                let is_input = scratch.left.is_empty() && !moved.any(number);
+                if is_input {
+                    source.copy(&region, &mut block.slices);
+                }
+                if scratch.tets.is_empty() && is_input {
+                    block.reports[i] = ResampleReport::default();
+                    continue;
+                }
+                f32::in_lanes(level, TileTask { scratch, source: &source, region, is_input });
+                if !is_input {
+                    scratch.tile.finish(grid.shape[0], &mut block.slices);
+                }
                 block.reports[i] = scratch.tile.report();
             }
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
         });
         self.tolerance = Some(space.tolerance);
         let report = self.reports.iter().fold(ResampleReport::default(), |sum, tile| sum + *tile);
-        Ok(ResampleReport { inverted_tets: warp.inverted_tets(&is_moved), ..report })
+        Ok(ResampleReport { inverted_tets: inverted_tets(&warp, &is_moved, level), ..report })
     }
 
     /// The output of the last update, in the order of [`Volume::voxels`]. All zeros before the
@@ -187,15 +202,13 @@ impl<'a> Resampler<'a> {
 
 /// The tets of each tile, with a margin around them.
 fn buckets(tiling: &Tiling, tets: &[[u32; 4]], places: &[Point3<f64>], margin: f64) -> Buckets {
-    Buckets::new(tets.len(), tiling, |tet| tiles_of(tiling, &tets[tet], places, margin))
+    let near = if tets.is_empty() { Vec::new() } else { tiles_near(tiling, places, margin) };
+    Buckets::new(tets.len(), tiling, |tet| Some(TilesNear::around(&near, &tets[tet])))
 }
 
-/// The tiles that a tet touches, with a margin around it.
-#[inline(always)]
-fn tiles_of(tiling: &Tiling, corners: &[u32; 4], places: &[Point3<f64>], margin: f64) -> TileBox {
-    let [a, b, c, d] = corners.map(|v| places[v as usize]);
-    let (low, high) = (a.inf(&b).inf(&c.inf(&d)), a.sup(&b).sup(&c.sup(&d)));
-    tiling.touched(low.coords.add_scalar(-margin).into(), high.coords.add_scalar(margin).into())
+/// The tiles around each of some places, with a margin.
+fn tiles_near(tiling: &Tiling, places: &[Point3<f64>], margin: f64) -> Vec<TilesNear> {
+    places.par_iter().map(|place| tiling.near(place.coords.into(), margin)).collect()
 }
 
 /// The output of a row of tiles.
@@ -234,6 +247,7 @@ fn blocks<'a>(tiling: &Tiling, values: &'a mut [i16], reports: &'a mut [Resample
 /// Memory for one tile after another.
 struct Scratch {
     tile: Tile,
+    group: Group,
     /// The tets that touch the tile now, in ascending order.
     tets: Vec<u32>,
     /// The tets that it holds at rest and that moved or were removed.
@@ -242,7 +256,7 @@ struct Scratch {
 
 impl Scratch {
     fn new() -> Self {
-        Self { tile: Tile::new(), tets: Vec::new(), left: Vec::new() }
+        Self { tile: Tile::new(), group: Group::new(), tets: Vec::new(), left: Vec::new() }
     }
 
     /// Lists the tets of a tile.
@@ -278,17 +292,65 @@ struct TileTask<'a> {
     scratch: &'a mut Scratch,
     source: &'a Source<'a>,
     region: [Range<usize>; 3],
+    /// Whether the values of the tile are those of the input, and not needed.
+    is_input: bool,
 }
 
 impl LaneTask<f32> for TileTask<'_> {
     #[inline(always)]
     fn run<L: Lanes<f32>>(self) {
-        let Self { scratch: Scratch { tile, tets, left }, source, region } = self;
-        tile.start(source, region);
-        tile.deform(source, tets);
-        if !left.is_empty() && !tile.is_covered() {
+        let Self { scratch: Scratch { tile, group, tets, left }, source, region, is_input } = self;
+        tile.start(region);
+        if !is_input {
+            tile.read(source);
+        }
+        tile.deform(source, group, tets);
+        if !left.is_empty() && tile.find_open() {
             left.retain(|&tet| tile.may_leave(source, tet));
-            tile.vacate(source, left);
+            tile.vacate(source, group, left);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cutis_test_kit::{Kuhn, Random};
+    use cutis_volume::{Affine, Grid};
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn each_simd_level_gives_the_same_bits() {
+        let affine = Affine::from_spacing([0.7, 0.9, 1.1], [0.0; 3]).unwrap();
+        let grid = Grid { shape: [90, 50, 40], affine };
+        let mut random = Random::new(3);
+        let voxels = (0..grid.len()).map(|_| random.below(3000) as i16 - 1024).collect();
+        let volume = Volume::new(grid, voxels, 1.0, 0.0).unwrap();
+        let Kuhn { positions, tets, .. } = Kuhn::new([18, 12, 11], 0.0037);
+        let rest: Vec<Point3<f32>> = positions.iter().map(|p| p.cast::<f32>()).collect();
+        let wave = |p: &Point3<f32>| p + Vector3::new((90.0 * p.y).sin(), 0.0, (70.0 * p.x).sin()) * 2e-3;
+        let mut deformed: Vec<Point3<f32>> = rest.iter().map(wave).collect();
+        deformed[700] += Vector3::repeat(0.006);
+        let warp = Warp {
+            origin_mm: Point3::new(0.3, 0.2, 0.1),
+            rest: &rest,
+            deformed: &deformed,
+            tets: &tets,
+            body_tets: tets.len() - 500,
+            removed: &tets[..20],
+        };
+        let run = |level| {
+            let mut resampler = Resampler { level, ..Resampler::new(&volume, &warp).unwrap() };
+            let report = resampler.update(&deformed).unwrap();
+            (report, resampler.values)
+        };
+        let expected = run(SimdLevel::best());
+        let report = expected.0;
+        assert!(report.folds > 0 && report.inverted_tets > 0 && report.vacated_voxels > 0, "{report:?}");
+        assert!(expected.1 != volume.voxels(), "control: the warp does something");
+        for level in SimdLevel::available() {
+            assert!(run(level) == expected, "{level:?}");
         }
     }
 }

@@ -1,8 +1,6 @@
 //! The rows of voxel centers that a tet holds. All rows of a tet are intersected with it at once,
 //! in loops that vectorize.
 
-use std::ops::Range;
-
 use crate::lanes::{ceil, floor, integer, less, more};
 use crate::raster::{Rasters, TetRaster};
 use crate::tiling::TILE;
@@ -42,17 +40,6 @@ pub struct HeldColumns {
 }
 
 impl TetRaster<'_> {
-    /// The columns, rows and slices of a region that come near the tet. Some may be empty.
-    #[inline(always)]
-    pub fn spans(&self, region: &[Range<usize>; 3]) -> [(usize, usize); 3] {
-        let mut spans = [(0, 0); 3];
-        for axis in 0..3 {
-            let (low, high) = (self.all.low[axis][self.lane], self.all.high[axis][self.lane]);
-            spans[axis] = covered(low, high, region[axis].start, region[axis].end);
-        }
-        spans
-    }
-
     /// Finds the voxels of the rows from `j` on that the tet holds or comes near, for some slices
     /// and columns. Bits count columns from `start` on.
     #[inline(always)]
@@ -116,18 +103,6 @@ impl TetRaster<'_> {
     }
 }
 
-/// The integers in the closed interval from `low` to `high`, as first and end.
-#[inline(always)]
-fn covered(low: f64, high: f64, start: usize, end: usize) -> (usize, usize) {
-    let low = more(low, start as f64);
-    let high = less(high, end as f64 - 1.0);
-    if low <= high {
-        (integer(ceil(low)) as usize, integer(floor(high)) as usize + 1)
-    } else {
-        (start, start)
-    }
-}
-
 /// Finds the voxels between the faces where rows enter a tet and those where they leave it, in the
 /// rows from `j` and the slices from `k` on. `last` is the last column that counts.
 #[inline(always)]
@@ -188,21 +163,7 @@ mod tests {
 
     use super::*;
     use crate::raster::GROUP;
-
-    #[test]
-    fn covered_keeps_both_ends_and_stays_within() {
-        let covered = |low, high, within: Range<usize>| {
-            let (first, end) = covered(low, high, within.start, within.end);
-            first..end
-        };
-        assert_eq!(covered(1.0, 3.0, 0..10), 1..4);
-        assert_eq!(covered(1.1, 2.9, 0..10), 2..3);
-        assert_eq!(covered(-7.0, 99.0, 2..5), 2..5);
-        assert!(covered(3.2, 3.8, 0..10).is_empty());
-        assert!(covered(12.0, 14.0, 0..10).is_empty());
-        assert!(covered(-3.0, -1.0, 0..10).is_empty());
-        assert!(covered(f64::NAN, 1.0, 0..0).is_empty());
-    }
+    use crate::spans::Spans;
 
     #[test]
     fn rows_list_exactly_the_centers_inside() {
@@ -213,11 +174,13 @@ mod tests {
         // The tets alternate over the lanes.
         let eight = [0, 1, 2, 3].map(|c| [0, 1, 2].map(|axis| std::array::from_fn(|n| both[n % 2][c][axis])));
         let rasters = Rasters::new(&eight, 1e-9);
+        let mut spans = Spans::empty();
+        spans.fill(&rasters, &[0..10, 0..10, 0..10]);
         for lane in 0..GROUP {
             let corners = both[lane % 2];
             let raster = rasters.tet(lane).unwrap();
             let mut found = 0;
-            let [columns, rows, slices] = raster.spans(&[0..10, 0..10, 0..10]);
+            let [columns, rows, slices] = spans.of(lane).unwrap();
             for j in (rows.0..rows.1).step_by(ROWS) {
                 let mut held = Rows::new();
                 raster.rows(j, slices, columns, 0, &mut held);

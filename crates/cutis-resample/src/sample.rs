@@ -51,6 +51,7 @@ pub fn trilinear(voxels: &[i16], shape: [usize; 3], scanned: [i16; 2], position:
 }
 
 /// The voxels of a volume, for sampling many positions.
+#[derive(Clone, Copy)]
 pub struct Sampler<'a> {
     pub voxels: &'a [i16],
     pub shape: [usize; 3],

@@ -66,7 +66,7 @@ impl Samples {
         first: usize,
         region: &[Range<usize>; 3],
     ) {
-        let start = [0, 1, 2].map(|axis| region[axis].start as u32);
+        let start = [region[0].start as u32, region[1].start as u32, region[2].start as u32];
         for n in (first..self.count).step_by(LANES) {
             let places = &self.places[n..][..LANES];
             let mut at = [[0.0; LANES]; 3];
@@ -130,8 +130,7 @@ fn write_block(sampler: &Sampler<'_>, rest: [&[f64]; 3], places: &[u32], values:
     let mut padding = 0;
     if at_end == 0 && length > 0 {
         let starts = [0, row, slice, slice + row];
-        let next = starts.map(|start| &sampler.voxels[start + 1..][..length]);
-        let here = starts.map(|start| &sampler.voxels[start..][..length]);
+        let rows = starts.map(|start| &sampler.voxels[start..][..length + 1]);
         for n in 0..count {
             let base = bases[n] as usize;
             if base >= length {
@@ -139,7 +138,8 @@ fn write_block(sampler: &Sampler<'_>, rest: [&[f64]; 3], places: &[u32], values:
                 break;
             }
             for of in 0..4 {
-                pairs[of][n] = u32::from(here[of][base] as u16) | u32::from(next[of][base] as u16) << 16;
+                let pair = &rows[of][base..base + 2];
+                pairs[of][n] = u32::from(pair[0] as u16) | u32::from(pair[1] as u16) << 16;
             }
         }
         if sampler.has_padding {

@@ -4,8 +4,10 @@ use std::ops::Range;
 
 use nalgebra::Point3;
 
+use crate::clear_rows::ClearRows;
+use crate::group::Group;
 use crate::lanes::{floor, integer, less, more};
-use crate::raster::{Corners, GROUP, Rasters, TetRaster};
+use crate::raster::{Corners, GROUP, TetRaster};
 use crate::report::ResampleReport;
 use crate::rows::{HeldColumns, ROWS, Rows};
 use crate::sample::{Sampler, trilinear};
@@ -29,28 +31,58 @@ pub struct Source<'a> {
     pub tolerance: f64,
 }
 
-/// One bit per column for each row of a tile, and the values of the tile.
+impl Source<'_> {
+    /// Copies the input into the rows of a tile of the output, which are as for [`Tile::finish`].
+    pub fn copy(&self, [columns, rows, slices]: &[Range<usize>; 3], output: &mut [&mut [i16]]) {
+        let [width, height, _] = self.sampler.shape;
+        for (k, slice) in slices.clone().zip(output) {
+            for (j, row) in rows.clone().zip(slice.chunks_exact_mut(width)) {
+                let from = (k * height + j) * width;
+                row[columns.clone()].copy_from_slice(&self.sampler.voxels[from..][columns.clone()]);
+            }
+        }
+    }
+}
+
+/// One bit per column of a row of a tile.
+#[derive(Clone, Copy, Default)]
+#[repr(align(32))]
+struct Line {
+    /// Voxels that a tet holds.
+    inside: u64,
+    /// Covered voxels whose tet moved.
+    moved: u64,
+    /// Voxels that one body tet holds strictly.
+    once: u64,
+    /// Voxels that two or more body tets hold strictly.
+    twice: u64,
+}
+
+/// The same for what is rare.
+#[derive(Clone, Copy, Default)]
+struct Margin {
+    /// Voxels that a tet comes near. Bits that are also inside have no meaning.
+    near: u64,
+    /// Voxels that a tet covers at rest and no deformed tet covers.
+    vacated: u64,
+}
+
+/// The rows of a tile, and its values.
 ///
 /// It is used for one tile after another, so that its memory stays in a cache.
 pub struct Tile {
     region: [Range<usize>; 3],
-    /// Voxels that a tet holds.
-    inside: Vec<u64>,
-    /// Voxels that a tet comes near. Bits that are also in `inside` have no meaning.
-    near: Vec<u64>,
-    /// Covered voxels whose tet moved.
-    moved: Vec<u64>,
-    /// Voxels that a tet covers at rest and no deformed tet covers.
-    vacated: Vec<u64>,
-    /// Voxels that one body tet holds strictly.
-    once: Vec<u64>,
-    /// Voxels that two or more body tets hold strictly.
-    twice: Vec<u64>,
+    lines: Vec<Line>,
+    margins: Vec<Margin>,
     values: Vec<i16>,
     /// The rows of the present tet.
+    clear: ClearRows,
+    /// The same for a tet that is not small or has a center close to a face.
     rows: Rows,
     /// The voxels that the present tets hold.
     samples: Samples,
+    /// For each slice one bit for each row with voxels that no deformed tet covers.
+    open: [u32; TILE[2]],
 }
 
 /// Rows of a tile.
@@ -58,34 +90,27 @@ const TILE_ROWS: usize = TILE[1] * TILE[2];
 
 impl Tile {
     pub fn new() -> Self {
-        let bits = || vec![0; TILE_ROWS];
         Self {
             region: [0..0, 0..0, 0..0],
-            inside: bits(),
-            near: bits(),
-            moved: bits(),
-            vacated: bits(),
-            once: bits(),
-            twice: bits(),
+            lines: vec![Line::default(); TILE_ROWS],
+            margins: vec![Margin::default(); TILE_ROWS],
             values: vec![0; TILE_ROWS * TILE[0]],
+            clear: ClearRows::new(),
             rows: Rows::new(),
             samples: Samples::new(),
+            open: [0; TILE[2]],
         }
     }
 
-    /// Starts a tile with the values of the input.
-    pub fn start(&mut self, source: &Source<'_>, region: [Range<usize>; 3]) {
-        for bits in [
-            &mut self.inside,
-            &mut self.near,
-            &mut self.moved,
-            &mut self.vacated,
-            &mut self.once,
-            &mut self.twice,
-        ] {
-            bits.fill(0);
-        }
+    /// Starts a tile.
+    pub fn start(&mut self, region: [Range<usize>; 3]) {
+        self.lines.fill(Line::default());
+        self.margins.fill(Margin::default());
         self.region = region;
+    }
+
+    /// Takes the values of the input.
+    pub fn read(&mut self, source: &Source<'_>) {
         let [columns, rows, slices] = self.region.clone();
         for k in slices {
             for j in rows.clone() {
@@ -112,51 +137,50 @@ impl Tile {
 
     /// Sets the voxels that deformed tets own. Tets must come in ascending order.
     #[inline(always)]
-    pub fn deform(&mut self, source: &Source<'_>, tets: &[u32]) {
-        for group in tets.chunks(GROUP) {
+    pub fn deform(&mut self, source: &Source<'_>, group: &mut Group, tets: &[u32]) {
+        for tets in tets.chunks(GROUP) {
             let mut vertices = [[0; 4]; GROUP];
             let mut any_moved = false;
-            for (vertices, &tet) in vertices.iter_mut().zip(group) {
+            for (vertices, &tet) in vertices.iter_mut().zip(tets) {
                 *vertices = source.warp.tets[tet as usize];
                 any_moved |= source.moved[tet as usize];
             }
-            let rasters = Rasters::new(&corners(source.deformed, &vertices), source.tolerance);
+            group.rasterize(source.deformed, &vertices, &self.region, source.tolerance);
             if !any_moved {
-                for (n, &tet) in group.iter().enumerate() {
-                    self.claim(source, &rasters, n, tet, None);
+                for (n, &tet) in tets.iter().enumerate() {
+                    self.claim(source, group, n, tet, false);
                 }
                 continue;
             }
-            let rest = corners(source.rest, &vertices);
-            let maps = rasters.rest_maps(&rest);
+            group.map_to(source.rest, &vertices);
             self.samples.clear();
-            for (n, &tet) in group.iter().enumerate() {
+            for (n, &tet) in tets.iter().enumerate() {
                 let first = self.samples.len();
-                let rest = source.moved[tet as usize].then_some(&rest);
-                self.claim(source, &rasters, n, tet, rest);
-                self.samples.locate(&maps.map(n), first, &self.region);
+                self.claim(source, group, n, tet, source.moved[tet as usize]);
+                self.samples.locate(&group.maps.map(n), first, &self.region);
             }
             self.samples.write(&source.sampler, &mut self.values);
         }
     }
 
-    /// Marks the voxels that a tet owns, and lists those that it holds if it moved from `rest`.
+    /// Marks the voxels that a tet owns, and lists those that it owns if it moved.
     #[inline(always)]
-    fn claim(
-        &mut self,
-        source: &Source<'_>,
-        rasters: &Rasters,
-        lane: usize,
-        tet: u32,
-        rest: Option<&Corners>,
-    ) {
-        let Some(raster) = rasters.tet(lane) else { return };
+    fn claim(&mut self, source: &Source<'_>, group: &Group, lane: usize, tet: u32, moved: bool) {
+        let Some(raster) = group.rasters.tet(lane) else { return };
+        let Some([columns, rows, slices]) = group.spans.of(lane) else { return };
         let in_body = (tet as usize) < source.warp.body_tets;
-        let [columns, rows, slices] = raster.spans(&self.region);
-        if columns.0 >= columns.1 || slices.0 >= slices.1 {
+        let start = self.region[0].start;
+        let size = [columns.1 - columns.0, rows.1 - rows.0, slices.1 - slices.0];
+        if group.faces.find(lane, size, &mut self.clear) {
+            let (base, shift) = (self.row(rows.0, slices.0), columns.0 - start);
+            while let Some((n, mask)) = self.clear.next(size[1]) {
+                let row = base + n;
+                let held = u64::from(mask) << shift;
+                let held = HeldColumns { near: held, inside: held, strict: held };
+                self.hold(source, row, held, in_body, moved);
+            }
             return;
         }
-        let start = self.region[0].start;
         for j in (rows.0..rows.1).step_by(ROWS) {
             raster.rows(j, slices, columns, start, &mut self.rows);
             for k in slices.0..slices.1 {
@@ -166,34 +190,41 @@ impl Tile {
                         continue;
                     }
                     let row = self.row(j + n, k);
+                    let (line, margin) = (&mut self.lines[row], &mut self.margins[row]);
                     let mut held = HeldColumns { near, inside: near, strict: near };
                     if self.rows.is_close {
                         held = raster.levels([j + n, k], columns, start);
                         // A tet that holds a center wins over one that only comes near it. Of
                         // several, the first one wins.
-                        let own = held.near & !(held.inside | self.inside[row] | self.near[row]);
-                        self.near[row] |= own;
-                        if let Some(rest) = rest
-                            && own != 0
-                        {
-                            self.moved[row] |= own;
-                            self.sample_near(source, raster, rest, row, own);
+                        let own = held.near & !(held.inside | line.inside | margin.near);
+                        margin.near |= own;
+                        if moved && own != 0 {
+                            line.moved |= own;
+                            self.sample_near(source, raster, &group.rest, row, own);
                         }
                     }
-                    if in_body {
-                        self.twice[row] |= self.once[row] & held.strict;
-                        self.once[row] |= held.strict;
-                    }
-                    let own = held.inside & !self.inside[row];
-                    self.inside[row] |= own;
-                    if rest.is_some() {
-                        self.moved[row] |= own;
-                        self.samples.add(row, own);
-                    } else if self.moved[row] & own != 0 {
-                        self.restore(source, row, self.moved[row] & own);
-                    }
+                    self.hold(source, row, held, in_body, moved);
                 }
             }
+        }
+    }
+
+    /// Marks the voxels of a row that a tet holds, and lists those that it owns if it moved.
+    #[inline(always)]
+    fn hold(&mut self, source: &Source<'_>, row: usize, held: HeldColumns, in_body: bool, moved: bool) {
+        let line = &mut self.lines[row];
+        if in_body {
+            line.twice |= line.once & held.strict;
+            line.once |= held.strict;
+        }
+        let own = held.inside & !line.inside;
+        line.inside |= own;
+        if moved {
+            line.moved |= own;
+            self.samples.add(row, own);
+        } else if line.moved & own != 0 {
+            let own = line.moved & own;
+            self.restore(source, row, own);
         }
     }
 
@@ -201,7 +232,7 @@ impl Tile {
     #[cold]
     #[inline(never)]
     fn restore(&mut self, source: &Source<'_>, row: usize, voxels: u64) {
-        self.moved[row] &= !voxels;
+        self.lines[row].moved &= !voxels;
         for column in columns_of(voxels) {
             let [i, j, k] = self.voxel(row * TILE[0] + column);
             let [columns, rows, _] = source.sampler.shape;
@@ -235,46 +266,54 @@ impl Tile {
         [columns.start + column, rows.start + row % TILE[1], slices.start + row / TILE[1]]
     }
 
-    /// Whether a deformed tet covers every voxel of the tile.
-    pub fn is_covered(&self) -> bool {
-        let covered: usize = self.covered().map(|bits| bits.count_ones() as usize).sum();
-        covered == self.region.iter().map(ExactSizeIterator::len).product()
-    }
-
-    fn covered(&self) -> impl Iterator<Item = u64> {
-        self.inside.iter().zip(&self.near).map(|(inside, near)| inside | near)
+    /// Finds the rows with voxels that no deformed tet covers, for [`Tile::may_leave`]. Returns
+    /// whether there are any.
+    pub fn find_open(&mut self) -> bool {
+        let [columns, rows, slices] = self.region.clone().map(|range| range.len());
+        let all = u64::MAX >> (64 - columns);
+        self.open = [0; TILE[2]];
+        for (k, open) in self.open.iter_mut().enumerate().take(slices) {
+            for j in 0..rows {
+                let row = k * TILE[1] + j;
+                let covered = self.lines[row].inside | self.margins[row].near;
+                *open |= u32::from(covered & all != all) << j;
+            }
+        }
+        self.open.iter().any(|&rows| rows != 0)
     }
 
     /// Sets the voxels to air that tets cover at rest and no deformed tet covers. Call it after
     /// [`Tile::deform`].
     #[inline(always)]
-    pub fn vacate(&mut self, source: &Source<'_>, tets: &[[u32; 4]]) {
-        for group in tets.chunks(GROUP) {
+    pub fn vacate(&mut self, source: &Source<'_>, group: &mut Group, tets: &[[u32; 4]]) {
+        for tets in tets.chunks(GROUP) {
             let mut vertices = [[0; 4]; GROUP];
-            vertices[..group.len()].copy_from_slice(group);
-            let rasters = Rasters::new(&corners(source.rest, &vertices), source.tolerance);
-            for n in 0..group.len() {
-                if let Some(raster) = rasters.tet(n) {
-                    self.leave(source, raster);
+            vertices[..tets.len()].copy_from_slice(tets);
+            group.rasterize(source.rest, &vertices, &self.region, source.tolerance);
+            for n in 0..tets.len() {
+                if let (Some(raster), Some(span)) = (group.rasters.tet(n), group.spans.of(n)) {
+                    self.leave(source, raster, span);
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn leave(&mut self, source: &Source<'_>, raster: TetRaster<'_>) {
-        let [columns, rows, slices] = raster.spans(&self.region);
-        if columns.0 >= columns.1 || slices.0 >= slices.1 {
-            return;
-        }
+    fn leave(
+        &mut self,
+        source: &Source<'_>,
+        raster: TetRaster<'_>,
+        [columns, rows, slices]: [(usize, usize); 3],
+    ) {
         for j in (rows.0..rows.1).step_by(ROWS) {
             raster.rows(j, slices, columns, self.region[0].start, &mut self.rows);
             for k in slices.0..slices.1 {
                 for n in 0..ROWS.min(rows.1 - j) {
                     let row = self.row(j + n, k);
+                    let margin = &mut self.margins[row];
                     let left = self.rows.near[ROWS * (k - slices.0) + n]
-                        & !(self.inside[row] | self.near[row] | self.vacated[row]);
-                    self.vacated[row] |= left;
+                        & !(self.lines[row].inside | margin.near | margin.vacated);
+                    margin.vacated |= left;
                     for column in columns_of(left) {
                         self.values[row * TILE[0] + column] = source.air;
                     }
@@ -287,9 +326,11 @@ impl Tile {
     #[inline(always)]
     pub fn may_leave(&self, source: &Source<'_>, vertices: [u32; 4]) -> bool {
         let mut spans = [(0, 0); 3];
-        let places = vertices.map(|v| &source.rest[v as usize]);
+        let [a, b, c, d] = vertices;
+        let (a, b) = (&source.rest[a as usize], &source.rest[b as usize]);
+        let (c, d) = (&source.rest[c as usize], &source.rest[d as usize]);
         for axis in 0..3 {
-            let [a, b, c, d] = places.map(|place| place[axis]);
+            let (a, b, c, d) = (a[axis], b[axis], c[axis], d[axis]);
             let region = &self.region[axis];
             let low = more(less(less(a, b), less(c, d)) - source.tolerance, region.start as f64);
             let high = less(more(more(a, b), more(c, d)) + source.tolerance, region.end as f64 - 1.0);
@@ -300,11 +341,13 @@ impl Tile {
         }
         let [columns, rows, slices] = spans;
         let bits = (u64::MAX >> (64 - (columns.1 - columns.0))) << (columns.0 - self.region[0].start);
+        let (first_row, first_slice) = (self.region[1].start, self.region[2].start);
+        let all = (u32::MAX >> (TILE[1] - (rows.1 - rows.0))) << (rows.0 - first_row);
         let mut open = 0;
-        for k in slices.0..slices.1 {
-            for j in rows.0..rows.1 {
-                let row = self.row(j, k);
-                open |= bits & !(self.inside[row] | self.near[row]);
+        for k in slices.0 - first_slice..slices.1 - first_slice {
+            for j in columns_of(u64::from(self.open[k] & all)) {
+                let row = k * TILE[1] + j;
+                open |= bits & !(self.lines[row].inside | self.margins[row].near);
             }
         }
         open != 0
@@ -312,14 +355,15 @@ impl Tile {
 
     /// The counts of this tile.
     pub fn report(&self) -> ResampleReport {
-        let count = |bits: &[u64]| bits.iter().map(|bits| bits.count_ones() as usize).sum();
-        ResampleReport {
-            covered_voxels: self.covered().map(|bits| bits.count_ones() as usize).sum(),
-            moved_voxels: count(&self.moved),
-            vacated_voxels: count(&self.vacated),
-            folds: count(&self.twice),
-            inverted_tets: 0,
+        let mut report = ResampleReport::default();
+        let count = |bits: u64| bits.count_ones() as usize;
+        for (line, margin) in self.lines.iter().zip(&self.margins) {
+            report.covered_voxels += count(line.inside | margin.near);
+            report.moved_voxels += count(line.moved);
+            report.vacated_voxels += count(margin.vacated);
+            report.folds += count(line.twice);
         }
+        report
     }
 
     /// Copies the values into the rows of the output. `slices` are the slices of the tile, each
@@ -333,21 +377,6 @@ impl Tile {
             }
         }
     }
-}
-
-/// The places of the corners of a group of tets.
-#[inline(always)]
-fn corners(places: &[Point3<f64>], tets: &[[u32; 4]; GROUP]) -> Corners {
-    let mut corners = [[[0.0; GROUP]; 3]; 4];
-    for (n, tet) in tets.iter().enumerate() {
-        for corner in 0..4 {
-            let place = &places[tet[corner] as usize];
-            for axis in 0..3 {
-                corners[corner][axis][n] = place[axis];
-            }
-        }
-    }
-    corners
 }
 
 /// The columns of the bits that are set.

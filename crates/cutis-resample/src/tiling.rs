@@ -16,11 +16,33 @@ pub struct Tiling {
     pub counts: [usize; 3],
 }
 
-/// A box of tiles: the first tile and the end along each axis.
+/// A box of tiles: the first tile and the end along each axis. It is empty if an end is not behind
+/// the first tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileBox {
-    first: [u16; 3],
-    end: [u16; 3],
+    first: [i32; 3],
+    end: [i32; 3],
+}
+
+/// The tiles around a point: the first one along each axis, negative, and the last one along each
+/// axis. The largest numbers of several points are those of the box around them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TilesNear([i32; 8]);
+
+impl TilesNear {
+    /// The tiles of the box around the corners of a tet.
+    #[inline(always)]
+    pub fn around(points: &[Self], tet: &[u32; 4]) -> TileBox {
+        let mut most = points[tet[0] as usize].0;
+        for &corner in &tet[1..] {
+            let corner = &points[corner as usize].0;
+            for n in 0..8 {
+                most[n] = most[n].max(corner[n]);
+            }
+        }
+        let [x, y, z, end_x, end_y, end_z, ..] = most;
+        TileBox { first: [-x, -y, -z], end: [end_x + 1, end_y + 1, end_z + 1] }
+    }
 }
 
 impl Tiling {
@@ -47,30 +69,29 @@ impl Tiling {
         })
     }
 
-    /// The tiles that hold voxel centers in a box of continuous indices.
+    /// The tiles that hold voxel centers at most `margin` voxels away from a continuous index.
     #[inline(always)]
-    pub fn touched(&self, low: [f64; 3], high: [f64; 3]) -> TileBox {
-        let mut tiles = TileBox::default();
+    pub fn near(&self, place: [f64; 3], margin: f64) -> TilesNear {
+        let mut tiles = [0; 8];
         for axis in 0..3 {
             let last = self.shape[axis] as f64 - 1.0;
-            if high[axis] < 0.0 || low[axis] > last {
-                return TileBox::default();
-            }
-            let tile = |at: f64| (at.clamp(0.0, last) as u32 / TILE[axis] as u32) as u16;
-            tiles.first[axis] = tile(low[axis]);
-            tiles.end[axis] = tile(high[axis]) + 1;
+            let (low, high) = (place[axis] - margin, place[axis] + margin);
+            let tile = |at: f64| (at.clamp(0.0, last) as u32 / TILE[axis] as u32) as i32;
+            // Outside of the grid the box is empty.
+            tiles[axis] = -(if low > last { self.counts[axis] as i32 } else { tile(low) });
+            tiles[3 + axis] = if high < 0.0 { -1 } else { tile(high) };
         }
-        tiles
+        TilesNear(tiles)
     }
 
     /// Calls `visit` with the number of each tile of a box.
     #[inline(always)]
     pub fn each(&self, tiles: &TileBox, mut visit: impl FnMut(usize)) {
-        let [columns, rows, slices] = [0, 1, 2].map(|a| tiles.first[a] as usize..tiles.end[a] as usize);
+        let [columns, rows, slices] = [0, 1, 2].map(|a| tiles.first[a]..tiles.end[a]);
         for k in slices {
             for j in rows.clone() {
                 for i in columns.clone() {
-                    visit(self.number([i, j, k]));
+                    visit(self.number([i as usize, j as usize, k as usize]));
                 }
             }
         }
@@ -96,7 +117,7 @@ mod tests {
             assert_eq!(tiling.number(tile), number);
             count += tiling.region(tile).iter().map(ExactSizeIterator::len).product::<usize>();
         }
-        assert_eq!(count, tiling.shape.iter().product());
+        assert_eq!(count, tiling.shape.iter().product::<usize>());
     }
 
     #[test]
@@ -105,7 +126,8 @@ mod tests {
         let [x, y, z] = TILE.map(|length| length as f64);
         let touched = |low, high| {
             let mut found = Vec::new();
-            tiling.each(&tiling.touched(low, high), |tile| found.push(tile));
+            let corners = [low, high].map(|corner| tiling.near(corner, 0.0));
+            tiling.each(&TilesNear::around(&corners, &[0, 1, 1, 0]), |tile| found.push(tile));
             found
         };
         assert_eq!(touched([-3.0, 2.0, 2.0], [x - 0.1, y + 8.0, 2.0]), [0]);

@@ -46,18 +46,6 @@ impl Warp<'_> {
         self.tets.par_iter().map(moved).collect()
     }
 
-    /// Number of tets whose volume changed its sign or vanished. `moved` is
-    /// [`moved_tets`](Self::moved_tets).
-    pub(crate) fn inverted_tets(&self, moved: &[bool]) -> usize {
-        let volume = |positions: &[Point3<f32>], tet: usize| {
-            let [a, b, c, d] = self.tets[tet].map(|v| positions[v as usize].map(f64::from));
-            (b - a).dot(&(c - a).cross(&(d - a)))
-        };
-        let inverted =
-            |&tet: &usize| moved[tet] && volume(self.deformed, tet) * volume(self.rest, tet).signum() <= 0.0;
-        (0..self.tets.len()).into_par_iter().filter(inverted).count()
-    }
-
     pub(crate) fn validate(&self) -> Result<(), ResampleError> {
         let vertices = self.rest.len();
         if vertices != self.deformed.len() {
