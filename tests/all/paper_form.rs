@@ -52,6 +52,10 @@ fn reports_have_colors_errors_and_cost_of_the_paper_form() {
     let json: serde_json::Value = serde_json::from_slice(&run.bytes("report.json")).unwrap();
     let colors = json["colors"]["stc"].as_u64().unwrap();
     assert!(colors > 0);
+    // The skin is no lattice. Its colors are those of the CPU on every backend.
+    let by_kind =
+        serde_json::json!({"distance": "closed_form", "volume": "closed_form", "stc": "greedy_cpu"});
+    assert_eq!(json["colorings"], by_kind);
     let parts = json["ledger"]["parts"].as_array().unwrap();
     let part = parts.iter().find(|part| part["part"] == "stc").unwrap();
     assert!(part["host_bytes"].as_u64().unwrap() > 0 && part["ms_per_frame"].is_number(), "{part}");

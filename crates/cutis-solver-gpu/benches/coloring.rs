@@ -1,5 +1,6 @@
 //! Time and number of colors of the coloring on each GPU of the machine and of the greedy coloring
-//! on the CPU, for a lattice in order and with its constraints and vertices shuffled.
+//! on the CPU, for a lattice and the triangles of its surface, as in the skin of a body. In order,
+//! and with the constraints and vertices shuffled.
 //!
 //! `cargo bench -p cutis-solver-gpu --bench coloring`
 #![allow(clippy::print_stdout)] // a benchmark prints its results
@@ -62,6 +63,15 @@ fn compare<const N: usize>(name: &str, constraints: &[[u32; N]], devices: &[Gpu]
     }
 }
 
+/// The triangles that belong to one tetrahedron only.
+fn surface(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
+    let faces = |&[a, b, c, d]: &[u32; 4]| [[b, c, d], [a, c, d], [a, b, d], [a, b, c]];
+    let mut all: Vec<[u32; 3]> = tets.iter().flat_map(faces).collect();
+    all.iter_mut().for_each(|face| face.sort_unstable());
+    all.sort_unstable();
+    all.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| same[0]).collect()
+}
+
 fn main() {
     let open = |index| Gpu::open(&GpuOptions { select: Select::Index(index), ..GpuOptions::default() });
     let devices: Vec<Gpu> = adapters().into_iter().filter_map(|adapter| open(adapter.index).ok()).collect();
@@ -70,4 +80,5 @@ fn main() {
     let lattice = Kuhn::new(VERTICES, 1.0);
     compare("edges", &lattice.edges, &devices);
     compare("tetrahedra", &lattice.tets, &devices);
+    compare("surface triangles", &surface(&lattice.tets), &devices);
 }

@@ -9,6 +9,7 @@ use super::{CostReport, left_out};
 use crate::backend::{Chosen, Request};
 use crate::body::{Body, Membrane};
 use crate::ct::source::Source;
+use crate::model::constraints::coloring::Coloring;
 use crate::model::constraints::kinds::{ConstraintKind, KindRow, ScanTension};
 use crate::model::{ModelChoice, ModelCosts, ModelInput};
 use crate::output::report::{Backend, MaterialRow, MembraneReport, MemoryPart, Sizes, Stage};
@@ -43,6 +44,9 @@ pub struct Plan {
     /// Colors per constraint kind; in vertex block descent only the colors of the vertices, as
     /// `descent`.
     pub colors: BTreeMap<String, usize>,
+    /// How the colors were found, with the same keys.
+    #[serde(default)]
+    pub colorings: BTreeMap<String, Coloring>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
     /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend. Kernels are compiled
@@ -84,7 +88,7 @@ pub fn check(loaded: &LoadedScene, progress: &dyn Progress) -> Result<Plan, Erro
 impl Plan {
     /// The plan of a model with these costs, and the backend that was chosen.
     pub(crate) fn new(scene: &Scene, source: &Source, body: &Body, costs: ModelCosts) -> (Self, Chosen) {
-        let ModelCosts { backend, sizes, colors, memory, device_memory, projections, .. } = costs;
+        let ModelCosts { backend, sizes, colors, colorings, memory, device_memory, projections, .. } = costs;
         let mut warnings = [source.warnings.as_slice(), &body.warnings].concat();
         warnings.extend(costs.warnings);
         warnings.extend(narrow_incisions(&scene.incision, body));
@@ -101,6 +105,7 @@ impl Plan {
             materials: body.materials.as_ref().map(|of_body| of_body.report(&body.mesh)).unwrap_or_default(),
             steps: StepReport::all(scene, body),
             colors,
+            colorings,
             costs: CostReport::of_memory(&memory, &device_memory, NO_DEVICE),
             memory,
             device_memory,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::backend::Chosen;
 use crate::body::{Body, GrowingCuts};
+use crate::model::constraints::coloring::Coloring;
 use crate::output::report::{MemoryPart, Sizes};
 use crate::scene::{HandleSection, Scene};
 
@@ -12,6 +13,7 @@ pub(crate) struct ModelCosts {
     pub(crate) backend: Chosen,
     pub(crate) sizes: Sizes,
     pub(crate) colors: BTreeMap<String, usize>,
+    pub(crate) colorings: BTreeMap<String, Coloring>,
     /// Memory on the host by part, bytes.
     pub(crate) memory: Vec<MemoryPart>,
     /// Memory on the GPU by part, bytes; empty on a CPU backend.

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::model::ScanTension;
+use crate::model::constraints::coloring::Coloring;
 use crate::model::constraints::kinds::report_name;
 use crate::output::rest_report::{RestReport, StopReport};
 use crate::output::step_report::{HandleReport, StepReport};
@@ -49,6 +50,10 @@ pub struct Report {
     /// Colors (groups without shared vertices) per constraint kind; a kind that the scene does not
     /// name is absent. In vertex block descent only the colors of the vertices, as `descent`.
     pub colors: BTreeMap<String, usize>,
+    /// How the colors were found, with the same keys: `closed_form` from places in the lattice, or
+    /// `greedy_cpu` by greedy coloring on the CPU, also if a GPU solves.
+    #[serde(default)]
+    pub colorings: BTreeMap<String, Coloring>,
     /// Memory of the solver on the host by part, bytes.
     pub memory: Vec<MemoryPart>,
     /// Memory of the solver on the GPU by part, bytes; empty on a CPU backend.

@@ -55,6 +55,7 @@ pub(super) fn report(
         tension: plan.tension,
         membrane: plan.membrane,
         colors: plan.colors,
+        colorings: plan.colorings,
         memory: plan.memory,
         device_memory: plan.device_memory,
         costs: result.times.add_to(plan.costs),

@@ -70,6 +70,7 @@ impl Model for ChainmailModel {
             backend,
             sizes: Sizes { edges: self.chain.links(), ..sizes(body, self.fixed) },
             colors: BTreeMap::new(),
+            colorings: BTreeMap::new(),
             memory: self.chain.bytes().map(part).into(),
             projections: visits,
             left_out: lines_that_hold(&[

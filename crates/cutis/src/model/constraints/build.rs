@@ -8,6 +8,7 @@ use cutis_solver::{Change, Formulation, Settings, SolverError, System, SystemBui
 use nalgebra::Vector3;
 
 use super::ConstraintModel;
+use super::coloring::Coloring;
 use super::elements::Elements;
 use super::hooks::{self, Hooks};
 use super::kinds::{BodyParts, contact};
@@ -83,13 +84,14 @@ impl ConstraintModel {
             inverse_masses: &inverse_masses,
             nothing_fixed: scene.fixed == Default::default(),
         };
-        let (mut colors, mut warnings) = (BTreeMap::new(), Vec::new());
+        let (mut colors, mut colorings, mut warnings) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
         let mut loads = vec![Vector3::zeros(); body.mesh.positions.len()];
         for (row, kind) in scene.constraints.named() {
             let section = format!("constraints.{}", row.key);
             let number;
             (builder, number) = kind.add(builder, &parts).map_err(file.blame(&section))?;
             colors.insert(row.key.to_owned(), number);
+            colorings.insert(row.key.to_owned(), kind.coloring());
             if scene.scan_is_at_rest {
                 kind.add_loads(&parts, &mut loads).map_err(file.blame(&section))?;
             }
@@ -135,9 +137,10 @@ impl ConstraintModel {
         if let Some(threads) = &mut threads {
             let kind = threads.constraints(input)?;
             colors.insert("suture".to_owned(), kind.colors());
+            colorings.insert("suture".to_owned(), Coloring::GreedyCpu);
             system.add_kinds(vec![kind])?;
         }
-        Ok(Self { system, settings: settings(scene), colors, warnings, wound, threads, hooks })
+        Ok(Self { system, settings: settings(scene), colors, colorings, warnings, wound, threads, hooks })
     }
 }
 

@@ -1,6 +1,7 @@
 //! The model `pbd`: constraints over the lattice, which a solver projects.
 
 mod build;
+pub(crate) mod coloring;
 mod elements;
 mod estimate;
 mod hooks;
@@ -24,6 +25,7 @@ use crate::scene::validate::Check;
 use crate::scene::{Scene, TissueMaterials};
 use crate::{CostReport, Error, Progress};
 
+use coloring::Coloring;
 pub(crate) use estimate::CostEstimate;
 use hooks::Hooks;
 pub(super) use kinds::contact::fill_default;
@@ -38,6 +40,8 @@ pub(crate) struct ConstraintModel {
     pub(crate) settings: Settings,
     /// Colors by constraint kind.
     pub(crate) colors: BTreeMap<String, usize>,
+    /// How they were found.
+    colorings: BTreeMap<String, Coloring>,
     /// Warnings of the constraint kinds.
     warnings: Vec<String>,
     /// The cuts that grow; none if the scene has none.
@@ -75,9 +79,13 @@ impl Model for ConstraintModel {
         let work = estimate.work(system, settings, scene.run.frames);
         let backend = request.settle(input.file, &scene.solver, &work)?;
         estimate.add_threaded(&backend, system);
-        let colors = match estimate.vertex_colors() {
-            Some(number) => BTreeMap::from([(StepProfile::DESCENT.to_owned(), number)]),
-            None => self.colors.clone(),
+        let (colors, colorings) = match estimate.vertex_colors() {
+            Some(number) => {
+                let vertices = || StepProfile::DESCENT.to_owned();
+                let closed_form = (vertices(), Coloring::ClosedForm);
+                (BTreeMap::from([(vertices(), number)]), BTreeMap::from([closed_form]))
+            }
+            None => (self.colors.clone(), self.colorings.clone()),
         };
         let motionless = system.vertices().iter().filter(|v| v.inverse_mass() == 0.0).count();
         let followers = match (&self.wound, &input.body.growing) {
@@ -97,6 +105,7 @@ impl Model for ConstraintModel {
                 ..sizes(input.body, motionless - input.body.removed_vertices() - followers)
             },
             colors,
+            colorings,
             memory: estimate.memory,
             projections: work.projections,
             left_out: left_out(scene),

@@ -2,12 +2,13 @@
 
 use std::collections::HashMap;
 
-use cutis_coloring::{Groups, greedy};
+use cutis_coloring::Groups;
 use cutis_constraints::Thread;
 use cutis_mesh::{Stitch, TetMesh};
 use cutis_solver::{Formulation, Kind, Stiffness, SystemBuilder, Values};
 use nalgebra::Point3;
 
+use super::coloring;
 use crate::Error;
 use crate::model::ModelInput;
 use crate::scene::SutureSection;
@@ -64,7 +65,7 @@ impl Threads {
                 Stiffness::Compliance(Values::Each(threads.iter().map(compliance).collect()))
             }
         };
-        let groups = greedy(&vertices, count)?;
+        let groups = coloring::of_mesh(&vertices, count)?;
         let builder = Some(SystemBuilder::in_place(&body.mesh.positions, &vec![0.0_f32; count])?);
         Ok(Some(Self { builder, groups, stiffness, vertices, kind, threads }))
     }

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use cutis_coloring::greedy;
 use cutis_constraints::{
     Constraint, MaterialError, SkinStrip, SkinStripAtRest, SkinStripLaw, SkinStripMaterial, SkinStripTurn,
 };
@@ -16,7 +15,7 @@ use super::freed::Strength;
 use super::membrane_presets::{MembranePreset, PRESETS, preset};
 use super::rounding::lost_in_rounding;
 use super::too_stiff::too_stiff;
-use super::{BodyParts, ConstraintKind, KindFacts, ScanTension, one};
+use super::{BodyParts, Coloring, ConstraintKind, KindFacts, ScanTension, coloring, one};
 use crate::Error;
 use crate::body::Tangent;
 use crate::scene::validate::Check;
@@ -242,7 +241,7 @@ impl MembraneSection {
         strips: &[Strip],
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
         let triangles: Vec<[u32; 3]> = strips.iter().map(|strip| strip.triangle).collect();
-        let groups = greedy(&triangles, parts.body.mesh.positions.len())?;
+        let groups = coloring::of_mesh(&triangles, parts.body.mesh.positions.len())?;
         let at_rest = |triangle: &[u32; 3]| triangle.map(|v| parts.body.mesh.positions[v as usize]);
         let params: Vec<C::Params<f32>> =
             strips.iter().map(|strip| C::from_rest(&at_rest(&strip.triangle), &strip.material)).collect();
@@ -308,6 +307,10 @@ struct Strip {
 }
 
 impl ConstraintKind for MembraneSection {
+    fn coloring(&self) -> Coloring {
+        Coloring::GreedyCpu
+    }
+
     fn validate(&self, _: &Scene, check: &Check<'_>) -> Result<(), Error> {
         check.not_negative("constraints.membrane.stiffening", self.stiffening)?;
         check.share("constraints.membrane.compression", self.compression)?;

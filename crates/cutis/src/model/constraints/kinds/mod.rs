@@ -30,6 +30,7 @@ pub use membrane::{MembraneDirections, MembraneSection};
 pub use skin_tension::{NearIncisionSection, StcForm, StcSection};
 pub use tet_volume::VolumeConstraintSection;
 
+use super::coloring::{self, Coloring};
 use super::elements::Elements;
 use crate::Error;
 use crate::body::Body;
@@ -109,6 +110,11 @@ pub(crate) trait ConstraintKind {
     /// Whether the kind acts. One that does not is left out.
     fn acts(&self) -> bool {
         true
+    }
+
+    /// How the constraints get their colors.
+    fn coloring(&self) -> Coloring {
+        Coloring::ClosedForm
     }
 
     /// Checks the values of the section.

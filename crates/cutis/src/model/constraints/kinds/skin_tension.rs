@@ -1,7 +1,7 @@
 //! `constraints.stc`: skin tension over each skin triangle, by HU and by distance from the
 //! incisions.
 
-use cutis_coloring::{Groups, greedy};
+use cutis_coloring::Groups;
 use cutis_constraints::{
     Constraint, SkinTension, SkinTensionMaterial, SkinTensionPaper, SkinTensionPaperMaterial,
 };
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::freed::Strength;
 use super::rounding::lost_in_rounding;
 use super::too_stiff::too_stiff;
-use super::{BodyParts, ConstraintKind, KindFacts, ScanTension, compliances, one};
+use super::{BodyParts, Coloring, ConstraintKind, KindFacts, ScanTension, coloring, compliances, one};
 use crate::Error;
 use crate::scene::validate::Check;
 use crate::scene::{Scene, TableChoice};
@@ -255,6 +255,10 @@ impl StcSection {
 }
 
 impl ConstraintKind for StcSection {
+    fn coloring(&self) -> Coloring {
+        Coloring::GreedyCpu
+    }
+
     fn validate(&self, scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
         check.positive("constraints.stc.area_modulus_n_per_m", self.area_modulus_n_per_m)?;
         check.share("constraints.stc.stiffness", self.stiffness)?;
@@ -279,7 +283,7 @@ impl ConstraintKind for StcSection {
         builder: SystemBuilder<f32>,
         parts: &BodyParts<'_>,
     ) -> Result<(SystemBuilder<f32>, usize), Error> {
-        let groups = greedy(parts.elements.skin(), parts.body.mesh.positions.len())?;
+        let groups = coloring::of_mesh(parts.elements.skin(), parts.body.mesh.positions.len())?;
         let builder = match self.form {
             StcForm::Energy => self.add_energy_form(builder, parts, &groups)?,
             StcForm::Paper => self.add_paper_form(builder, parts, &groups)?,
