@@ -19,8 +19,8 @@ struct Chunk {
 }
 
 impl Buckets {
-    /// Sorts the tets `0..count`. `tiles_of` gives the tiles that a tet touches; none for a tet that
-    /// is left out.
+    /// Sorts the tets `0..count`. `tiles_of` gives the tiles that a tet touches; none for a tet
+    /// that is left out.
     pub fn new(count: usize, tiling: &Tiling, tiles_of: impl Fn(usize) -> Option<TileBox> + Sync) -> Self {
         let tiles = tiling.len();
         let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().filter_map(|chunk| {

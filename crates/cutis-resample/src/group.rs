@@ -1,5 +1,5 @@
-//! A group of tets over a tile, with all that follows from their corners. Its memory is used for one
-//! group after another.
+//! A group of tets over a tile, with all that follows from their corners. Its memory is used for
+//! one group after another.
 
 use std::ops::Range;
 

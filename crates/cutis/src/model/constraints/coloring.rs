@@ -6,10 +6,10 @@
 //! - Colors decide the order of the sweeps, and so the bits of a run. With one coloring for all
 //!   backends a run has the same bits on the CPU and on software adapters, and a timing never
 //!   decides.
-//! - The CPU takes about 2 ms for the skin of the paper's largest data set
-//!   (`cargo bench -p cutis-solver-gpu --bench coloring`). A GPU has to compile five kernels, to
-//!   upload the constraints, and to wait for the host between rounds.
-//! - The coloring on a GPU needs more colors. Each is a dispatch in every iteration of the run.
+//! - A GPU would have to compile kernels, to upload the constraints, and to wait for the host
+//!   between rounds. No hardware GPU was available to measure it. `cargo bench -p cutis-solver-gpu
+//!   --bench coloring` compares both on the GPUs of a machine.
+//! - The coloring on a GPU needs a few colors more. Each is a dispatch in every iteration of a run.
 
 use cutis_coloring::{ColoringError, Groups, greedy};
 use schemars::JsonSchema;
