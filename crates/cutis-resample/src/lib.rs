@@ -15,6 +15,9 @@
 //! [`blend_walls`] then gives the voxels that the wall of a wound crosses the mean over the voxel,
 //! as a scanner would, so that walls look smooth.
 //!
+//! [`Displacement`] gives the displacement field of a warp on a grid, and [`resample_labels`] a
+//! label map through the warp, with nearest neighbors.
+//!
 //! With the feature `gpu`, the same rules hold on a GPU: `resample_gpu` resamples through one state
 //! of a mesh, and `ResamplerGpu` through many.
 //!
@@ -45,11 +48,13 @@
 
 mod buckets;
 mod clear_rows;
+mod displacement;
 mod error;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod group;
 mod inverted;
+mod labels;
 mod lanes;
 mod partial_volume;
 mod raster;
@@ -58,15 +63,19 @@ mod resampler;
 mod rows;
 mod sample;
 mod samples;
+mod slabs;
 mod space;
 mod spans;
+mod tet_map;
 mod tile;
 mod tiling;
 mod warp;
 
+pub use displacement::{Coverage, Displacement, Slab};
 pub use error::ResampleError;
 #[cfg(feature = "gpu")]
 pub use gpu::{GridUniform, ResamplerGpu, ResamplerOptions, Setup, SlabState, resample_gpu};
+pub use labels::{LabelReport, resample_labels};
 pub use partial_volume::blend_walls;
 pub use report::ResampleReport;
 pub use resampler::Resampler;

@@ -1,6 +1,7 @@
 //! Integration tests of resampling.
 
 mod bodies;
+mod displacement;
 mod errors;
 #[cfg(feature = "gpu")]
 mod gpu;
