@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use crate::voxels::Observer;
+use crate::voxels::{Observer, Opened};
 use crate::{Loaded, VolumeError, metaimage, nifti, nrrd, to_perpendicular_axes};
 
 /// How to read a volume.
@@ -70,6 +70,27 @@ fn read_files(
             .push("the axes were not perpendicular: the volume was resampled to perpendicular axes".into());
     }
     Ok(loaded)
+}
+
+/// Whether a file has the mark of DICOM, after a preamble of 128 bytes.
+pub(crate) fn has_dicom_mark(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(132).read_to_end(&mut start));
+    read.is_ok() && start.ends_with(b"DICM") && start.len() == 132
+}
+
+/// Opens a file of the format that its content has, and passes it on to `read`.
+pub(crate) fn with_open<T>(
+    path: &Path,
+    read: impl FnOnce(Opened<'_>) -> Result<T, VolumeError>,
+) -> Result<T, VolumeError> {
+    if starts_with(path, nrrd::MAGIC) {
+        nrrd::with_open(path, None, read)
+    } else if metaimage::is_metaimage(path) {
+        metaimage::with_open(path, None, read)
+    } else {
+        nifti::with_open(path, None, read)
+    }
 }
 
 fn starts_with(path: &Path, magic: &[u8]) -> bool {

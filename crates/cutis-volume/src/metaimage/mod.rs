@@ -9,4 +9,5 @@ mod write;
 pub use read::read;
 pub use write::write;
 
-pub(crate) use read::{is_metaimage, read_files};
+pub(crate) use read::{is_metaimage, read_files, with_open};
+pub(crate) use write::write_voxels;

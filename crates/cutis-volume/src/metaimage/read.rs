@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::header::Header;
-use crate::voxels::{Compression, Layout, Observer, Source, again, decode, lines};
+use crate::voxels::{Compression, Layout, Observer, Opened, Source, again, decode, lines};
 use crate::{Loaded, VolumeError};
 
 /// Number of bytes in which a header has one of the fields that every image has.
@@ -36,10 +36,16 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
     read_files(path.as_ref(), None)
 }
 
-pub(crate) fn read_files(
+pub(crate) fn read_files(path: &Path, observer: Option<&mut Observer<'_>>) -> Result<Loaded, VolumeError> {
+    with_open(path, observer, decode)
+}
+
+/// Decodes the header, and passes the file on to `read`.
+pub(crate) fn with_open<T>(
     path: &Path,
     mut observer: Option<&mut Observer<'_>>,
-) -> Result<Loaded, VolumeError> {
+    read: impl FnOnce(Opened<'_>) -> Result<T, VolumeError>,
+) -> Result<T, VolumeError> {
     let mut source = Source::open_plain(path, again(&mut observer))?;
     // The voxels follow this field.
     let last = |line: &str| line.split_once('=').is_some_and(|(name, _)| name.trim() == "ElementDataFile");
@@ -72,5 +78,5 @@ pub(crate) fn read_files(
         scaling: [1.0, 0.0],
         offset,
     };
-    decode(source, &layout, warnings)
+    read(Opened { source, layout, warnings, segments: Vec::new() })
 }

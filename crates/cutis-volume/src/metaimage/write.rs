@@ -3,8 +3,8 @@
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use crate::voxels::{fits_int16, put_hu};
-use crate::{PartialFile, Volume, VolumeError};
+use crate::voxels::{PutVoxels, fits_int16, put_hu};
+use crate::{Grid, PartialFile, Volume, VolumeError};
 
 /// Writes a volume to a `.mha` file, or to a `.mhd` header and a `.raw` file next to it.
 ///
@@ -14,43 +14,49 @@ use crate::{PartialFile, Volume, VolumeError};
 /// # Errors
 /// [`VolumeError::Extension`], [`VolumeError::Sheared`] or [`VolumeError::Io`].
 pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), VolumeError> {
-    let path = path.as_ref();
+    let int16 = fits_int16(volume);
+    let dtype = if int16 { "MET_SHORT" } else { "MET_FLOAT" };
+    write_voxels(path.as_ref(), volume.grid(), dtype, &|sink| put_hu(sink, volume, int16))
+}
+
+/// Writes the voxels that `put` gives, little-endian.
+pub(crate) fn write_voxels(
+    path: &Path,
+    grid: &Grid,
+    dtype: &str,
+    put: &PutVoxels<'_>,
+) -> Result<(), VolumeError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let detached = match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("mha") => false,
         Some("mhd") => true,
         _ => return Err(VolumeError::Extension { path: path.into(), expected: ".mha or .mhd" }),
     };
-    let affine = &volume.grid().affine;
-    if affine.is_sheared() {
-        return Err(VolumeError::Sheared { path: path.into(), cosine: affine.shear() });
+    if grid.affine.is_sheared() {
+        return Err(VolumeError::Sheared { path: path.into(), cosine: grid.affine.shear() });
     }
-    let int16 = fits_int16(volume);
     let data = path.with_extension("raw");
     let name = data.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let header = header(volume, int16, if detached { &name } else { "LOCAL" });
+    let header = header(grid, dtype, if detached { &name } else { "LOCAL" });
     if detached {
-        put(&data, b"", Some(volume), int16)?;
-        return put(path, header.as_bytes(), None, int16);
+        write_file(&data, b"", Some(put))?;
+        return write_file(path, header.as_bytes(), None);
     }
-    put(path, header.as_bytes(), Some(volume), int16)
+    write_file(path, header.as_bytes(), Some(put))
 }
 
 /// Writes a header and voxels, or one of them.
-fn put(path: &Path, header: &[u8], volume: Option<&Volume>, int16: bool) -> Result<(), VolumeError> {
+fn write_file(path: &Path, header: &[u8], put: Option<&PutVoxels<'_>>) -> Result<(), VolumeError> {
     let mut file = BufWriter::with_capacity(1 << 20, PartialFile::create(path)?);
     let written = (|| -> io::Result<PartialFile> {
         file.write_all(header)?;
-        if let Some(volume) = volume {
-            put_hu(&mut file, volume, int16)?;
-        }
+        put.map_or(Ok(()), |put| put(&mut file))?;
         file.into_inner().map_err(io::IntoInnerError::into_error)
     })();
     written.map_err(|source| VolumeError::Io { path: path.into(), action: "write", source })?.commit()
 }
 
-fn header(volume: &Volume, int16: bool, data_file: &str) -> String {
-    let grid = volume.grid();
+fn header(grid: &Grid, dtype: &str, data_file: &str) -> String {
     let [nx, ny, nz] = grid.shape;
     let rows = grid.affine.rows();
     let [sx, sy, sz] = grid.affine.spacing_mm();
@@ -62,7 +68,6 @@ fn header(volume: &Volume, int16: bool, data_file: &str) -> String {
         .map(|(r, c)| value(r, rows[r][c] / [sx, sy, sz][c]))
         .collect();
     let offset: Vec<String> = (0..3).map(|r| value(r, rows[r][3])).collect();
-    let dtype = if int16 { "MET_SHORT" } else { "MET_FLOAT" };
     format!(
         "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
          TransformMatrix = {}\nOffset = {}\nCenterOfRotation = 0 0 0\nElementSpacing = {sx:?} {sy:?} {sz:?}\n\

@@ -4,17 +4,23 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
+use crate::voxels::VoxelType;
 use crate::{Affine, Grid, VolumeError};
 
 /// Offset of the first voxel: after the header and an empty list of extensions.
 const VOXEL_OFFSET: usize = 352;
-const INT16: i16 = 4;
 const MILLIMETER: u8 = 2;
 /// The code `NIFTI_XFORM_SCANNER_ANAT`.
 const SCANNER: i16 = 1;
 
-/// Encodes the header for int16 voxels on `grid`. `path` appears in error messages.
-pub(super) fn encode(path: &Path, grid: &Grid, slope: f32, intercept: f32) -> Result<Vec<u8>, VolumeError> {
+/// Encodes the header for voxels of a type on `grid`, with slope and intercept. `path` appears in
+/// error messages.
+pub(super) fn encode(
+    path: &Path,
+    grid: &Grid,
+    dtype: VoxelType,
+    [slope, intercept]: [f32; 2],
+) -> Result<Vec<u8>, VolumeError> {
     let shape = grid.shape;
     if shape.iter().any(|&n| n == 0 || n > i16::MAX as usize) {
         return Err(VolumeError::WriteShape { path: path.into(), shape });
@@ -26,7 +32,7 @@ pub(super) fn encode(path: &Path, grid: &Grid, slope: f32, intercept: f32) -> Re
     header.i32(0, &[348]);
     header.0[38] = b'r';
     header.i16(40, &[3, shape[0] as i16, shape[1] as i16, shape[2] as i16, 1, 1, 1, 1]);
-    header.i16(70, &[INT16, 16]);
+    header.i16(70, &[dtype.code(), 8 * dtype.bytes() as i16]);
     let [dx, dy, dz] = grid.affine.spacing_mm();
     let (quaternion, handedness) = rotation(&grid.affine);
     header.f32(76, &[handedness, dx, dy, dz, 1.0, 1.0, 1.0, 1.0]);

@@ -6,6 +6,7 @@ mod placement;
 mod read;
 mod write;
 
-pub(crate) use read::read_files;
 pub use read::{read, read_observed};
+pub(crate) use read::{read_files, with_open};
+pub(crate) use write::write_voxels;
 pub use write::{Writer, write};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::header::Header;
 use super::placement;
-use crate::voxels::{Layout, Observer, Source, VoxelType, again, decode};
+use crate::voxels::{Layout, Observer, Opened, Source, VoxelType, again, decode};
 use crate::{Loaded, VolumeError};
 
 /// Reads a NIfTI-1 or NIfTI-2 file in either byte order, compressed or not, with integer or real
@@ -54,10 +54,16 @@ pub fn read_observed(
     read_files(path.as_ref(), Some(&mut observe))
 }
 
-pub(crate) fn read_files(
+pub(crate) fn read_files(path: &Path, observer: Option<&mut Observer<'_>>) -> Result<Loaded, VolumeError> {
+    with_open(path, observer, decode)
+}
+
+/// Decodes the header, and passes the file on to `read`.
+pub(crate) fn with_open<T>(
     path: &Path,
     mut observer: Option<&mut Observer<'_>>,
-) -> Result<Loaded, VolumeError> {
+    read: impl FnOnce(Opened<'_>) -> Result<T, VolumeError>,
+) -> Result<T, VolumeError> {
     if path.is_dir() {
         let reason = "it is a folder: a DICOM series is read by builds with the feature dicom, and dcm2niix converts it to one file";
         return Err(VolumeError::NotNifti { path: path.into(), reason });
@@ -79,7 +85,7 @@ pub(crate) fn read_files(
             source = Source::open(image, again(&mut observer))?;
         }
     }
-    load(source, header_path, &header)
+    read(opened(source, header_path, &header)?)
 }
 
 /// Reads the header at the beginning of a file.
@@ -98,7 +104,7 @@ fn header(source: &mut Source<'_>) -> Result<Header, VolumeError> {
     Header::decode(&source.path, &bytes)
 }
 
-fn load(source: Source<'_>, header_path: &Path, header: &Header) -> Result<Loaded, VolumeError> {
+fn opened<'a>(source: Source<'a>, header_path: &Path, header: &Header) -> Result<Opened<'a>, VolumeError> {
     let mut warnings = Vec::new();
     let dtype = VoxelType::from_code(header.datatype).map_err(|dtype| VolumeError::VoxelType {
         path: header_path.into(),
@@ -116,7 +122,7 @@ fn load(source: Source<'_>, header_path: &Path, header: &Header) -> Result<Loade
         scaling,
         offset: header.voxel_offset,
     };
-    decode(source, &layout, warnings)
+    Ok(Opened { source, layout, warnings, segments: Vec::new() })
 }
 
 /// Paths of the header and image file of a pair, given either of them. `None` for a single file.

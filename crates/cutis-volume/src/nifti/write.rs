@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::encode::encode;
-use crate::voxels::{GzipWriter, fits_int16};
+use crate::voxels::{GzipWriter, PutVoxels, VoxelType, fits_int16};
 use crate::{Grid, PartialFile, Volume, VolumeError};
 
 /// Number of voxels converted to bytes at a time.
@@ -68,7 +68,45 @@ enum Sink {
     Gzip(GzipWriter<PartialFile>),
 }
 
+/// Writes the voxels of a type that `put` gives, little-endian, with slope 1.
+pub(crate) fn write_voxels(
+    path: &Path,
+    grid: &Grid,
+    dtype: VoxelType,
+    put: &PutVoxels<'_>,
+) -> Result<(), VolumeError> {
+    let mut sink = Sink::open(path, grid, dtype, [1.0, 0.0])?;
+    put(sink.as_write()).map_err(|source| VolumeError::Io { path: path.into(), action: "write", source })?;
+    sink.finish(path)
+}
+
 impl Sink {
+    /// Creates the file and writes its header.
+    fn open(path: &Path, grid: &Grid, dtype: VoxelType, scaling: [f32; 2]) -> Result<Self, VolumeError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let gzip = name.ends_with(".nii.gz");
+        if !gzip && !name.ends_with(".nii") {
+            return Err(VolumeError::Extension { path: path.into(), expected: ".nii or .nii.gz" });
+        }
+        let header = encode(path, grid, dtype, scaling)?;
+        let file = PartialFile::create(path)?;
+        let failed = |source| VolumeError::Io { path: path.into(), action: "write", source };
+        let mut sink = match gzip {
+            true => Self::Gzip(GzipWriter::new(file).map_err(failed)?),
+            false => Self::Plain(BufWriter::with_capacity(1 << 20, file)),
+        };
+        sink.as_write().write_all(&header).map_err(failed)?;
+        Ok(sink)
+    }
+
+    fn finish(self, path: &Path) -> Result<(), VolumeError> {
+        let file = match self {
+            Self::Plain(buffer) => buffer.into_inner().map_err(io::IntoInnerError::into_error),
+            Self::Gzip(gzip) => gzip.finish(),
+        };
+        file.map_err(|source| VolumeError::Io { path: path.into(), action: "write", source })?.commit()
+    }
+
     fn as_write(&mut self) -> &mut dyn Write {
         match self {
             Self::Plain(file) => file,
@@ -99,19 +137,7 @@ impl Writer {
         intercept: f32,
     ) -> Result<Self, VolumeError> {
         let path = path.as_ref();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        let gzip = name.ends_with(".nii.gz");
-        if !gzip && !name.ends_with(".nii") {
-            return Err(VolumeError::Extension { path: path.into(), expected: ".nii or .nii.gz" });
-        }
-        let header = encode(path, &grid, slope, intercept)?;
-        let file = PartialFile::create(path)?;
-        let failed = |source| VolumeError::Io { path: path.into(), action: "write", source };
-        let mut sink = match gzip {
-            true => Sink::Gzip(GzipWriter::new(file).map_err(failed)?),
-            false => Sink::Plain(BufWriter::with_capacity(1 << 20, file)),
-        };
-        sink.as_write().write_all(&header).map_err(failed)?;
+        let sink = Sink::open(path, &grid, VoxelType::I16, [slope, intercept])?;
         Ok(Self { sink, path: path.into(), expected: grid.len(), pushed: 0 })
     }
 
@@ -142,12 +168,7 @@ impl Writer {
         if self.pushed != self.expected {
             return Err(self.wrong_count());
         }
-        let Self { sink, path, .. } = self;
-        let file = match sink {
-            Sink::Plain(buffer) => buffer.into_inner().map_err(io::IntoInnerError::into_error),
-            Sink::Gzip(gzip) => gzip.finish(),
-        };
-        file.map_err(|source| VolumeError::Io { path, action: "write", source })?.commit()
+        self.sink.finish(&self.path)
     }
 
     fn wrong_count(&self) -> VolumeError {

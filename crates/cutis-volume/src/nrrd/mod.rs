@@ -4,12 +4,15 @@
 
 mod header;
 mod read;
+mod vectors;
 mod write;
 
 pub use read::read;
+pub use vectors::VectorWriter;
 pub use write::write;
 
-pub(crate) use read::read_files;
+pub(crate) use read::{read_files, with_open};
+pub(crate) use write::write_voxels;
 
 /// The first bytes of a file.
 pub(crate) const MAGIC: &[u8] = b"NRRD000";

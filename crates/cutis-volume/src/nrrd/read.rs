@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::MAGIC;
 use super::header::{Encoding, Header};
-use crate::voxels::{Compression, Layout, Observer, Source, again, decode, header_error, lines};
+use crate::voxels::{Compression, Layout, Observer, Opened, Source, again, decode, header_error, lines};
 use crate::{Loaded, VolumeError};
 
 /// Reads an NRRD file. Its values are HU.
@@ -21,10 +21,16 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, VolumeError> {
     read_files(path.as_ref(), None)
 }
 
-pub(crate) fn read_files(
+pub(crate) fn read_files(path: &Path, observer: Option<&mut Observer<'_>>) -> Result<Loaded, VolumeError> {
+    with_open(path, observer, decode)
+}
+
+/// Decodes the header, and passes the file on to `read`.
+pub(crate) fn with_open<T>(
     path: &Path,
     mut observer: Option<&mut Observer<'_>>,
-) -> Result<Loaded, VolumeError> {
+    read: impl FnOnce(Opened<'_>) -> Result<T, VolumeError>,
+) -> Result<T, VolumeError> {
     let mut source = Source::open_plain(path, again(&mut observer))?;
     let lines = lines(&mut source, str::is_empty)?;
     let magic = lines[0].as_bytes();
@@ -55,5 +61,7 @@ pub(crate) fn read_files(
         scaling: [1.0, 0.0],
         offset,
     };
-    decode(source, &layout, warnings)
+    let of_segment = |line: &&String| line.starts_with("Segment") && line.contains(":=");
+    let segments = lines.iter().filter(of_segment).cloned().collect();
+    read(Opened { source, layout, warnings, segments })
 }

@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use crate::voxels::{GzipWriter, fits_int16, put_hu};
-use crate::{PartialFile, Volume, VolumeError};
+use crate::voxels::{GzipWriter, PutVoxels, fits_int16, put_hu};
+use crate::{Affine, Grid, PartialFile, Volume, VolumeError};
 
 /// Writes a volume to a `.nrrd` file, or to a `.nhdr` header and a `.raw.gz` file next to it.
 ///
@@ -14,43 +14,48 @@ use crate::{PartialFile, Volume, VolumeError};
 /// # Errors
 /// [`VolumeError::Extension`], [`VolumeError::Sheared`] or [`VolumeError::Io`].
 pub fn write(path: impl AsRef<Path>, volume: &Volume) -> Result<(), VolumeError> {
-    let path = path.as_ref();
+    let int16 = fits_int16(volume);
+    let dtype = if int16 { "int16" } else { "float" };
+    write_voxels(path.as_ref(), volume.grid(), dtype, &[], &|sink| put_hu(sink, volume, int16))
+}
+
+/// Writes the voxels that `put` gives, little-endian. `lines` are further lines of the header.
+pub(crate) fn write_voxels(
+    path: &Path,
+    grid: &Grid,
+    dtype: &str,
+    lines: &[String],
+    put: &PutVoxels<'_>,
+) -> Result<(), VolumeError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let detached = match extension.as_ref().and_then(|extension| extension.to_str()) {
         Some("nrrd") => false,
         Some("nhdr") => true,
         _ => return Err(VolumeError::Extension { path: path.into(), expected: ".nrrd or .nhdr" }),
     };
-    let affine = &volume.grid().affine;
-    if affine.is_sheared() {
-        return Err(VolumeError::Sheared { path: path.into(), cosine: affine.shear() });
+    if grid.affine.is_sheared() {
+        return Err(VolumeError::Sheared { path: path.into(), cosine: grid.affine.shear() });
     }
-    let int16 = fits_int16(volume);
     let data = path.with_extension("raw.gz");
     let name = detached.then(|| data.file_name().unwrap_or_default().to_string_lossy().into_owned());
-    let header = header(volume, int16, name.as_deref());
+    let header = header(grid, dtype, lines, name.as_deref());
     if detached {
-        put(PartialFile::create(&data)?, b"", Some(volume), int16, &data)?;
-        return put(PartialFile::create(path)?, header.as_bytes(), None, int16, path);
+        write_file(&data, b"", Some(put))?;
+        return write_file(path, header.as_bytes(), None);
     }
-    put(PartialFile::create(path)?, header.as_bytes(), Some(volume), int16, path)
+    write_file(path, header.as_bytes(), Some(put))
 }
 
 /// Writes a header and voxels, or one of them.
-fn put(
-    mut file: PartialFile,
-    header: &[u8],
-    volume: Option<&Volume>,
-    int16: bool,
-    path: &Path,
-) -> Result<(), VolumeError> {
+fn write_file(path: &Path, header: &[u8], put: Option<&PutVoxels<'_>>) -> Result<(), VolumeError> {
+    let mut file = PartialFile::create(path)?;
     let written = (|| -> io::Result<PartialFile> {
         file.write_all(header)?;
-        match volume {
+        match put {
             None => Ok(file),
-            Some(volume) => {
+            Some(put) => {
                 let mut gzip = GzipWriter::new(file)?;
-                put_hu(&mut gzip, volume, int16)?;
+                put(&mut gzip)?;
                 gzip.finish()
             }
         }
@@ -58,22 +63,28 @@ fn put(
     written.map_err(|source| VolumeError::Io { path: path.into(), action: "write", source })?.commit()
 }
 
-fn header(volume: &Volume, int16: bool, data_file: Option<&str>) -> String {
-    let grid = volume.grid();
-    let [nx, ny, nz] = grid.shape;
-    let rows = grid.affine.rows();
+/// The fields after the kinds of the axes.
+pub(super) const ENDING: &str = "endian: little\nencoding: gzip\n";
+
+/// The vectors of `space directions`, and the one of `space origin`.
+pub(super) fn geometry(affine: &Affine) -> (String, String) {
+    let rows = affine.rows();
     // Adding zero removes the sign of a negative zero.
     let column =
         |c: usize| format!("({:?},{:?},{:?})", -rows[0][c] + 0.0, -rows[1][c] + 0.0, rows[2][c] + 0.0);
-    let dtype = if int16 { "int16" } else { "float" };
+    ([column(0), column(1), column(2)].join(" "), column(3))
+}
+
+/// The header for voxels of a type on a grid. `data_file` names the file with the voxels, if they
+/// do not follow.
+fn header(grid: &Grid, dtype: &str, lines: &[String], data_file: Option<&str>) -> String {
+    let [nx, ny, nz] = grid.shape;
+    let (directions, origin) = geometry(&grid.affine);
     let mut header = format!(
         "NRRD0004\n# written by Cutis\ntype: {dtype}\ndimension: 3\nspace: left-posterior-superior\nsizes: {nx} {ny} {nz}\n\
-         space directions: {} {} {}\nkinds: domain domain domain\nendian: little\nencoding: gzip\nspace origin: {}\n",
-        column(0),
-        column(1),
-        column(2),
-        column(3)
+         space directions: {directions}\nkinds: domain domain domain\n{ENDING}space origin: {origin}\n"
     );
+    lines.iter().for_each(|line| header.extend([line, "\n"]));
     match data_file {
         Some(name) => header += &format!("data file: {name}\n"),
         // An empty line ends the header.

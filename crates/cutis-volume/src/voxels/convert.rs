@@ -57,6 +57,47 @@ impl VoxelType {
         }
     }
 
+    /// The value of `datatype` in a NIfTI header.
+    pub(crate) fn code(self) -> i16 {
+        match self {
+            Self::U8 => 2,
+            Self::I16 => 4,
+            Self::I32 => 8,
+            Self::F32 => 16,
+            Self::F64 => 64,
+            Self::I8 => 256,
+            Self::U16 => 512,
+            Self::U32 => 768,
+            Self::I64 => 1024,
+            Self::U64 => 1280,
+        }
+    }
+
+    /// The name of the type in an NRRD header.
+    pub(crate) fn nrrd_name(self) -> &'static str {
+        match self {
+            Self::F32 => "float",
+            Self::F64 => "double",
+            integer => integer.name(),
+        }
+    }
+
+    /// The name of the type in a MetaImage header.
+    pub(crate) fn meta_name(self) -> &'static str {
+        match self {
+            Self::U8 => "MET_UCHAR",
+            Self::I8 => "MET_CHAR",
+            Self::I16 => "MET_SHORT",
+            Self::U16 => "MET_USHORT",
+            Self::I32 => "MET_INT",
+            Self::U32 => "MET_UINT",
+            Self::I64 => "MET_LONG_LONG",
+            Self::U64 => "MET_ULONG_LONG",
+            Self::F32 => "MET_FLOAT",
+            Self::F64 => "MET_DOUBLE",
+        }
+    }
+
     /// The name of the type in NumPy.
     pub(crate) fn name(self) -> &'static str {
         match self {

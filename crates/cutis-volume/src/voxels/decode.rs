@@ -19,50 +19,34 @@ pub(crate) struct Layout {
     pub(crate) offset: u64,
 }
 
-/// Reads all voxels. `warnings` holds what was noticed in the header.
+/// A file whose header is decoded.
+pub(crate) struct Opened<'a> {
+    pub(crate) source: Source<'a>,
+    pub(crate) layout: Layout,
+    /// What was noticed in the header.
+    pub(crate) warnings: Vec<String>,
+    /// Lines of an NRRD header that describe segments.
+    pub(crate) segments: Vec<String>,
+}
+
+/// Reads all voxels as HU.
 ///
 /// # Errors
 /// [`VolumeError::Truncated`], [`VolumeError::TooLarge`], [`VolumeError::Range`],
 /// [`VolumeError::Infinite`] or [`VolumeError::Io`].
-pub(crate) fn decode(
-    mut source: Source<'_>,
-    layout: &Layout,
-    mut warnings: Vec<String>,
-) -> Result<Loaded, VolumeError> {
+pub(crate) fn decode(opened: Opened<'_>) -> Result<Loaded, VolumeError> {
+    let Opened { mut source, layout, mut warnings, .. } = opened;
     let path: PathBuf = source.path.clone();
-    let &Layout { shape, affine, dtype, .. } = layout;
+    let Layout { shape, affine, dtype, .. } = layout;
     let too_large = || VolumeError::TooLarge { path: path.clone(), shape };
-    let count = shape.iter().try_fold(1u64, |count, &n| count.checked_mul(n)).ok_or_else(too_large)?;
-    let bytes = count.checked_mul(dtype.bytes() as u64).ok_or_else(too_large)?;
-    let voxels = usize::try_from(count).map_err(|_| too_large())?;
-    source.expect(layout.offset, bytes)?;
-    source.skip_to(layout.offset, bytes)?;
-
     let mut converter = Converter::new(dtype, layout.big_endian, layout.scaling);
-    let mut reserved = 0usize;
-    let mut buffer = vec![0; PORTION.min(bytes as usize)];
-    let mut done = 0u64;
-    while done < bytes {
-        let wanted = PORTION.min((bytes - done) as usize);
-        let got = source.fill(&mut buffer[..wanted])?;
-        done += got as u64;
-        if got < wanted {
-            return Err(VolumeError::Truncated { path, expected_bytes: bytes, found_bytes: done });
+    each_portion(&mut source, &layout, |portion, reserve| {
+        if !reserve.is_none_or(|voxels| converter.reserve(voxels)) {
+            return Err(too_large());
         }
-        let received = (done / dtype.bytes() as u64) as usize;
-        if received > reserved {
-            // The size of an uncompressed file is known to suffice. For a compressed file, the
-            // reserved memory grows with the voxels received, so that a header with wrong sizes
-            // cannot make the program allocate too much.
-            let capacity =
-                if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
-            if !converter.reserve(capacity) {
-                return Err(too_large());
-            }
-            reserved = capacity;
-        }
-        converter.push(&buffer[..wanted]);
-    }
+        converter.push(portion);
+        Ok(())
+    })?;
     source.check_tail(&mut warnings)?;
     source.finish()?;
 
@@ -93,4 +77,67 @@ pub(crate) fn decode(
         converted.intercept as f32,
     )?;
     Ok(Loaded { volume, stats, dtype: dtype.name(), warnings })
+}
+
+/// Reads all voxels as they are, little-endian.
+///
+/// # Errors
+/// [`VolumeError::Truncated`], [`VolumeError::TooLarge`] or [`VolumeError::Io`].
+pub(crate) fn decode_raw(source: &mut Source<'_>, layout: &Layout) -> Result<Vec<u8>, VolumeError> {
+    let (path, size) = (source.path.clone(), layout.dtype.bytes());
+    let too_large = || VolumeError::TooLarge { path: path.clone(), shape: layout.shape };
+    let mut bytes: Vec<u8> = Vec::new();
+    each_portion(source, layout, |portion, reserve| {
+        if let Some(voxels) = reserve {
+            let more = voxels.saturating_mul(size).saturating_sub(bytes.len());
+            bytes.try_reserve_exact(more).map_err(|_| too_large())?;
+        }
+        let first = bytes.len();
+        bytes.extend_from_slice(portion);
+        if layout.big_endian {
+            bytes[first..].chunks_exact_mut(size).for_each(<[u8]>::reverse);
+        }
+        Ok(())
+    })?;
+    Ok(bytes)
+}
+
+/// Calls `visit(portion, reserve)` with the bytes of whole voxels. `reserve` is the number of
+/// voxels for which there should be memory from now on, if it has grown.
+fn each_portion(
+    source: &mut Source<'_>,
+    layout: &Layout,
+    mut visit: impl FnMut(&[u8], Option<usize>) -> Result<(), VolumeError>,
+) -> Result<(), VolumeError> {
+    let &Layout { shape, dtype, .. } = layout;
+    let too_large = || VolumeError::TooLarge { path: source.path.clone(), shape };
+    let count = shape.iter().try_fold(1u64, |count, &n| count.checked_mul(n)).ok_or_else(too_large)?;
+    let bytes = count.checked_mul(dtype.bytes() as u64).ok_or_else(too_large)?;
+    let voxels = usize::try_from(count).map_err(|_| too_large())?;
+    source.expect(layout.offset, bytes)?;
+    source.skip_to(layout.offset, bytes)?;
+    let mut reserved = 0usize;
+    let mut buffer = vec![0; PORTION.min(bytes as usize)];
+    let mut done = 0u64;
+    while done < bytes {
+        let wanted = PORTION.min((bytes - done) as usize);
+        let got = source.fill(&mut buffer[..wanted])?;
+        done += got as u64;
+        if got < wanted {
+            let path = source.path.clone();
+            return Err(VolumeError::Truncated { path, expected_bytes: bytes, found_bytes: done });
+        }
+        let received = (done / dtype.bytes() as u64) as usize;
+        let mut reserve = None;
+        if received > reserved {
+            // The size of an uncompressed file is known to suffice. For a compressed file, the
+            // reserved memory grows with the voxels received, so that a header with wrong sizes
+            // cannot make the program allocate too much.
+            reserved =
+                if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
+            reserve = Some(reserved);
+        }
+        visit(&buffer[..wanted], reserve)?;
+    }
+    Ok(())
 }

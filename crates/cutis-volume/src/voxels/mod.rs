@@ -8,8 +8,8 @@ mod source;
 mod text;
 
 pub(crate) use convert::VoxelType;
-pub(crate) use decode::{Layout, decode};
+pub(crate) use decode::{Layout, Opened, decode, decode_raw};
 pub(crate) use gzip::GzipWriter;
-pub(crate) use put::{fits_int16, put_hu};
+pub(crate) use put::{PutVoxels, fits_int16, put_hu};
 pub(crate) use source::{Compression, Observer, Source, again};
 pub(crate) use text::{header_error, lines, numbers, sizes};

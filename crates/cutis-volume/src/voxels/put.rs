@@ -7,6 +7,9 @@ use crate::Volume;
 /// Number of voxels converted to bytes at a time.
 const PORTION: usize = 1 << 16;
 
+/// Writes all voxels of a file to a sink.
+pub(crate) type PutVoxels<'a> = dyn Fn(&mut dyn Write) -> io::Result<()> + 'a;
+
 /// True if all HU are whole numbers within int16. Else they are written as 32-bit real numbers.
 pub(crate) fn fits_int16(volume: &Volume) -> bool {
     let whole = |hu: f32| hu == hu.trunc() && (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&hu);
@@ -15,7 +18,7 @@ pub(crate) fn fits_int16(volume: &Volume) -> bool {
 }
 
 /// Writes all voxels, little-endian, as int16 or as 32-bit real numbers.
-pub(crate) fn put_hu(sink: &mut impl Write, volume: &Volume, int16: bool) -> io::Result<()> {
+pub(crate) fn put_hu(sink: &mut dyn Write, volume: &Volume, int16: bool) -> io::Result<()> {
     let mut bytes = Vec::with_capacity(4 * PORTION);
     for portion in volume.voxels().chunks(PORTION) {
         bytes.clear();

@@ -4,6 +4,7 @@ mod awkward;
 #[cfg(feature = "dicom")]
 mod dicom;
 mod hostile;
+mod labels;
 mod phantom;
 mod round_trip;
 mod text_formats;
