@@ -101,6 +101,20 @@ pub enum SkinError {
         /// What makes a stroke in this format.
         expected: &'static str,
     },
+    /// A file for one path has several.
+    #[error(
+        "{path} has {count} paths, the first two are {} and {}; a cut needs a file with one",
+        places[0],
+        places[1]
+    )]
+    SeveralPaths {
+        /// Path of the file.
+        path: PathBuf,
+        /// Number of paths.
+        count: usize,
+        /// Places of the first two.
+        places: [Place; 2],
+    },
     /// A stroke has fewer than two points, or all of its points are equal.
     #[error(
         "{path}, {place}: the stroke has {points} points and is {length_mm} mm long; it needs two points that differ"

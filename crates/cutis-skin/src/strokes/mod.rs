@@ -1,5 +1,6 @@
 //! Strokes: polylines on the skin that show the direction of its tension, and their files.
 
+mod drawn_path;
 mod markups;
 mod text;
 
@@ -11,6 +12,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::Point3;
 
 use crate::SkinError;
+
+pub use drawn_path::DrawnPath;
 
 /// Strokes on the skin, from a file or from a program. Positions are RAS+ millimeters.
 ///
@@ -113,11 +116,7 @@ impl Strokes {
     /// [`SkinError::StrokeRead`] if the file cannot be read. The errors of [`Strokes::parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SkinError> {
         let path = path.as_ref();
-        let failed = |source| SkinError::StrokeRead { path: path.into(), source };
-        let mut bytes = Vec::new();
-        let file = File::open(path).map_err(failed)?;
-        file.take(Self::MAX_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
-        Self::parse(path, &bytes)
+        Self::parse(path, &bytes_of(path)?)
     }
 
     /// Reads strokes from the bytes of a file. `path` names it in messages.
@@ -130,20 +129,7 @@ impl Strokes {
     /// [`SkinError::NoStroke`] if there is no stroke.
     pub fn parse(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Self, SkinError> {
         let path = path.as_ref();
-        if bytes.len() > Self::MAX_BYTES {
-            return Err(too_many(path, "bytes", Self::MAX_BYTES));
-        }
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
-        let (polylines, warnings, expected) = if first == Some(&b'{') {
-            let (polylines, warnings) = markups::parse(path, bytes)?;
-            (polylines, warnings, "a markup of the type Curve, ClosedCurve or Line")
-        } else {
-            (text::parse(path, bytes)?, Vec::new(), "lines with the coordinates x y z in mm")
-        };
-        if polylines.is_empty() {
-            return Err(SkinError::NoStroke { path: path.into(), expected });
-        }
+        let (polylines, warnings) = polylines::<false>(path, bytes)?;
         Ok(Self { path: path.into(), polylines, warnings, reach_mm: None })
     }
 
@@ -200,6 +186,42 @@ impl Strokes {
 
     pub(crate) fn reach_mm(&self) -> Option<f64> {
         self.reach_mm
+    }
+}
+
+/// The bytes of a file, at most one more than [`Strokes::MAX_BYTES`].
+fn bytes_of(path: &Path) -> Result<Vec<u8>, SkinError> {
+    let failed = |source| SkinError::StrokeRead { path: path.into(), source };
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    file.take(Strokes::MAX_BYTES as u64 + 1).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// One or more polylines of a file of either format, and what was skipped. Lists of points count as
+/// polylines with `LISTS`.
+fn polylines<const LISTS: bool>(
+    path: &Path,
+    bytes: &[u8],
+) -> Result<(Vec<Polyline>, Vec<String>), SkinError> {
+    if bytes.len() > Strokes::MAX_BYTES {
+        return Err(too_many(path, "bytes", Strokes::MAX_BYTES));
+    }
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+    let (polylines, warnings, expected) = if first == Some(&b'{') {
+        let (polylines, warnings) = markups::parse::<LISTS>(path, bytes)?;
+        let expected = match LISTS {
+            false => "a markup of the type Curve, ClosedCurve or Line",
+            true => "a markup of the type Curve, ClosedCurve, Line or Fiducial",
+        };
+        (polylines, warnings, expected)
+    } else {
+        (text::parse(path, bytes)?, Vec::new(), "lines with the coordinates x y z in mm")
+    };
+    match polylines.is_empty() {
+        true => Err(SkinError::NoStroke { path: path.into(), expected }),
+        false => Ok((polylines, warnings)),
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod depth;
 mod directions;
+mod drawn_path;
 mod normals;
 mod real_data;
 mod shapes;

@@ -20,9 +20,13 @@ use values::{ControlPoints, Scalar, Units};
 /// The part of a schema's address that names the version whose keys this module knows.
 const SCHEMA: &str = "markups-schema-v1.";
 
-/// The strokes of a file, and warnings about skipped parts.
-pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Vec<Polyline>, Vec<String>), SkinError> {
-    let document: Document = serde_json::from_slice(bytes).map_err(|error| at_line(path, &error))?;
+/// The polylines of a file, and warnings about skipped parts. Lists of points count as polylines
+/// with `LISTS`.
+pub(super) fn parse<const LISTS: bool>(
+    path: &Path,
+    bytes: &[u8],
+) -> Result<(Vec<Polyline>, Vec<String>), SkinError> {
+    let document: Document<LISTS> = serde_json::from_slice(bytes).map_err(|error| at_line(path, &error))?;
     if let Some(schema) = document.schema.filter(|schema| !schema.to_lowercase().contains(SCHEMA)) {
         let problem = format!("`@schema` is {:?}; expected an address with {SCHEMA:?}", shortened(&schema));
         return Err(SkinError::StrokeFile { path: path.into(), line: 1, problem });
@@ -33,7 +37,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<(Vec<Polyline>, Vec<Str
         return Err(too_many(path, "points", Strokes::MAX_POINTS));
     }
     let polyline = |curve: Curve| Polyline::new(path, Place::Markup(curve.index), curve.points_mm);
-    Ok((curves.into_iter().map(polyline).collect::<Result<_, _>>()?, skipped.warnings()))
+    Ok((curves.into_iter().map(polyline).collect::<Result<_, _>>()?, skipped.warnings(LISTS)))
 }
 
 /// The error with its line as a number instead of text.
@@ -46,14 +50,14 @@ fn at_line(path: &Path, error: &serde_json::Error) -> SkinError {
 
 /// A file of markups.
 #[derive(Deserialize)]
-struct Document {
+struct Document<const LISTS: bool> {
     #[serde(rename = "@schema")]
     schema: Option<String>,
-    markups: Markups,
+    markups: Markups<LISTS>,
 }
 
-/// The strokes among the markups of a file.
-struct Markups {
+/// The polylines among the markups of a file. With `LISTS` a list of points is one, too.
+struct Markups<const LISTS: bool> {
     curves: Vec<Curve>,
     skipped: Skipped,
 }
@@ -74,12 +78,16 @@ struct Skipped {
 }
 
 impl Skipped {
-    fn warnings(self) -> Vec<String> {
+    fn warnings(self, lists: bool) -> Vec<String> {
         let mut warnings = Vec::new();
         if let Some((index, kind)) = self.first {
+            let (what, types) = match lists {
+                false => ("strokes", "Curve, ClosedCurve and Line"),
+                true => ("paths", "Curve, ClosedCurve, Line and Fiducial"),
+            };
             warnings.push(format!(
-                "{} markups are not strokes and were skipped, the first is markups[{index}] of the type {:?}; strokes are \
-                 of the types Curve, ClosedCurve and Line",
+                "{} markups are not {what} and were skipped, the first is markups[{index}] of the type {:?}; {what} are \
+                 of the types {types}",
                 self.markups,
                 shortened(&kind)
             ));
@@ -131,28 +139,29 @@ impl Markup {
     }
 }
 
-impl<'de> Deserialize<'de> for Markups {
+impl<'de, const LISTS: bool> Deserialize<'de> for Markups<LISTS> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_seq(MarkupsVisitor)
     }
 }
 
-struct MarkupsVisitor;
+struct MarkupsVisitor<const LISTS: bool>;
 
-impl<'de> Visitor<'de> for MarkupsVisitor {
-    type Value = Markups;
+impl<'de, const LISTS: bool> Visitor<'de> for MarkupsVisitor<LISTS> {
+    type Value = Markups<LISTS>;
 
     fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str("a list of markups")
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Markups, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Markups<LISTS>, A::Error> {
         let mut markups = Markups { curves: Vec::new(), skipped: Skipped::default() };
         for index in 0.. {
             let markup =
                 list.next_element::<Markup>().map_err(|error| in_element("markups", index, &error))?;
             let Some(markup) = markup else { break };
-            if !["Curve", "ClosedCurve", "Line"].contains(&markup.kind.as_str()) {
+            let kind = markup.kind.as_str();
+            if !(["Curve", "ClosedCurve", "Line"].contains(&kind) || (LISTS && kind == "Fiducial")) {
                 markups.skipped.markups += 1;
                 markups.skipped.first.get_or_insert((index, markup.kind));
                 continue;
