@@ -26,6 +26,21 @@ pub enum Space {
     Ras,
 }
 
+impl Space {
+    /// The name in mesh files.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Lps => "LPS",
+            Self::Ras => "RAS",
+        }
+    }
+
+    /// A vector in RAS axes in the axes of this frame.
+    pub(crate) fn of_ras(self, v: [f32; 3]) -> [f32; 3] {
+        if self == Self::Lps { [-v[0], -v[1], v[2]] } else { v }
+    }
+}
+
 /// A named array with one value per position or per cell. The name should include the unit: `hu`,
 /// `displacement_mm`.
 #[derive(Clone, Copy, Debug)]
@@ -214,10 +229,7 @@ impl<'a> MeshFile<'a> {
             Format::UnstructuredGrid => ("UnstructuredGrid", "Cells"),
             Format::PolyData => ("PolyData", "Polys"),
         };
-        let space = match self.space {
-            Space::Lps => "LPS",
-            Space::Ras => "RAS",
-        };
+        let space = self.space.name();
         let codes: Vec<String> = space.bytes().chain([0]).map(|byte| byte.to_string()).collect();
         let mut offset = 0usize;
         let mut array = |data_type: &str, name: &str, components: usize, count: usize, size: usize| {
@@ -274,8 +286,7 @@ impl<'a> MeshFile<'a> {
         let (points, cells) = (self.used.len(), self.connectivity.len() / self.corners);
         let length = |out: &mut dyn Write, bytes: usize| out.write_all(&(bytes as u64).to_le_bytes());
         let vector = |out: &mut dyn Write, v: [f32; 3]| {
-            let [x, y, z] = if self.space == Space::Lps { [-v[0], -v[1], v[2]] } else { v };
-            [x, y, z].iter().try_for_each(|c| out.write_all(&c.to_le_bytes()))
+            self.space.of_ras(v).iter().try_for_each(|c| out.write_all(&c.to_le_bytes()))
         };
         let used = || self.used.iter().map(|&point| point as usize);
         for data in self.piece.data {

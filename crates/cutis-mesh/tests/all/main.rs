@@ -17,3 +17,4 @@ mod sever;
 mod shell;
 mod skin;
 mod stitches;
+mod surface_files;
