@@ -8,6 +8,7 @@ use cutis::mesh::{SkinMode, Split};
 use cutis::render::Side;
 use cutis::scene::{Override, constraint_kinds};
 use cutis::volume::{ReadOptions, sample::LatticeSize};
+use cutis::{FieldDirection, ResampleInput};
 
 /// Cut a CT scan and watch skin tension open the wound.
 ///
@@ -124,7 +125,7 @@ pub(crate) enum Command {
         /// HU to add to every value of the file, as volume.offset_hu of a scene
         #[arg(long, value_name = "HU", default_value_t = 0.0, allow_negative_numbers = true)]
         offset_hu: f32,
-        /// Write the triangles (.vtu or .vtp)
+        /// Write the triangles (.vtu, .vtp, .ply or .stl)
         #[arg(long)]
         out: Option<PathBuf>,
         /// Print as JSON
@@ -147,16 +148,15 @@ pub(crate) enum Command {
         #[arg(long)]
         out: PathBuf,
     },
-    /// Deform another volume as a finished run deformed its CT
+    /// Deform another volume or a label map as a finished run deformed its CT
     Resample {
         /// Scene file of the run
         scene: PathBuf,
         /// Run folder; it must hold a checkpoint
         #[arg(long)]
         run: PathBuf,
-        /// Volume to deform, in the same world frame [default: the scene's own]
-        #[arg(long)]
-        volume: Option<PathBuf>,
+        #[command(flatten)]
+        input: ResampleArgs,
         /// File to write (.nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd)
         #[arg(long)]
         out: PathBuf,
@@ -234,6 +234,30 @@ impl VolumeArgs {
     }
 }
 
+/// What `cutis resample` deforms.
+#[derive(Clone, Debug, Group)]
+pub(crate) struct ResampleArgs {
+    /// Volume to deform, in the same world frame [default: the scene's own]
+    #[arg(long, conflicts_with_all = ["labels", "field"])]
+    volume: Option<PathBuf>,
+    /// Label map to deform, in the same world frame, with nearest neighbors; 0 where the body left
+    #[arg(long, conflicts_with = "field")]
+    labels: Option<PathBuf>,
+    /// Write the displacement field instead (.nrrd)
+    #[arg(long, value_parser = one_of(&DIRECTIONS))]
+    field: Option<FieldDirection>,
+}
+
+impl ResampleArgs {
+    pub(crate) fn input(self) -> ResampleInput {
+        match (self.labels, self.field) {
+            (Some(labels), _) => ResampleInput::Labels(labels),
+            (None, Some(direction)) => ResampleInput::Field(direction),
+            (None, None) => ResampleInput::Volume(self.volume),
+        }
+    }
+}
+
 /// Options of `cutis tune`.
 #[derive(Clone, Debug, Group)]
 pub(crate) struct TuneArgs {
@@ -293,6 +317,11 @@ const MODES: [Named<SkinMode>; 3] = [
 const SPLITS: [Named<Split>; 2] = [
     ("kuhn6", Split::Kuhn6, "Six tetrahedra around the main diagonal"),
     ("five", Split::Five, "Five tetrahedra, mirrored in every other cell"),
+];
+
+const DIRECTIONS: [Named<FieldDirection>; 2] = [
+    ("to-rest", FieldDirection::ToRest, "From the deformed body to the scan, as ITK resamples images"),
+    ("from-rest", FieldDirection::FromRest, "From the scan to the deformed body, for points and models"),
 ];
 
 const SIDES: [Named<Side>; 6] = [

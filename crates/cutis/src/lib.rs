@@ -55,7 +55,7 @@ pub use cost::{CostPart, CostReport, Plan, check};
 pub use ct::{FolderInspection, Inspection, Series, convert, inspect, inspect_folder};
 pub use error::Error;
 pub use model::{ScanTension, SceneCt, SceneSystem, build_system, build_system_and_ct};
-pub use output::{ResampleRequest, report, resample_run};
+pub use output::{FieldDirection, ResampleInput, ResampleRequest, report, resample_run};
 pub use progress::{Progress, Silent};
 pub use run::files::RunFolder;
 #[cfg(feature = "gpu")]

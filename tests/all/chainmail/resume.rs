@@ -1,6 +1,6 @@
 //! A resumed chain equals one that was never stopped.
 
-use cutis::{ResampleRequest, Silent};
+use cutis::{ResampleInput, ResampleRequest, Silent};
 
 use super::*;
 use crate::scenes::{frames, run_in};
@@ -72,7 +72,7 @@ fn another_volume_can_be_resampled_with_the_checkpoint() {
     let scene = chain(&[("output", "{ volume = true }"), INCISION, ASIDE]);
     let run = Run::of(&scene);
     let out = run.path("again.nii.gz");
-    let request = ResampleRequest { run: run.folder().into(), volume: None, out };
+    let request = ResampleRequest { run: run.folder().into(), input: ResampleInput::Volume(None), out };
     let found = cutis::resample_run(&scene, &request, &Silent).unwrap();
     assert!(run.bytes("again.nii.gz") == run.bytes("deformed.nii.gz"));
     let chainmail = run.report.resample.as_ref().unwrap();

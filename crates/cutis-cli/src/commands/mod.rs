@@ -20,8 +20,8 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
         Command::Settle { scene, out, change, json } => simulate::settle(&scene, out, &change, json),
         Command::Check { scene, change, lattice, json } => simulate::check(&scene, &change, lattice, json),
         Command::Tune { scene, tune: args, change, json } => tune::tune(&scene, &change, &args, json),
-        Command::Resample { scene, run, volume, out, change } => {
-            simulate::resample(&scene, &change, cutis::ResampleRequest { run, volume, out })
+        Command::Resample { scene, run, input, out, change } => {
+            simulate::resample(&scene, &change, cutis::ResampleRequest { run, input: input.input(), out })
         }
         Command::Inspect { volume, json } => look::inspect(&volume, json),
         Command::Convert { volume, out } => look::convert(&volume, &out),

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use cutis_mesh::vtk::{self, Cells, Piece, Space};
-use cutis_mesh::{Frame, Lattice, Skin, SkinMode, SkinOptions, SkinReport, Split, skin};
+use cutis_mesh::{
+    Frame, Lattice, Skin, SkinMode, SkinOptions, SkinReport, Split, Surface, skin, write_ply, write_stl,
+};
 use cutis_volume::sample::LatticeSize;
 use cutis_volume::{ReadOptions, sample};
 use nalgebra::Point3;
@@ -27,7 +29,8 @@ pub struct SkinRequest {
     pub offset_hu: f32,
 }
 
-/// Finds the skin of a volume file. If `out` is given, writes its triangles (`.vtu` or `.vtp`).
+/// Finds the skin of a volume file. If `out` is given, writes its triangles (`.vtu`,
+/// `.vtp`, `.ply` or `.stl`).
 ///
 /// # Errors
 /// [`Error`] for a volume that cannot be read or has no skin, a lattice that does not fit, or a
@@ -65,10 +68,10 @@ pub fn find_skin(
 
 fn check_extension(path: &Path) -> Result<(), Error> {
     match path.extension().and_then(|e| e.to_str()) {
-        Some("vtu" | "vtp") => Ok(()),
+        Some("vtu" | "vtp" | "ply" | "stl") => Ok(()),
         _ => Err(Error::Request {
             what: format!("--out {}", path.display()),
-            why: "must end in .vtu or .vtp".into(),
+            why: "must end in .vtu, .vtp, .ply or .stl".into(),
         }),
     }
 }
@@ -86,12 +89,14 @@ fn write(path: &Path, lattice: &Lattice, skin: &Skin) -> Result<(), Error> {
     let triangles: Vec<[u32; 3]> = skin.triangles.iter().map(|triangle| triangle.map(number)).collect();
     let cells = Cells::Triangles(&triangles);
     let piece = Piece { frame: &frame, positions: &positions, cells, data: &[], cell_data: &[] };
-    if path.extension().is_some_and(|e| e == "vtp") {
-        vtk::write_vtp(path, Space::default(), &piece)?;
-    } else {
-        vtk::write_vtu(path, Space::default(), &piece)?;
-    }
-    Ok(())
+    let surface = Surface { frame: &frame, positions: &positions, triangles: &triangles };
+    let space = Space::default();
+    Ok(match path.extension().and_then(|extension| extension.to_str()) {
+        Some("vtp") => vtk::write_vtp(path, space, &piece),
+        Some("ply") => write_ply(path, space, &surface),
+        Some("stl") => write_stl(path, space, &surface),
+        _ => vtk::write_vtu(path, space, &piece),
+    }?)
 }
 
 #[cfg(test)]

@@ -105,6 +105,9 @@ pub(crate) fn needs_skin(scene: &Scene) -> bool {
         || smooth_skin(scene)
         || scene.cuts()
         || scene.output.surface
+        || scene.output.series_every > 0
+        || scene.output.ply
+        || scene.output.stl
         || scene.output.pictures
         || scene.used_materials().is_some_and(TissueMaterials::name_depth)
 }

@@ -26,7 +26,13 @@ pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
             "volume: the CT is resampled for the pictures only and not written",
         ),
         (!output.surface, "surface: skin.vtu is not written"),
+        (output.series_every == 0, "series: the skin is not written after frames"),
+        (!(output.ply || output.stl), "ply, stl: no surface without data is written"),
         (!output.tissue, "tissue: tissue.vtu is not written"),
+        (
+            !(output.displacement || output.displacement_forward),
+            "displacement: no displacement field is computed",
+        ),
         (!output.pictures, "pictures: nothing is rendered"),
         (!output.report, "report: report.json, report.html and frames.csv are not written"),
         (!backend.on_gpu(), &gpu),

@@ -1,6 +1,7 @@
 //! The files that a run writes: the deformed CT, surfaces, pictures and the report. An output that
 //! the scene does not name is not computed.
 
+mod displacement;
 pub(crate) mod html;
 mod pictures;
 pub mod report;
@@ -18,6 +19,7 @@ mod wound_place;
 use std::path::Path;
 
 use cutis_mesh::vtk::{self, Cells, DataArray, Piece, Space, Values};
+use cutis_mesh::{MeshError, Surface, write_ply, write_stl};
 use cutis_volume::{Volume, nifti};
 use nalgebra::Point3;
 
@@ -28,6 +30,7 @@ use crate::run::clock::Clock;
 use crate::run::files::{self, RunFolder};
 use crate::scene::{OutputSection, Scene};
 
+use displacement::write_field;
 use html::Figure;
 use pictures::Pictures;
 use report::Resample;
@@ -35,7 +38,8 @@ use skin_lines::SkinLines;
 use slices::SlicePair;
 use warp::BodyWarp;
 
-pub use resample_run::{ResampleRequest, resample_run};
+pub use displacement::FieldDirection;
+pub use resample_run::{ResampleInput, ResampleRequest, resample_run};
 
 /// A deformed body, and the data from which its files are made.
 pub(crate) struct DeformedBody<'a> {
@@ -78,15 +82,28 @@ pub(crate) fn write(
     if output.surface {
         clock.stage("write skin.vtu", 0, |_| write_skin(&folder.skin(), deformed))?;
     }
+    for (named, path, write) in
+        [(output.ply, folder.ply(), write_ply as SurfaceWriter), (output.stl, folder.stl(), write_stl)]
+    {
+        if named {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            clock.stage(&format!("write {name}"), 0, |_| write_surface(&path, deformed, write))?;
+        }
+    }
     if output.tissue {
         clock.stage("write tissue.vtu", 0, |_| write_tissue(&folder.tissue(), deformed))?;
     }
     let mut results = OutputResults::default();
-    if !(output.volume || output.pictures) {
+    let resamples = output.volume || output.pictures;
+    if !(resamples || output.displacement || output.displacement_forward) {
         return Ok(results);
     }
     let DeformedBody { body, positions, on_device, scene, frames, .. } = *deformed;
     let warp = BodyWarp::new(body, positions, last_cut_s(scene, frames), on_device, stages)?;
+    write_fields(deformed, &warp, output, folder, clock)?;
+    if !resamples {
+        return Ok(results);
+    }
     let (volume, found) = clock.stage_placed("resample the CT", 0, |progress| {
         Ok((warp.apply(deformed.ct, stages, progress)?, stages.place()))
     })?;
@@ -113,6 +130,31 @@ pub(crate) fn write(
     Ok(results)
 }
 
+/// Writes the displacement fields that the section names, on the grid of the CT.
+fn write_fields(
+    deformed: &DeformedBody<'_>,
+    warp: &BodyWarp,
+    output: &OutputSection,
+    folder: &RunFolder,
+    clock: &mut Clock<'_>,
+) -> Result<(), Error> {
+    let grid = deformed.ct.grid();
+    if output.displacement {
+        clock.stage("write displacement.nrrd", 0, |progress| {
+            let direction = FieldDirection::ToRest;
+            let written = write_field(&folder.displacement(), grid, warp, direction, progress)?;
+            Ok(written.coverage.write(folder.coverage())?)
+        })?;
+    }
+    if output.displacement_forward {
+        clock.stage("write displacement-forward.nrrd", 0, |progress| {
+            let path = folder.displacement_forward();
+            write_field(&path, grid, warp, FieldDirection::FromRest, progress).map(drop)
+        })?;
+    }
+    Ok(())
+}
+
 /// Writes the skin of the whole body, including the inactive skin outside a region of interest. The
 /// skin of a membrane also has its lines of tension in the scan.
 fn write_skin(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
@@ -123,6 +165,17 @@ fn write_skin(path: &Path, deformed: &DeformedBody<'_>) -> Result<(), Error> {
     let lines = SkinLines::of(body, deformed.scene);
     let cell_data = lines.as_ref().map(SkinLines::arrays).unwrap_or_default();
     write_mesh(path, body, [&rest, &now], &hu, Cells::Triangles(&triangles), &cell_data)
+}
+
+/// Writes a surface in one of the formats without data.
+type SurfaceWriter = fn(&Path, Space, &Surface<'_>) -> Result<(), MeshError>;
+
+/// Writes the skin of the whole body without data, in the frame of 3D Slicer.
+fn write_surface(path: &Path, deformed: &DeformedBody<'_>, write: SurfaceWriter) -> Result<(), Error> {
+    let body = deformed.body;
+    let (positions, triangles) = body.whole_skin(deformed.positions);
+    let surface = Surface { frame: &body.mesh.frame, positions: &positions, triangles: &triangles };
+    Ok(write(path, Space::Lps, &surface)?)
 }
 
 /// Writes the tetrahedra of the body.

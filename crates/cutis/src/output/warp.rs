@@ -44,6 +44,11 @@ impl BodyWarp {
         })
     }
 
+    /// The deformation for the resampler.
+    pub(super) fn warp(&self) -> Warp<'_> {
+        self.mesh.warp(&self.deformed)
+    }
+
     /// Two opposite corners of a box in mm, along the axes of the patient, that holds all walls of
     /// wounds at rest and deformed. `None` without a wound.
     pub(crate) fn walls_mm(&self) -> Option<[Point3<f64>; 2]> {

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use cutis_volume::{PartialFile, VolumeError};
 use sha2::{Digest, Sha256};
 
+use super::series;
 use crate::Error;
 use crate::scene::OutputSection;
 
@@ -101,8 +102,22 @@ paths! {
     volume = "deformed.nii.gz";
     /// The deformed skin.
     skin = "skin.vtu";
+    /// The list of the files of a time series.
+    series = "skin.pvd";
+    /// The folder with the files of a time series.
+    series_folder = "skin-series";
+    /// The deformed skin without data.
+    ply = "skin.ply";
+    /// The same in another format.
+    stl = "skin.stl";
     /// The deformed tetrahedra.
     tissue = "tissue.vtu";
+    /// The displacement from the deformed shape to the rest shape.
+    displacement = "displacement.nrrd";
+    /// What covers each voxel of the deformed CT.
+    coverage = "displacement-coverage.nrrd";
+    /// The displacement from the rest shape to the deformed shape.
+    displacement_forward = "displacement-forward.nrrd";
     /// One line per frame.
     frames = "frames.csv";
     /// The skin before.
@@ -128,7 +143,13 @@ impl RunFolder {
             (output.report, self.frames()),
             (output.volume, self.volume()),
             (output.surface, self.skin()),
+            (output.series_every > 0, self.series()),
+            (output.ply, self.ply()),
+            (output.stl, self.stl()),
             (output.tissue, self.tissue()),
+            (output.displacement, self.displacement()),
+            (output.displacement, self.coverage()),
+            (output.displacement_forward, self.displacement_forward()),
             (output.pictures, self.before()),
             (output.pictures, self.after()),
             (output.pictures, self.slice()),
@@ -140,10 +161,8 @@ impl RunFolder {
     /// Names of existing files that a run with these outputs does not write, and that no report in
     /// the folder lists. They may belong to the user.
     pub(crate) fn stale_files(&self, output: &OutputSection, has_lines: bool) -> Vec<String> {
-        let everything =
-            OutputSection { report: true, volume: true, surface: true, tissue: true, pictures: true };
         let (written, earlier) = (self.written(output, has_lines), self.of_earlier_run());
-        let stale = self.written(&everything, true).into_iter();
+        let stale = self.written(&OutputSection::ALL, true).into_iter();
         stale
             .filter(|path| path.exists() && !written.contains(path) && !earlier.contains(path))
             .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
@@ -163,6 +182,9 @@ impl RunFolder {
         let earlier = self.of_earlier_run();
         let (of_report, others): (Vec<_>, Vec<_>) =
             earlier.into_iter().partition(|path| report.contains(path));
+        if output.series_every == 0 && others.contains(&self.series()) {
+            series::remove(self)?;
+        }
         // The report goes last: until then it says which files are those of the earlier run.
         for path in others.iter().filter(|path| !written.contains(path)).chain(&of_report) {
             match fs::remove_file(path) {
@@ -198,10 +220,8 @@ mod tests {
     fn only_files_that_a_report_of_cutis_lists_are_removed() {
         let here = tempfile::tempdir().unwrap();
         let folder = RunFolder(here.path().into());
-        let (all, none) = (
-            OutputSection { report: true, volume: true, surface: false, tissue: false, pictures: false },
-            OutputSection { report: false, volume: false, surface: false, tissue: false, pictures: false },
-        );
+        let (all, none) =
+            (OutputSection { report: true, volume: true, ..OutputSection::NONE }, OutputSection::NONE);
         let put = |schema: &str| {
             let report = serde_json::json!({ "schema": schema, "scene": { "output": all } });
             fs::write(folder.report(), report.to_string()).unwrap();

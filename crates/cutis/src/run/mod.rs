@@ -13,6 +13,7 @@ mod history;
 mod peak_memory;
 pub(crate) mod prepare;
 mod run_loop;
+mod series;
 mod simulate;
 mod stops;
 mod summary;
@@ -222,8 +223,8 @@ mod tests {
         let hu_in_piece = |frame: u32| {
             Checkpoint { frame, ..saved.clone() }.write(&path, &fingerprint).unwrap();
             let out = folder.path().join("out.nii.gz");
-            let request =
-                crate::ResampleRequest { run: folder.path().into(), volume: None, out: out.clone() };
+            let input = crate::ResampleInput::Volume(None);
+            let request = crate::ResampleRequest { run: folder.path().into(), input, out: out.clone() };
             crate::resample_run(&loaded, &request, &crate::Silent).unwrap();
             let volume = cutis_volume::nifti::read(&out).unwrap().volume;
             let from_middle = |voxel: &usize| {

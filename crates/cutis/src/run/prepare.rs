@@ -41,12 +41,17 @@ pub(crate) fn prepare(
     Ok(Prepared { source, body, model, backend, plan })
 }
 
-/// Refuses to write a volume whose axes are not at right angles, which NIfTI readers do not expect.
+/// Refuses to write a volume whose axes are not at right angles, which readers do not expect.
 fn refuse_sheared(loaded: &LoadedScene, source: &Source) -> Result<(), Error> {
-    if !(loaded.scene.output.volume && source.volume.grid().affine.is_sheared()) {
-        return Ok(());
-    }
+    let output = &loaded.scene.output;
+    let on_grid = [
+        (output.volume, "output.volume"),
+        (output.displacement, "output.displacement"),
+        (output.displacement_forward, "output.displacement_forward"),
+    ];
+    let named = on_grid.iter().find(|(named, _)| *named);
+    let Some((_, key)) = named.filter(|_| source.volume.grid().affine.is_sheared()) else { return Ok(()) };
     let why = "cannot be written: the axes of the CT are not at right angles; volume.resample = true \
                resamples it to perpendicular axes; or leave this output out";
-    Err(loaded.file().bad_key("output.volume", "true", why))
+    Err(loaded.file().bad_key(key, "true", why))
 }

@@ -11,6 +11,7 @@ use super::checkpoint::Checkpoint;
 use super::clock::Clock;
 use super::files::RunFolder;
 use super::frames::FrameRow;
+use super::series::Series;
 use super::stops::{SEARCH, SearchBar, Settled, Stop};
 use super::timing::{PartTimes, Timing};
 use crate::backend::{DeviceMeter, DevicePositions};
@@ -38,6 +39,9 @@ pub(super) struct RunLoop<'a> {
     /// Whether an output needs the final positions on the GPU.
     pub(super) resamples: bool,
     pub(super) device: Option<&'a DeviceMeter>,
+    pub(super) series: Option<Series<'a>>,
+    /// Duration of a frame, s.
+    pub(super) dt_s: f64,
 }
 
 /// The result of the frames.
@@ -84,6 +88,12 @@ impl RunLoop<'_> {
         if rows.is_empty() {
             rows.push(self.row(simulation, &lips, self.done(), None)?);
         }
+        if let Some(series) = &self.series {
+            series.begin(self.resumed.is_some())?;
+            if self.resumed.is_none() {
+                series.frame(simulation, 0, self.run.frames)?;
+            }
+        }
         if let Some(recorder) = &mut recorder {
             recorder.start(&rows[0], self.resumed);
             if let (0, Some(_), Some(last)) = (self.count(), self.resumed, rows.last()) {
@@ -110,6 +120,9 @@ impl RunLoop<'_> {
             let (settled, ended) = self.settle(simulation, &lips, recorder, clock)?;
             (Some(settled), ended)
         };
+        if let Some(series) = &self.series {
+            series.finish(self.run.frames, self.dt_s)?;
+        }
         if self.count() > 0 {
             self.time_extra_frame(simulation, &mut times);
         }
@@ -195,6 +208,9 @@ impl RunLoop<'_> {
                 recorder.frame(simulation, &row)?;
             }
             rows.push(row);
+            if let Some(series) = &self.series {
+                series.frame(simulation, frame, frames)?;
+            }
             if every > 0 && (frame % every == 0 || frame == frames) {
                 let saved = Checkpoint { history: rows.clone(), ..simulation.save(frame)? };
                 saved.write(&self.folder.checkpoint(), &self.fingerprint)?;

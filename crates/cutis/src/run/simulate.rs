@@ -8,6 +8,7 @@ use super::clock::Clock;
 use super::files::{self, RunFolder};
 use super::frames::FrameRow;
 use super::run_loop::{RunLoop, RunResult};
+use super::series::Series;
 use super::stops::Stop;
 use super::timing::Timing;
 use crate::backend::{Chosen, DeviceMeter};
@@ -77,6 +78,8 @@ pub(super) fn simulate(
         },
         resamples: scene.output.volume || scene.output.pictures,
         device: device.as_ref(),
+        series: Series::of(folder, body, scene.output.series_every),
+        dt_s: scene.solver.dt_s,
     };
     let rests = if scene.run.until == RunEnd::Rest { 1 + run_loop.stops.len() } else { 0 };
     let mut recorder = match scene.output.report {

@@ -18,7 +18,7 @@ use crate::body::even_shape;
 use crate::output::{self, DeformedBody};
 use crate::report::{KindResidual, Stage};
 use crate::run::clock::Clock;
-use crate::scene::{LatticeSection, Scene};
+use crate::scene::{LatticeSection, OutputSection, Scene};
 use crate::{Error, Progress};
 
 /// Factors by which coarser lattices are tried.
@@ -118,7 +118,7 @@ impl Baseline<'_> {
     /// Cost of each output, from writing all of them once.
     fn outputs(&self, clock: &mut Clock<'_>) -> Result<Vec<Omission>, Error> {
         let output = &self.loaded.scene.output;
-        if !(output.volume || output.surface || output.tissue || output.pictures) {
+        if *output == (OutputSection { report: output.report, ..OutputSection::NONE }) {
             return Ok(Vec::new());
         }
         let scratch = Scratch::new(&std::env::temp_dir())?;
@@ -138,9 +138,23 @@ impl Baseline<'_> {
             clock.stages[before..].iter().filter(named).map(|stage| stage.ms).sum()
         };
         let resample = |shared: bool| if shared { "" } else { "resample the CT" };
-        let list: [(bool, &str, f64, &[PathBuf]); 4] = [
+        let list: [(bool, &str, f64, &[PathBuf]); 8] = [
             (output.surface, "surface", ms(&["write skin.vtu"]), &[scratch.0.skin()]),
+            (output.ply, "ply", ms(&["write skin.ply"]), &[scratch.0.ply()]),
+            (output.stl, "stl", ms(&["write skin.stl"]), &[scratch.0.stl()]),
             (output.tissue, "tissue", ms(&["write tissue.vtu"]), &[scratch.0.tissue()]),
+            (
+                output.displacement,
+                "displacement",
+                ms(&["write displacement.nrrd"]),
+                &[scratch.0.displacement(), scratch.0.coverage()],
+            ),
+            (
+                output.displacement_forward,
+                "displacement_forward",
+                ms(&["write displacement-forward.nrrd"]),
+                &[scratch.0.displacement_forward()],
+            ),
             (
                 output.volume,
                 "volume",

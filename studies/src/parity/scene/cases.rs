@@ -20,8 +20,7 @@ impl SceneCase {
     fn new(name: &str, mut loaded: LoadedScene, frames: u32, volume: bool) -> Self {
         loaded.scene.run.frames = frames;
         loaded.scene.run.checkpoint_every = frames;
-        loaded.scene.output =
-            OutputSection { volume, surface: false, tissue: false, pictures: false, report: false };
+        loaded.scene.output = OutputSection { volume, ..OutputSection::NONE };
         Self { name: name.into(), loaded }
     }
 }

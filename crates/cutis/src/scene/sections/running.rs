@@ -114,9 +114,29 @@ pub struct OutputSection {
     /// tension in the scan.
     #[serde(default)]
     pub surface: bool,
+    /// `skin.pvd` and the folder `skin-series`: the skin before the first frame, after every so
+    /// many frames and after the last one, as a time series for ParaView; 0 writes none. A state of
+    /// rest has no time and is not part of it.
+    #[serde(default)]
+    pub series_every: u32,
+    /// `skin.ply`: the deformed skin without data, LPS, mm.
+    #[serde(default)]
+    pub ply: bool,
+    /// `skin.stl`: the same as STL.
+    #[serde(default)]
+    pub stl: bool,
     /// `tissue.vtu`: the deformed tetrahedra.
     #[serde(default)]
     pub tissue: bool,
+    /// `displacement.nrrd`: for each voxel of the deformed CT the way to its place at rest, as ITK
+    /// and 3D Slicer resample with it, and `displacement-coverage.nrrd`: where the field is that of
+    /// the body (1), where the body has left (2), and everything else (0).
+    #[serde(default)]
+    pub displacement: bool,
+    /// `displacement-forward.nrrd`: for each voxel at rest the way to its place in the deformed
+    /// body, for points and models.
+    #[serde(default)]
+    pub displacement_forward: bool,
     /// `before.png`, `after.png`, `slice.png`. With directions of `constraints.membrane` also
     /// `tension.png`, the lines of tension on the skin.
     #[serde(default)]
@@ -126,8 +146,30 @@ pub struct OutputSection {
     pub report: bool,
 }
 
+impl OutputSection {
+    /// No output.
+    pub const NONE: Self = Self::each(false);
+    /// Every output.
+    pub const ALL: Self = Self::each(true);
+
+    const fn each(written: bool) -> Self {
+        Self {
+            volume: written,
+            surface: written,
+            series_every: written as u32,
+            ply: written,
+            stl: written,
+            tissue: written,
+            displacement: written,
+            displacement_forward: written,
+            pictures: written,
+            report: written,
+        }
+    }
+}
+
 impl Default for OutputSection {
     fn default() -> Self {
-        Self { volume: true, surface: true, tissue: false, pictures: true, report: true }
+        Self { volume: true, surface: true, pictures: true, report: true, ..Self::NONE }
     }
 }
