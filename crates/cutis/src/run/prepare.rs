@@ -37,7 +37,8 @@ pub(crate) fn prepare(
     let input = ModelInput { file: loaded.file(), scene, body: &body };
     let model = model::build(&input, clock)?;
     let costs = model.costs(&input, request)?;
-    let (plan, backend) = Plan::new(scene, &source, &body, costs);
+    let (mut plan, backend) = Plan::new(scene, &source, &body, costs);
+    plan.warnings.extend_from_slice(&loaded.notes);
     Ok(Prepared { source, body, model, backend, plan })
 }
 

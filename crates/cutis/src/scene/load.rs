@@ -46,6 +46,8 @@ pub struct LoadedScene {
     pub text: String,
     /// Where the steps of the scene went.
     pub(crate) steps: Steps,
+    /// What was skipped in the files that the scene names.
+    pub(crate) notes: Vec<String>,
 }
 
 impl LoadedScene {
@@ -84,12 +86,13 @@ impl SceneFile<'_> {
 }
 
 impl Scene {
-    /// Reads a scene file, applies `overrides` in order, resolves the volume's path and checks
-    /// every value.
+    /// Reads a scene file, applies `overrides` in order, resolves the paths of other files, reads
+    /// the paths of cuts from them and checks every value.
     ///
     /// # Errors
     /// [`Error::SceneFile`] if the file cannot be read, [`Error::SceneSyntax`] if it is not TOML,
-    /// [`Error::SceneKey`] for an unknown key, a wrong type or a value out of range.
+    /// [`Error::SceneKey`] for an unknown key, a wrong type or a value out of range,
+    /// [`Error::SceneSection`] for the path of a cut that cannot be read from its file.
     pub fn load(file: &Path, overrides: &[Override]) -> Result<LoadedScene, Error> {
         let read = |why: std::io::Error| Error::SceneFile { file: file.into(), why: why.to_string() };
         let mut bytes = Vec::new();
@@ -154,7 +157,9 @@ impl Scene {
         })?;
         crate::model::fill_defaults(&mut scene);
         super::pick_region::fill(&mut scene);
-        scene.validate(SceneFile { file, steps: &steps })?;
+        let of_scene = SceneFile { file, steps: &steps };
+        let notes = super::markups::fill(&mut scene, of_scene, directory, overrides)?;
+        scene.validate(of_scene)?;
         // Paths in a scene start from its folder, and paths in an override from the present one.
         let strokes =
             scene.constraints.membrane.as_mut().and_then(|skin| skin.directions.as_mut()?.strokes.as_mut());
@@ -167,7 +172,7 @@ impl Scene {
                 *path = directory.join(&*path);
             }
         }
-        Ok(LoadedScene { scene, file: file.into(), text: text.into(), steps })
+        Ok(LoadedScene { scene, file: file.into(), text: text.into(), steps, notes })
     }
 }
 

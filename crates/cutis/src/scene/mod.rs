@@ -10,6 +10,7 @@
 mod choice;
 mod demo;
 mod load;
+mod markups;
 mod pick_region;
 mod reference;
 mod sections;

@@ -50,7 +50,7 @@ impl Scene {
             let (key, shown) = (key(name), format!("{:?}", end.unwrap_or_default()));
             let why = "must be left out next to path_mm, whose points hold the ends";
             check.require(end.is_none() || path_mm.is_empty(), &key, shown, why)?;
-            let why = "is missing: give from_mm and to_mm, or path_mm";
+            let why = "is missing: give from_mm and to_mm, path_mm, or markups";
             check.require(end.is_some() || !path_mm.is_empty(), &key, "", why)?;
             end.map_or(Ok(()), |end| check.point(&key, end))?;
         }

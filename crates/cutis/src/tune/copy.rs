@@ -60,8 +60,15 @@ impl<'a> SceneCopy<'a> {
 fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<String, String> {
     let plain = |e: &dyn std::fmt::Display| e.to_string();
     let value = |scene: &Scene| toml::Table::try_from(comparable(scene)).map_err(|e| plain(&e));
-    let written = Scene::parse(&loaded.text, &loaded.file, Path::new(""), &[]).map_err(|e| plain(&e))?.scene;
     let mut document: DocumentMut = loaded.text.parse().map_err(|e| plain(&e))?;
+    let home = loaded.file.parent().unwrap_or(Path::new(""));
+    let mut anywhere = document.clone();
+    make_markups_absolute(&mut anywhere, home)?;
+    let written = Scene::parse(&anywhere.to_string(), &loaded.file, Path::new(""), &[]);
+    let written = written.map_err(|e| plain(&e))?.scene;
+    if absolute(home) != absolute(directory) {
+        make_markups_absolute(&mut document, home)?;
+    }
     change(document.as_table_mut(), &value(&written)?, &value(wanted)?);
 
     let read = |document: &DocumentMut| Scene::parse(&document.to_string(), &loaded.file, directory, &[]);
@@ -77,6 +84,28 @@ fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<Stri
         return Err("the edited scene has other values than intended; this is a bug in cutis".into());
     }
     Ok(document.to_string())
+}
+
+/// Makes the names of files with the paths of cuts absolute. `home` is the folder of the scene.
+fn make_markups_absolute(document: &mut DocumentMut, home: &Path) -> Result<(), String> {
+    for list in ["incision", "excision", "step"] {
+        let Some(entries) = document.get_mut(list) else { continue };
+        let tables: Vec<&mut dyn TableLike> = match entries {
+            Item::ArrayOfTables(list) => list.iter_mut().map(|table| table as &mut dyn TableLike).collect(),
+            Item::Value(Value::Array(list)) => {
+                let tables = list.iter_mut().filter_map(Value::as_inline_table_mut);
+                tables.map(|table| table as &mut dyn TableLike).collect()
+            }
+            _ => continue,
+        };
+        for table in tables {
+            let Some(item) = table.get_mut("markups") else { continue };
+            let Some(name) = item.as_str().map(Path::new).filter(|name| name.is_relative()) else { continue };
+            let path = absolute(&home.join(name));
+            *item = toml_edit::value(path.to_str().ok_or("the path of the markups is not Unicode")?);
+        }
+    }
+    Ok(())
 }
 
 /// The scene without what may differ between two files that describe it.

@@ -1,5 +1,7 @@
 //! The sections that cut the body: incisions, underminings, excisions.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -10,16 +12,21 @@ pub struct IncisionSection {
     /// Name, by which underminings and sutures refer to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// One end, on or near the skin, mm. Left out with `path_mm`.
+    /// One end, on or near the skin, mm. Left out with `path_mm` and `markups`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_mm: Option<[f64; 3]>,
-    /// The other end, mm. Left out with `path_mm`.
+    /// The other end, mm. Left out with `path_mm` and `markups`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_mm: Option<[f64; 3]>,
     /// Two or more points on or near the skin, mm, in place of `from_mm` and `to_mm`. The incision
     /// runs straight from each point to the next.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub path_mm: Vec<[f64; 3]>,
+    /// File with the path, in place of points: a curve, a line or a list of points of 3D Slicer
+    /// (`.mrk.json`), or text with one point `x y z` per line. The name starts from the folder of
+    /// the scene. The points are read with the scene and stand in `path_mm` of the report.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub markups: Option<PathBuf>,
     /// Depth below the skin, mm.
     pub depth_mm: f64,
     /// Width of the strip of tissue that is removed, mm, as in the paper. Left out: the cut has no
@@ -94,8 +101,13 @@ pub struct ExcisionSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Points of the outline on or near the skin, mm: three or more, and the first one again at the
-    /// end.
+    /// end. Left out with `markups`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub path_mm: Vec<[f64; 3]>,
+    /// File with the outline, in place of points, as for an incision: a closed curve of 3D Slicer,
+    /// or a path that ends where it began.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub markups: Option<PathBuf>,
     /// Depth below the skin, mm.
     pub depth_mm: f64,
     /// Time at which the piece is taken out, s.
