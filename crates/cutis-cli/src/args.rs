@@ -14,7 +14,12 @@ use cutis::{FieldDirection, ResampleInput};
 ///
 /// Exit codes: 0 done, 1 failed while running, 2 bad input or usage.
 #[derive(Debug, Parser)]
-#[command(name = "cutis", version, max_term_width = 100)]
+#[command(
+    name = "cutis",
+    version,
+    max_term_width = 100,
+    after_help = "`cutis --xml` describes the program as a command-line module of 3D Slicer, which runs it."
+)]
 pub(crate) struct Args {
     #[command(subcommand)]
     pub(crate) command: Command,

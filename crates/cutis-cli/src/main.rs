@@ -4,6 +4,7 @@ mod args;
 mod commands;
 mod headless;
 mod interrupt;
+mod module;
 mod terminal;
 
 use std::process::ExitCode;
@@ -12,8 +13,16 @@ use clap::Parser;
 
 fn main() -> ExitCode {
     headless::quiet_drivers();
-    let args = args::Args::parse();
-    match commands::run(args.command) {
+    let words: Vec<std::ffi::OsString> = std::env::args_os().skip(1).collect();
+    let done = match module::call(&words) {
+        Some(module::Call::Describe) => {
+            module::describe();
+            Ok(())
+        }
+        Some(module::Call::Run) => module::run(),
+        None => commands::run(args::Args::parse().command),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::error(&error);

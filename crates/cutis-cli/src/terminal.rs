@@ -22,6 +22,11 @@ pub(crate) fn print(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
+/// Prints a note on standard error.
+pub(crate) fn note(message: &str) {
+    say(&format!("note: {message}"));
+}
+
 fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }

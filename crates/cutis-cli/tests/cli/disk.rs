@@ -3,19 +3,25 @@
 use crate::Desk;
 
 /// Calls that write one file each. Every file is larger than the limits of the tests.
-const WRITERS: [(&str, &str); 6] = [
+const WRITERS: [(&str, &str); 9] = [
     ("phantom --size 64,64,48 --out out/ct.nii", "out/ct.nii"),
     ("phantom --size 64,64,48 --out out/ct.nii.gz", "out/ct.nii.gz"),
     ("skin ct.nii --out out/skin.vtu", "out/skin.vtu"),
     ("skin ct.nii --out out/skin.vtp", "out/skin.vtp"),
+    ("skin ct.nii --out out/skin.ply", "out/skin.ply"),
     ("resample scene.toml --run run --out out/deformed.nii.gz", "out/deformed.nii.gz"),
+    ("resample scene.toml --run run --labels ct.nii --out out/labels.mha", "out/labels.mha"),
+    ("resample scene.toml --run run --field to-rest --out out/field.nrrd", "out/field.nrrd"),
     ("render ct.nii --out out/skin.png --pixels 700", "out/skin.png"),
 ];
 
 /// Outputs of a run, and the first file that exceeds the limit.
-const RUNS: [(&str, &str); 4] = [
+const RUNS: [(&str, &str); 7] = [
     ("output={surface=true}", "out/skin.vtu"),
     ("output={tissue=true}", "out/tissue.vtu"),
+    ("output={ply=true}", "out/skin.ply"),
+    ("output={stl=true}", "out/skin.stl"),
+    ("output={displacement=true}", "out/displacement.nrrd"),
     ("output={volume=true}", "out/deformed.nii.gz"),
     ("run.checkpoint_every=1", "out/checkpoint.bin"),
 ];

@@ -12,6 +12,7 @@ mod looks;
 mod paper_form;
 mod printed;
 mod run_folder;
+mod slicer;
 mod steps;
 mod tune;
 
