@@ -157,7 +157,9 @@ mod tests {
             .iter()
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
-        assert_eq!(names, ["awkward.py", "cantilever.py", "dicom.py", "formats.py", "outputs.py", "report.py"]);
+        let all =
+            ["awkward.py", "cantilever.py", "dicom.py", "formats.py", "outputs.py", "report.py", "slicer.py"];
+        assert_eq!(names, all);
     }
 
     #[test]
