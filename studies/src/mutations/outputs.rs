@@ -156,8 +156,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "meshes: LPS coordinates are labeled RAS",
         "crates/cutis-mesh/src/vtk.rs",
-        "Space::Lps => \"LPS\"",
-        "Space::Lps => \"RAS\"",
+        "Self::Lps => \"LPS\"",
+        "Self::Lps => \"RAS\"",
     ),
     mutation(
         Outputs,
@@ -303,7 +303,7 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "skin: the file is in RAS",
         "crates/cutis/src/body/find_skin.rs",
-        "vtk::write_vtu(path, Space::default(), &piece)",
+        "vtk::write_vtu(path, space, &piece)",
         "vtk::write_vtu(path, Space::Ras, &piece)",
     ),
     mutation(
