@@ -106,7 +106,7 @@ impl Page<'_> {
     fn plots(&self) -> String {
         let mut out = String::new();
         if self.has_time {
-            out.push_str("<h2>Over time</h2><p id=\"at-time\" class=\"readings\" hidden></p>");
+            out.push_str("<h2>Over time</h2>");
         }
         for plot in self.plots {
             let _ = write!(out, "<figure class=\"plot\">{plot}</figure>");
