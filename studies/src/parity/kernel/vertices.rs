@@ -3,9 +3,7 @@
 
 use cutis_gpu::{Binding, Buffer, Gpu, GpuError};
 use cutis_shaders::solver;
-use cutis_solver::{
-    Execute, Formulation, Integrator, Serial, Settings, Simulation, Solver, SolverReference, System, Vertex,
-};
+use cutis_solver::{Formulation, Integrator, Settings, Simulation, Solver, SolverReference, System, Vertex};
 use nalgebra::Vector3;
 
 use super::replaced;
