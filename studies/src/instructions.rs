@@ -52,14 +52,14 @@ struct Case {
 }
 
 const CASES: [Case; 4] = [
-    Case { name: "edges-pbd", formulation: Formulation::Pbd, edges: true, tets: false, most: [129.5, 51.7] },
-    Case { name: "tets-pbd", formulation: Formulation::Pbd, edges: false, tets: true, most: [247.8, 115.1] },
+    Case { name: "edges-pbd", formulation: Formulation::Pbd, edges: true, tets: false, most: [122.3, 51.5] },
+    Case { name: "tets-pbd", formulation: Formulation::Pbd, edges: false, tets: true, most: [236.9, 94.0] },
     Case {
         name: "edges-xpbd",
         formulation: Formulation::Xpbd,
         edges: true,
         tets: false,
-        most: [139.0, 58.2],
+        most: [138.3, 58.2],
     },
     Case {
         name: "vertices-vbd",

@@ -96,7 +96,8 @@ fn check() {
     expect_keys(&found, &["ledger.parts[].ms_per_frame"]);
     let parts: Vec<&str> =
         found["ledger"]["parts"].as_array().unwrap().iter().map(|p| p["part"].as_str().unwrap()).collect();
-    assert_eq!(parts, ["vertices", "distance", "volume", "check"], "what is left out has no part");
+    let expected = ["vertices", "distance", "volume", "columns", "check"];
+    assert_eq!(parts, expected, "what is left out has no part");
     assert!(
         found["ledger"]["parts"][1]["host_bytes"].as_u64() == found["memory"][1]["bytes"].as_u64(),
         "{found}"
