@@ -30,15 +30,25 @@ fn a_kind_needs_only_its_own_bytes() {
     let full = scene(SMALL, &[]);
     let whole = plan(&full);
     let kinds = [
-        ("distance", needed::<2, Distance>(whole.sizes.edges, whole.colors["distance"])),
-        ("volume", needed::<4, Volume>(whole.sizes.tets, whole.colors["volume"])),
-        ("stc", needed::<3, SkinTension>(whole.sizes.skin_triangles, whole.colors["stc"])),
+        (
+            "distance",
+            needed::<2, Distance>(whole.sizes.edges, whole.colors["distance"]),
+            2 * whole.sizes.edges,
+        ),
+        ("volume", needed::<4, Volume>(whole.sizes.tets, whole.colors["volume"]), 4 * whole.sizes.tets),
+        (
+            "stc",
+            needed::<3, SkinTension>(whole.sizes.skin_triangles, whole.colors["stc"]),
+            3 * whole.sizes.skin_triangles,
+        ),
     ];
     assert!(whole.sizes.skin_triangles > 1000);
-    for (kind, expected) in kinds {
-        // Up to nine runs of a color take 8 bytes each.
+    for (kind, expected, corners) in kinds {
+        // Up to three runs of a color take 12 bytes each. One of 16 constraints in a row has its
+        // vertices, of 4 bytes each, in a list of their own.
         let found = bytes(&whole, kind).unwrap();
-        assert!((expected..=expected + 72 * whole.colors[kind]).contains(&found), "{kind}: {found}");
+        let most = expected + 36 * whole.colors[kind] + 4 * corners / 16;
+        assert!((expected..=most).contains(&found), "{kind}: {found}");
         assert!(!says(&whole.left_out, kind), "{kind} is there: {:?}", whole.left_out);
 
         let mut without = full.clone();
