@@ -51,7 +51,7 @@ fn region(body: &Body, memory: &[MemoryPart]) -> Option<String> {
     let inactive = mesh.inactive.as_ref().filter(|inactive| inactive.tets > 0)?;
     let kept_and_left = |part: &str| match KINDS.iter().find(|row| row.key == part) {
         Some(row) => (row.facts.counts)(body),
-        None if part == "vertices" => [mesh.positions.len(), inactive.vertices],
+        None if ["vertices", "columns"].contains(&part) => [mesh.positions.len(), inactive.vertices],
         None => [0, 0],
     };
     let saved = |part: &MemoryPart| {
