@@ -96,7 +96,8 @@ impl Plan {
         warnings.extend(idle_adapter(scene, &backend));
         let mut left_out = costs.left_out;
         left_out.extend(left_out::sections(scene, &backend));
-        left_out.extend(left_out::of_lattice(body, &memory));
+        let by_column = !backend.on_gpu() && !backend.is_reference();
+        left_out.extend(left_out::of_lattice(body, &memory, by_column));
         let plan = Self {
             backend: backend.report.clone(),
             sizes,
