@@ -3,7 +3,8 @@
 //! Vertices 0.1 m apart, the face x = 0 fixed, unit masses, PBD with stiffness 1 on every edge,
 //! then on every tetrahedron. Three independent programs give the last vertex the same height to
 //! five digits. Their edges of one direction alternate between two colors along the first axis of
-//! the direction, and their tetrahedra of one type have four colors along each axis. A fourth program, in another order of the constraints, differs by less than 2 mm.
+//! the direction, and their tetrahedra of one type have four colors along each axis. A fourth
+//! program, in another order of the constraints, differs by less than 2 mm.
 
 use cutis_coloring::{Groups, greedy};
 use cutis_constraints::{Distance, Scalar, Volume};
@@ -51,8 +52,8 @@ fn edge_colors(lattice: &Kuhn, [nx, ny, _]: [usize; 3]) -> Vec<u16> {
     lattice.edges.iter().zip(&lattice.edge_colors).map(color).collect()
 }
 
-/// The colors of the tetrahedra in the independent programs: the type, and the sum of the indices of
-/// the first vertex.
+/// The colors of the tetrahedra in the independent programs: the type, and the sum of the indices
+/// of the first vertex.
 fn tet_colors(lattice: &Kuhn, [nx, ny, _]: [usize; 3]) -> Vec<u16> {
     let sum = |n: u32| n as usize % nx + n as usize / nx % ny + n as usize / nx / ny;
     let color = |(tet, color): (&[u32; 4], &u16)| color / 4 * 4 + (sum(tet[0]) % 4) as u16;
