@@ -39,7 +39,7 @@ pub struct Found {
     pub steps: Vec<StepOf>,
     /// True error at the first step with a stated error of at most [`AT_REST`].
     true_error: Option<f64>,
-    /// Largest memory of the process until now, 10⁹ bytes.
+    /// Largest memory of the process since the body was built, 10⁹ bytes.
     peak_gb: Option<f64>,
     complexity: f64,
 }
@@ -74,8 +74,10 @@ impl Found {
     }
 }
 
-/// A scene with some keys set.
+/// A scene with some keys set. The largest memory counts from here on.
 fn built(name: &str, set: &[String]) -> Result<SceneSystem, Failure> {
+    // Resets the peak (Linux, `proc_pid_clear_refs`). Elsewhere no peak is known.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
     let overrides: Vec<Override> = set
         .iter()
         .map(|text| {
@@ -208,7 +210,7 @@ fn follow(
     Ok(Found { name, free, constraints, prepared_s, steps, true_error: None, peak_gb: peak_gb(), complexity })
 }
 
-/// Largest memory of this process until now in 10⁹ bytes. `None` if the system does not tell.
+/// Largest memory of this process since it was reset, in 10⁹ bytes. `None` if the system does not tell.
 fn peak_gb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
@@ -252,7 +254,7 @@ pub fn table(found: &[Found]) -> Table {
         "true error",
         "to 0.1 %: s",
         "cycles",
-        "largest memory until then, GB",
+        "largest memory, GB",
     ]);
     for found in found {
         let count = |error: f64| found.steps.iter().take_while(|step| step.stated > error).count() + 1;
