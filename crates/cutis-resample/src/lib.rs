@@ -79,7 +79,7 @@ pub use labels::{LabelReport, resample_labels};
 pub use partial_volume::blend_walls;
 pub use report::ResampleReport;
 pub use resampler::Resampler;
-pub use warp::{Warp, resample};
+pub use warp::{Warp, resample, resample_where};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

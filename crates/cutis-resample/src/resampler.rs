@@ -69,6 +69,8 @@ pub struct Resampler<'a> {
     touched: Vec<bool>,
     /// Counts of each tile.
     reports: Vec<ResampleReport>,
+    /// Whether each tile is needed. All are if it is empty.
+    needed: Vec<bool>,
 }
 
 impl<'a> Resampler<'a> {
@@ -99,7 +101,29 @@ impl<'a> Resampler<'a> {
             touched: vec![false; tiling.len()],
             reports: vec![ResampleReport::default(); tiling.len()],
             tiling,
+            needed: Vec::new(),
         })
+    }
+
+    /// Leaves out the tiles of the output that `is_needed` refuses: their voxels keep the values of
+    /// the input, and the counts do not include them. `is_needed` receives the world position in mm
+    /// of the middle of a tile, and the radius in mm of a ball around the centers of its voxels.
+    #[must_use]
+    pub fn only(mut self, is_needed: &dyn Fn(Point3<f64>, f64) -> bool) -> Self {
+        let affine = &self.volume.grid().affine;
+        let tiling = self.tiling;
+        self.needed = (0..tiling.len())
+            .map(|number| {
+                let region = tiling.region(tiling.place(number));
+                let ends =
+                    |end: fn(&Range<usize>) -> f64| affine.to_mm(Point3::from(region.each_ref().map(end)));
+                let (low, high) = (ends(|range| range.start as f64), ends(|range| range.end as f64 - 1.0));
+                let half = |axis: usize| affine.step_mm(axis).norm() * (region[axis].len() - 1) as f64 / 2.0;
+                // The steps may be at other angles than 90°: their sum is the farthest.
+                is_needed(nalgebra::center(&low, &high), (0..3).map(half).sum())
+            })
+            .collect();
+        self
     }
 
     /// Resamples through deformed positions in local meters, one per vertex.
@@ -141,6 +165,8 @@ impl<'a> Resampler<'a> {
         let all = self.tolerance != Some(space.tolerance);
         let before = std::mem::replace(&mut self.touched, touched);
         let is_stale = |tile: usize| all || before[tile] || self.touched[tile];
+        let needed = &self.needed;
+        let is_needed = |tile: usize| needed.is_empty() || needed[tile];
 
         let (sampler, air) = (self.sampler, self.air);
         let source = Source {
@@ -160,8 +186,12 @@ impl<'a> Resampler<'a> {
             let first = block.first;
             for i in (0..tiling.counts[0]).filter(|i| is_stale(first + i)) {
                 let number = first + i;
-                scratch.list(&source, &self.still, &moved, &self.removed, number);
                 let region = tiling.region([i, block.tile[0], block.tile[1]]);
+                if !is_needed(number) {
+                    source.copy(&region, &mut block.slices);
+                    continue;
+                }
+                scratch.list(&source, &self.still, &moved, &self.removed, number);
                 // Without motion the tets are only counted.
                 let is_input = scratch.left.is_empty() && !moved.any(number);
                 if is_input {
@@ -320,13 +350,60 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn each_simd_level_gives_the_same_bits() {
+    /// A volume of random numbers.
+    fn noise(shape: [usize; 3]) -> Volume {
         let affine = Affine::from_spacing([0.7, 0.9, 1.1], [0.0; 3]).unwrap();
-        let grid = Grid { shape: [90, 50, 40], affine };
+        let grid = Grid { shape, affine };
         let mut random = Random::new(3);
         let voxels = (0..grid.len()).map(|_| random.below(3000) as i16 - 1024).collect();
-        let volume = Volume::new(grid, voxels, 1.0, 0.0).unwrap();
+        Volume::new(grid, voxels, 1.0, 0.0).unwrap()
+    }
+
+    /// Tiles that are needed have the values of the whole output, and the others those of the
+    /// input, of which some would change.
+    #[test]
+    fn only_the_tiles_that_are_needed_are_resampled() {
+        let volume = noise([150, 70, 40]);
+        let Kuhn { positions, tets, .. } = Kuhn::new([28, 18, 11], 0.0037);
+        let rest: Vec<Point3<f32>> = positions.iter().map(|p| p.cast::<f32>()).collect();
+        let deformed: Vec<Point3<f32>> =
+            rest.iter().map(|p| p + Vector3::new(0.0, (70.0 * p.x).sin(), 0.3) * 2e-3).collect();
+        let warp = Warp {
+            origin_mm: Point3::origin(),
+            rest: &rest,
+            deformed: &deformed,
+            tets: &tets,
+            body_tets: tets.len(),
+            removed: &[],
+        };
+        let whole = crate::resample(&volume, &warp, &|_, _| {}).unwrap();
+        let near =
+            |mm: Point3<f64>, radius_mm: f64| (mm - Point3::new(40.0, 20.0, 10.0)).norm() < 12.0 + radius_mm;
+        let mut some = Resampler::new(&volume, &warp).unwrap().only(&near);
+        let report = some.update(&deformed).unwrap();
+        let grid = volume.grid();
+        let [mut needed, mut kept] = [0, 0];
+        for (n, &value) in some.voxels().iter().enumerate() {
+            let [i, j, k] = grid.point(n);
+            let tile = some.tiling.number([i / TILE[0], j / TILE[1], k / TILE[2]]);
+            if some.needed[tile] {
+                assert_eq!(value, whole.0.voxels()[n], "voxel {n}");
+                needed += 1;
+            } else {
+                assert_eq!(value, volume.voxels()[n], "voxel {n}");
+                kept += usize::from(value != whole.0.voxels()[n]);
+            }
+            // No voxel near the place is left out.
+            let inside = (grid.mm([i, j, k]) - Point3::new(40.0, 20.0, 10.0)).norm() < 12.0;
+            assert!(!inside || some.needed[tile], "voxel {n}");
+        }
+        assert!(needed > 0 && kept > 1000, "{needed} voxels needed, {kept} left as they were");
+        assert!(report.covered_voxels < whole.1.covered_voxels && report.covered_voxels > 0);
+    }
+
+    #[test]
+    fn each_simd_level_gives_the_same_bits() {
+        let volume = noise([90, 50, 40]);
         let Kuhn { positions, tets, .. } = Kuhn::new([18, 12, 11], 0.0037);
         let rest: Vec<Point3<f32>> = positions.iter().map(|p| p.cast::<f32>()).collect();
         let wave = |p: &Point3<f32>| p + Vector3::new((90.0 * p.y).sin(), 0.0, (70.0 * p.x).sin()) * 2e-3;

@@ -61,6 +61,12 @@ impl Tiling {
         i + self.counts[0] * (j + self.counts[1] * k)
     }
 
+    /// Place of a tile along each axis.
+    pub fn place(&self, number: usize) -> [usize; 3] {
+        let [columns, rows, _] = self.counts;
+        [number % columns, number / columns % rows, number / columns / rows]
+    }
+
     /// The voxels of a tile along each axis.
     pub fn region(&self, tile: [usize; 3]) -> [Range<usize>; 3] {
         std::array::from_fn(|axis| {
@@ -113,7 +119,7 @@ mod tests {
         assert_eq!(tiling.counts, [3, 1, 3]);
         let mut count = 0;
         for number in 0..tiling.len() {
-            let tile = [number % 3, number / 3 % tiling.counts[1], number / 3 / tiling.counts[1]];
+            let tile = tiling.place(number);
             assert_eq!(tiling.number(tile), number);
             count += tiling.region(tile).iter().map(ExactSizeIterator::len).product::<usize>();
         }

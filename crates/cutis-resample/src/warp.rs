@@ -113,3 +113,19 @@ pub fn resample(
     let report = resampler.update_with(warp.deformed, progress)?;
     Ok((resampler.into_volume()?, report))
 }
+
+/// Resamples the parts of a volume that `is_needed` names, as [`resample`] does, and leaves the
+/// others as they are: see [`Resampler::only`].
+///
+/// # Errors
+/// The errors of [`resample`].
+pub fn resample_where(
+    volume: &Volume,
+    warp: &Warp<'_>,
+    is_needed: &dyn Fn(Point3<f64>, f64) -> bool,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<(Volume, ResampleReport), ResampleError> {
+    let mut resampler = Resampler::new(volume, warp)?.only(is_needed);
+    let report = resampler.update_with(warp.deformed, progress)?;
+    Ok((resampler.into_volume()?, report))
+}
