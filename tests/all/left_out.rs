@@ -1,5 +1,7 @@
 //! Parts that a scene does not name are not stored, computed or written, and the report lists them.
 
+use std::fs;
+
 use cutis::constraints::{Constraint, Distance, SkinTension, Volume};
 use cutis::{LoadedScene, Plan, Silent};
 
@@ -101,6 +103,23 @@ fn the_skin_is_detected_only_if_needed() {
     assert!(with.skin.is_some() && with.sizes.skin_triangles > 0 && !says(&with.left_out, "skin"));
 }
 
+/// Without the volume only what the pictures show is resampled, and they stay the same. The CT is
+/// larger than that: it has many tiles.
+#[test]
+fn pictures_without_the_volume_are_those_with_it() {
+    let ct = ("volume.phantom", "{ size = [192, 160, 192], seed = 1 }");
+    let run = |output: &str| {
+        let run = Run::of(&scene(SMALL, &[ct, ("run.frames", "4"), ("output", output)]));
+        let pictures = ["before.png", "after.png", "slice.png"].map(|name| fs::read(run.path(name)).unwrap());
+        (pictures, run)
+    };
+    let (with, whole) = run("{ pictures = true, volume = true }");
+    let (without, part) = run("{ pictures = true }");
+    assert!(with == without, "the pictures differ");
+    assert!(with[0] != with[1], "control: the wound moves");
+    assert!(whole.report.resample.is_some() && part.report.resample.is_none());
+}
+
 #[test]
 fn only_named_outputs_are_written() {
     let run = |output: &[(&str, &str)]| Run::of(&scene(SMALL, &[&[("run.frames", "1")], output].concat()));
@@ -117,7 +136,8 @@ fn only_named_outputs_are_written() {
         let run = run(&[("output", output)]);
         assert_eq!(run.names(), expected, "{output}");
         let resampled = output.contains("volume") || output.contains("pictures");
-        assert_eq!(run.report.resample.is_some(), resampled, "{output}");
+        // The counts are those of the whole volume.
+        assert_eq!(run.report.resample.is_some(), output.contains("volume"), "{output}");
         assert_eq!(run.report.stages.iter().any(|stage| stage.name == "resample the CT"), resampled);
         for (topic, key) in
             [("surface", "surface"), ("tissue", "tissue"), ("pictures", "pictures"), ("report", "report")]

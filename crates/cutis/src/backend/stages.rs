@@ -52,6 +52,22 @@ impl Stages {
         )
     }
 
+    /// Resamples as [`cutis_resample::resample_where`]. The GPU resamples all parts.
+    pub(crate) fn resample_where(
+        &mut self,
+        volume: &Volume,
+        warp: &Warp<'_>,
+        positions: Option<&DevicePositions>,
+        is_needed: &dyn Fn(Point3<f64>, f64) -> bool,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<(Volume, ResampleReport), Error> {
+        self.first_on_gpu(
+            "resampling",
+            |gpu| Ok(gpu::resample(gpu, volume, warp, positions, progress)?),
+            || Ok(cutis_resample::resample_where(volume, warp, is_needed, progress)?),
+        )
+    }
+
     /// Renders as [`cutis_render::raymarch`].
     pub(crate) fn raymarch(&mut self, volume: &Volume, view: &View<'_>) -> Result<Image, Error> {
         self.first_on_gpu(

@@ -7,6 +7,7 @@ mod pictures;
 pub mod report;
 mod resample_run;
 pub mod rest_report;
+mod shown;
 mod skin_lines;
 mod slices;
 pub mod step_report;
@@ -34,9 +35,11 @@ use displacement::write_field;
 use html::Figure;
 use pictures::Pictures;
 use report::Resample;
+use shown::Shown;
 use skin_lines::SkinLines;
 use slices::SlicePair;
 use warp::BodyWarp;
+use wound_place::WoundPlace;
 
 pub use displacement::FieldDirection;
 pub use resample_run::{ResampleInput, ResampleRequest, resample_run};
@@ -104,8 +107,19 @@ pub(crate) fn write(
     if !resamples {
         return Ok(results);
     }
+    // Without the volume, only what the pictures show is resampled.
+    let shown = match output.volume {
+        true => None,
+        false => Shown::of(WoundPlace::of(body).as_ref(), deformed.ct.grid().affine.spacing_mm()),
+    };
     let (volume, found) = clock.stage_placed("resample the CT", 0, |progress| {
-        Ok((warp.apply(deformed.ct, stages, progress)?, stages.place()))
+        let resampled = match &shown {
+            None => warp.apply(deformed.ct, stages, progress)?,
+            Some(shown) => {
+                warp.apply_where(deformed.ct, &|mm, radius| shown.shows(mm, radius), stages, progress)?
+            }
+        };
+        Ok((resampled, stages.place()))
     })?;
     if found.folds > 0 {
         let folds = found.folds;
@@ -113,7 +127,8 @@ pub(crate) fn write(
             .warnings
             .push(format!("{folds} voxels lie in two places of the deformed body at once (folds)"));
     }
-    results.resample = Some(found);
+    // Counts of a part say nothing about the whole.
+    results.resample = shown.is_none().then_some(found);
     if output.volume {
         clock.stage("write deformed.nii.gz", 0, |_| Ok(nifti::write(folder.volume(), &volume)?))?;
     }

@@ -94,7 +94,8 @@ pub struct Report {
     /// The handles and their forces.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub handles: Vec<HandleReport>,
-    /// The resampled CT, if an output needed it.
+    /// The resampled CT, if it was resampled as a whole: for the volume, or for pictures without a
+    /// wound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resample: Option<Resample>,
     /// Results of the model `chainmail`.

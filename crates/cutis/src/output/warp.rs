@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use cutis_resample::{Warp, blend_walls};
+use cutis_resample::{ResampleReport, Warp, blend_walls};
 use cutis_volume::Volume;
 use nalgebra::Point3;
 
@@ -72,7 +72,36 @@ impl BodyWarp {
         stages: &mut Stages,
         progress: &dyn Progress,
     ) -> Result<(Volume, Resample), Error> {
-        let (resampled, report) = self.apply_to_centers(volume, stages, progress)?;
+        let resampled = self.apply_to_centers(volume, stages, progress)?;
+        self.with_walls(volume, resampled)
+    }
+
+    /// As [`BodyWarp::apply`], for the parts of the volume that `is_needed` names: it receives the
+    /// middle of a part in world mm, and the radius in mm of a ball around it. On a GPU all parts
+    /// are resampled, and on a CPU the others keep their values.
+    ///
+    /// # Errors
+    /// The errors of the resampler.
+    pub(super) fn apply_where(
+        &self,
+        volume: &Volume,
+        is_needed: &dyn Fn(Point3<f64>, f64) -> bool,
+        stages: &mut Stages,
+        progress: &dyn Progress,
+    ) -> Result<(Volume, Resample), Error> {
+        let (warp, on_device) = (self.mesh.warp(&self.deformed), self.on_device.as_ref());
+        let progress = |done: usize, _total: usize| progress.advance(done as u64);
+        let (resampled, report) = stages.resample_where(volume, &warp, on_device, is_needed, &progress)?;
+        self.with_walls(volume, (resampled, counts(report)))
+    }
+
+    /// A resampled volume in which voxels that the wall of a wound crosses have the mean over the
+    /// voxel.
+    fn with_walls(
+        &self,
+        volume: &Volume,
+        (resampled, report): (Volume, Resample),
+    ) -> Result<(Volume, Resample), Error> {
         let warp = self.mesh.warp(&self.deformed);
         Ok((blend_walls(volume, &warp, &self.mesh.at_walls, resampled)?.0, report))
     }
@@ -93,12 +122,7 @@ impl BodyWarp {
             self.on_device.as_ref(),
             &|done, _total| progress.advance(done as u64),
         )?;
-        let report = Resample {
-            covered_voxels: report.covered_voxels as u64,
-            folds: report.folds as u64,
-            vacated_voxels: report.vacated_voxels as u64,
-        };
-        Ok((volume, report))
+        Ok((volume, counts(report)))
     }
 
     /// The volume before the first frame: with the cuts from the start, and nothing moved. Voxels
@@ -128,5 +152,14 @@ impl BodyWarp {
         let warp = Warp { tets: &tets, body_tets: body.len(), removed, ..self.mesh.warp(rest) };
         let progress = |done: usize, _total: usize| progress.advance(done as u64);
         Ok(Cow::Owned(stages.resample(volume, &warp, None, &progress)?.0))
+    }
+}
+
+/// The counts for the report.
+fn counts(report: ResampleReport) -> Resample {
+    Resample {
+        covered_voxels: report.covered_voxels as u64,
+        folds: report.folds as u64,
+        vacated_voxels: report.vacated_voxels as u64,
     }
 }
