@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::nearest;
 use super::steps::{self, Steps};
 use crate::{Error, Scene};
 
@@ -152,7 +153,7 @@ impl Scene {
                 file: file.into(),
                 key: steps.name(&key),
                 value: found,
-                why: e.inner().to_string().trim().replace('\n', " "),
+                why: nearest::with_suggestion(&e.inner().to_string().trim().replace('\n', " ")),
             }
         })?;
         crate::model::fill_defaults(&mut scene);

@@ -11,6 +11,7 @@ mod choice;
 mod demo;
 mod load;
 mod markups;
+pub(crate) mod nearest;
 mod pick_region;
 mod reference;
 mod sections;

@@ -1,0 +1,57 @@
+//! The nearest one of some names, for messages about a misspelled one.
+
+/// The name with the fewest edits from `wrong`. None if every name differs in most letters.
+pub(crate) fn of<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let counted = names.map(|name| (distance(wrong, name), name));
+    let (edits, name) = counted.min_by_key(|(edits, _)| *edits)?;
+    let longer = wrong.chars().count().max(name.chars().count());
+    (2 * edits <= longer).then_some(name)
+}
+
+/// The message of serde about an unknown key, with the nearest valid one. Other messages stay.
+pub(crate) fn with_suggestion(message: &str) -> String {
+    let mut words = message.split('`').skip(1).step_by(2);
+    let wrong = words.next().filter(|_| message.starts_with("unknown field"));
+    let near = wrong.and_then(|wrong| of(wrong, words));
+    near.map_or_else(|| message.to_owned(), |near| format!("{message}; the nearest one is `{near}`"))
+}
+
+/// Number of letters to insert, remove or replace.
+fn distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(100).collect(), b.chars().take(100).collect());
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, to) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(from != to);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_those_of_levenshtein() {
+        for (a, b, edits) in
+            [("", "", 0), ("abc", "", 3), ("kitten", "sitting", 3), ("spacing", "spaicng", 2)]
+        {
+            assert_eq!((distance(a, b), distance(b, a)), (edits, edits), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn the_nearest_name_is_named_unless_all_are_far() {
+        let names = ["spacing_mm", "vertices", "split"];
+        assert_eq!(of("spcing_mm", names.into_iter()), Some("spacing_mm"));
+        assert_eq!(of("frames", names.into_iter()), None);
+        let message = "unknown field `spliit`, expected one of `spacing_mm`, `split`";
+        assert!(with_suggestion(message).ends_with("`split`; the nearest one is `split`"));
+        assert_eq!(with_suggestion("invalid type: `spliit`"), "invalid type: `spliit`");
+    }
+}
