@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args as Group, Parser, Subcommand};
+use clap::{Args as Group, Parser, Subcommand, value_parser};
 use cutis::mesh::{SkinMode, Split};
 use cutis::render::Side;
 use cutis::scene::{Override, constraint_kinds};
@@ -97,6 +97,16 @@ pub(crate) enum Command {
         /// Print as JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Run many scans with many settings, and collect the results in one table
+    ///
+    /// A sweep that was interrupted goes on where it ended, and a changed study repeats only what
+    /// changed. Exit code 1 says that some cases are not done.
+    Sweep {
+        /// Study file (TOML)
+        study: PathBuf,
+        #[command(flatten)]
+        args: SweepArgs,
     },
     /// Describe a volume file, or list the series in a folder of DICOM files
     Inspect {
@@ -231,6 +241,8 @@ pub(crate) struct VolumeArgs {
     /// Resample tilted or unevenly spaced slices to a regular grid with perpendicular axes
     #[arg(long)]
     resample: bool,
+    /// JSON schema of a study, which `cutis sweep` runs
+    StudySchema,
 }
 
 impl VolumeArgs {
@@ -304,6 +316,35 @@ pub(crate) struct Change {
     pub(crate) frames: Option<u32>,
     /// Set a key of the scene, for example solver.substeps=20
     #[arg(long = "set", value_name = "KEY=VALUE")]
+/// Options of `cutis sweep`.
+#[derive(Clone, Debug, Group)]
+pub(crate) struct SweepArgs {
+    /// Folder of the sweep [default: the study's name with `-sweep`, in the current folder]
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Cases that run at the same time
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = value_parser!(u16).range(1..))]
+    pub(crate) jobs: u16,
+    /// Threads of each case [default: all cores, shared by the cases that run at the same time]
+    #[arg(long, value_name = "NUMBER", value_parser = value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Run only the case with this name, in this process
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["list", "dry_run", "table", "jobs"])]
+    pub(crate) case: Option<String>,
+    /// Print the names of the cases; read no scan and run nothing
+    #[arg(long, conflicts_with_all = ["dry_run", "table"])]
+    pub(crate) list: bool,
+    /// Print which cases would run; run nothing
+    #[arg(long, conflicts_with = "table")]
+    pub(crate) dry_run: bool,
+    /// Write the table and the plots of the cases that are done; run nothing
+    #[arg(long)]
+    pub(crate) table: bool,
+    /// Print as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
     pub(crate) set: Vec<Override>,
     /// Remove a constraint kind from the scene
     #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(constraint_kinds()))]

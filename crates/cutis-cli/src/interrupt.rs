@@ -58,6 +58,15 @@ impl Interruptible {
     }
 }
 
+/// Waits for Ctrl-C during a sweep. The processes of its cases receive it, too.
+#[expect(clippy::disallowed_methods, reason = "the sweep itself writes no file while cases run")]
+pub(crate) fn watch_sweep() {
+    let _ = ctrlc::set_handler(move || {
+        terminal::interrupted("interrupted; the same command goes on with the cases that are not done");
+        std::process::exit(INTERRUPTED);
+    });
+}
+
 /// Removes the hidden files of this process from the run folder.
 fn remove_partial_files(folder: &Path) {
     let prefix = format!(".cutis-{}-", std::process::id());

@@ -17,16 +17,16 @@ fn main() -> ExitCode {
     let done = match module::call(&words) {
         Some(module::Call::Describe) => {
             module::describe();
-            Ok(())
+            Ok(0)
         }
-        Some(module::Call::Run) => module::run(),
+        Some(module::Call::Run) => module::run().map(|()| 0),
         None => commands::run(args::Args::parse().command),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => ExitCode::from(code),
         Err(error) => {
             terminal::error(&error);
-            ExitCode::from(if error.is_bad_input() { 2 } else { 1 })
+            ExitCode::from(error.exit_code())
         }
     }
 }

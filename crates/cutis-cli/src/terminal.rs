@@ -27,7 +27,8 @@ pub(crate) fn note(message: &str) {
     say(&format!("note: {message}"));
 }
 
-fn say(text: &str) {
+/// Prints a line on standard error.
+pub(crate) fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 

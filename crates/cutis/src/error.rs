@@ -60,6 +60,36 @@ pub enum Error {
         /// The reason.
         source: Box<Error>,
     },
+    /// A study file cannot be read.
+    #[error("{}: cannot read the study: {why}", file.display())]
+    StudyFile {
+        /// The study file.
+        file: PathBuf,
+        /// The message of the system, or line, column and reason.
+        why: String,
+    },
+    /// A key of a study is unknown or its value cannot be used.
+    #[error("{}: key `{key}`{}: {why}", file.display(), if value.is_empty() { String::new() } else { format!(" = {value}") })]
+    StudyKey {
+        /// The study file.
+        file: PathBuf,
+        /// Dotted key.
+        key: String,
+        /// The value that was found, as text; empty if there is none to show.
+        value: String,
+        /// The valid values.
+        why: String,
+    },
+    /// The scene of a case of a study is not valid.
+    #[error("{}: case `{case}`: {source}", file.display())]
+    StudyCase {
+        /// The study file.
+        file: PathBuf,
+        /// Name of the case.
+        case: String,
+        /// The reason.
+        source: Box<Error>,
+    },
     /// A request from the command line or a caller that cannot be met.
     #[error("{what}: {why}")]
     Request {
@@ -169,13 +199,20 @@ pub enum Error {
 }
 
 impl Error {
-    /// True if the input or the request is at fault (exit code 2), false if the run itself failed
-    /// (exit code 1).
+    /// Exit code of a program that ends with this error: 2 if the input or the request is at fault,
+    /// 1 if the run itself failed.
+    pub fn exit_code(&self) -> u8 {
+        if self.is_bad_input() { 2 } else { 1 }
+    }
+
+    /// True if the input or the request is at fault, false if the run itself failed.
     pub fn is_bad_input(&self) -> bool {
         match self {
             Self::SceneFile { .. }
             | Self::SceneSyntax { .. }
             | Self::SceneKey { .. }
+            | Self::StudyFile { .. }
+            | Self::StudyKey { .. }
             | Self::Request { .. }
             | Self::Backend { .. }
             | Self::Checkpoint { .. }
@@ -184,7 +221,7 @@ impl Error {
             | Self::Skin(_)
             | Self::Chain(_)
             | Self::Coloring(_) => true,
-            Self::SceneSection { source, .. } => source.is_bad_input(),
+            Self::SceneSection { source, .. } | Self::StudyCase { source, .. } => source.is_bad_input(),
             Self::Volume(e) | Self::Mesh(MeshError::Volume(e)) => {
                 !matches!(e, VolumeError::Io { action: "write" | "create", .. })
             }

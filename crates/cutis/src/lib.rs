@@ -13,8 +13,9 @@
 //!
 //! A run goes through the modules of this crate in this order: `scene` (the scene file), `ct` (the
 //! volume), `body` (lattice, skin, incisions), `model` (constraints or ChainMail), `backend` (CPU
-//! or GPU), `run` (frames) and `output` (files and report). Two more modules use these: `cost`
-//! (plans and costs) and `tune` (the choice of a setting). Start reading at `run`.
+//! or GPU), `run` (frames) and `output` (files and report). Three more modules use these: `cost`
+//! (plans and costs), `tune` (the choice of a setting) and [`sweep`] (many scans and settings).
+//! Start reading at `run`.
 //!
 //! The parts are crates of their own, re-exported here: [`volume`] (CT in and out), [`mesh`]
 //! (lattice, skin, incisions), [`constraints`], [`coloring`], [`solver`] and [`solver_cpu`],
@@ -32,6 +33,7 @@ mod output;
 mod progress;
 mod run;
 pub mod scene;
+pub mod sweep;
 pub mod tune;
 
 pub use cutis_chainmail as chainmail;

@@ -4,15 +4,17 @@ mod devices;
 mod look;
 mod simulate;
 mod tune;
+mod sweep;
 
 use cutis::{Error, report::Report, scene};
 
 use crate::args::{Command, SceneCommand};
 use crate::terminal::print;
 
-/// Runs a subcommand.
-pub(crate) fn run(command: Command) -> Result<(), Error> {
-    match command {
+/// Runs a subcommand. Returns the exit code.
+pub(crate) fn run(command: Command) -> Result<u8, Error> {
+    let done = match command {
+        Command::Sweep { study, args } => return sweep::sweep(&study, &args),
         Command::Demo { out, change, json } => simulate::demo(&out, &change, json),
         Command::Run { scene, out, change, resume, json } => {
             simulate::run(&scene, out, &change, resume, json)
@@ -46,10 +48,12 @@ pub(crate) fn run(command: Command) -> Result<(), Error> {
             }
             Ok(())
         }
-    }
+    };
+    done.map(|()| 0)
 }
 
 /// Indented JSON. Serializing plain data cannot fail.
 fn pretty(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"))
+                SceneCommand::StudySchema => print(&pretty(&cutis::sweep::Study::json_schema())),
 }

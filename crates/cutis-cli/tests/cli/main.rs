@@ -15,6 +15,7 @@ mod run_folder;
 mod slicer;
 mod steps;
 mod tune;
+mod sweep;
 
 use std::path::PathBuf;
 use std::process::{Command, Output};

@@ -15,7 +15,7 @@ fn a_new_scene_is_a_scene() {
 
 #[test]
 fn schemas_are_json_schemas() {
-    for (what, key) in [("schema", "constraints"), ("report-schema", "wounds")] {
+    for (what, key) in [("schema", "constraints"), ("report-schema", "wounds"), ("study-schema", "axis")] {
         let printed = Desk::new().cutis(&["scene", what]).expect_success().stdout;
         let schema: Value = serde_json::from_str(&printed).unwrap();
         assert!(schema["$schema"].as_str().is_some_and(|s| s.contains("json-schema.org")), "{what}");

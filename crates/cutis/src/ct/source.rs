@@ -1,7 +1,9 @@
 //! The CT of a scene: read from its files, or made by the phantom.
 
+use std::path::Path;
+
 use cutis_volume::phantom::Phantom;
-use cutis_volume::{Table, TableKind, Volume};
+use cutis_volume::{ReadOptions, Table, TableKind, Volume};
 use sha2::{Digest, Sha256};
 
 use crate::Error;
@@ -38,6 +40,16 @@ pub(crate) fn with_offset(volume: Volume, hu: f32) -> Result<Volume, Error> {
     }
     let (grid, slope, intercept) = (*volume.grid(), volume.slope(), volume.intercept());
     Ok(Volume::new(grid, volume.into_voxels(), slope, intercept + hu)?)
+}
+
+/// SHA-256 of the bytes of the files of a volume, as reports have it.
+///
+/// # Errors
+/// [`Error::Volume`] for a file that cannot be read.
+pub(crate) fn sha256_of_file(path: &Path, options: &ReadOptions) -> Result<String, Error> {
+    let mut hash = Sha256::new();
+    cutis_volume::read_observed(path, options, |_, bytes| hash.update(bytes))?;
+    Ok(files::hex(&hash.finalize()))
 }
 
 fn read(loaded: &LoadedScene) -> Result<Source, Error> {

@@ -3,6 +3,7 @@
 
 use std::fmt;
 use std::marker::PhantomData;
+use std::path::PathBuf;
 
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, IntoDeserializer, SeqAccess, Unexpected, Visitor};
@@ -21,6 +22,10 @@ pub(crate) trait One<'de>: Deserialize<'de> {
 
 impl One<'_> for String {
     const EITHER: &'static str = "the name of a preset, or a list";
+}
+
+impl One<'_> for PathBuf {
+    const EITHER: &'static str = "a path, or a list of paths";
 }
 
 impl One<'_> for f64 {

@@ -9,7 +9,7 @@ mod page;
 mod plots;
 mod summary;
 mod tables;
-mod text;
+pub(crate) mod text;
 
 use std::path::PathBuf;
 

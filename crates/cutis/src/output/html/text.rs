@@ -12,7 +12,7 @@ pub(super) fn items(lines: &[String]) -> String {
 }
 
 /// Text in which no character has a meaning in HTML, also within double or single quotes.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
