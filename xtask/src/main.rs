@@ -32,8 +32,9 @@ usage: cargo xtask COMMAND
   tidy [--all]        check the rules of sources, manifests and pages; --all also where a rule is not
                       in force yet
   licenses            check licenses, bans and sources of all dependencies with cargo-deny
-  python              compare inputs and outputs with nibabel, pydicom, pynrrd and SimpleITK, and a
-                      bent beam with scikit-fem
+  python              compare inputs and outputs with nibabel, pydicom, pynrrd and SimpleITK, a bent
+                      beam with scikit-fem, and the workflow of Snakemake with `cutis sweep`
+  book                build the book as a site in target/book, and check its links
   lines [--at REV]    count lines per tree and language, in the checkout or in a revision of git
   publish --dry-run   pack every crate as for crates.io and build it from its package
   study NAME [OPTIONS]

@@ -77,8 +77,7 @@ type Install = fn(&Workspace, python: &Path, requirements: &Path) -> Result<bool
 fn environment(workspace: &Workspace, name: &str, requirements: &str, install: Install) -> Result<PathBuf> {
     let folder = workspace.target_dir()?.join(name);
     let requirements = workspace.root.join(requirements);
-    let wanted =
-        std::fs::read_to_string(&requirements).with_context(|| requirements.display().to_string())?;
+    let wanted = with_included(&requirements)?;
     let version = require(workspace)?;
     let stamp = folder.join("requirements.stamp");
     let wanted_stamp = format!("{version}\n{wanted}");
@@ -93,6 +92,19 @@ fn environment(workspace: &Workspace, name: &str, requirements: &str, install: I
         std::fs::write(&stamp, wanted_stamp).with_context(|| stamp.display().to_string())?;
     }
     Ok(python)
+}
+
+/// The text of a file of requirements, and of the files that it includes.
+fn with_included(requirements: &Path) -> Result<String> {
+    let read = |path: &Path| std::fs::read_to_string(path).with_context(|| path.display().to_string());
+    let mut text = read(requirements)?;
+    let folder = requirements.parent().unwrap_or(Path::new(""));
+    let included: Vec<PathBuf> =
+        packages(&text).filter_map(|line| line.strip_prefix("-r ")).map(|path| folder.join(path)).collect();
+    for path in included {
+        text += &read(&path)?;
+    }
+    Ok(text)
 }
 
 fn pip(workspace: &Workspace, python: &Path) -> Command {
@@ -157,9 +169,8 @@ mod tests {
             .iter()
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
-        let all =
-            ["awkward.py", "cantilever.py", "dicom.py", "formats.py", "outputs.py", "report.py", "slicer.py"];
-        assert_eq!(names, all);
+        let all = ["awkward", "cantilever", "dicom", "formats", "outputs", "report", "slicer", "workflow"];
+        assert_eq!(names, all.map(|name| format!("{name}.py")));
     }
 
     #[test]
@@ -168,6 +179,14 @@ mod tests {
         let text = std::fs::read_to_string(file).unwrap();
         assert!(packages(&text).count() > 4 && packages(&text).all(|package| package.contains("==")));
         assert_eq!(packages("# a\n\n b==1 \n").collect::<Vec<_>>(), ["b==1"]);
+    }
+
+    #[test]
+    fn the_packages_of_the_workflow_belong_to_the_checks_and_are_pinned() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python/requirements.txt");
+        let text = with_included(&file).unwrap();
+        assert!(packages(&text).any(|package| package.starts_with("snakemake==")), "{text}");
+        assert!(packages(&text).all(|package| package.contains("==") || package.starts_with('-')));
     }
 
     #[test]
