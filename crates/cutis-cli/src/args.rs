@@ -210,7 +210,21 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Print a new scene, or the schemas of scenes and reports
+    /// Print completions for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write man pages: one for the program, and one for each command
+    Man {
+        /// Folder of the pages
+        #[arg(required_unless_present = "markdown")]
+        folder: Option<PathBuf>,
+        /// Print the help of all commands as one page of Markdown
+        #[arg(long, conflicts_with = "folder")]
+        markdown: bool,
+    },
+    /// Print a new scene, or the schemas of scenes, studies and reports
     Scene {
         #[command(subcommand)]
         what: SceneCommand,
@@ -227,6 +241,8 @@ pub(crate) enum SceneCommand {
     Reference,
     /// JSON schema of report.json
     ReportSchema,
+    /// JSON schema of a study, which `cutis sweep` runs
+    StudySchema,
 }
 
 /// A volume, and how to read it.
@@ -241,8 +257,6 @@ pub(crate) struct VolumeArgs {
     /// Resample tilted or unevenly spaced slices to a regular grid with perpendicular axes
     #[arg(long)]
     resample: bool,
-    /// JSON schema of a study, which `cutis sweep` runs
-    StudySchema,
 }
 
 impl VolumeArgs {
@@ -302,20 +316,6 @@ pub(crate) struct TuneArgs {
     pub(crate) minutes: f64,
 }
 
-/// Options that change a scene.
-#[derive(Clone, Debug, Default, Group)]
-pub(crate) struct Change {
-    /// Backend of the solver: auto, cpu, reference or gpu
-    #[arg(long)]
-    pub(crate) backend: Option<String>,
-    /// GPU to use: part of its name, or its index in `cutis devices`
-    #[arg(long, value_name = "NAME|INDEX")]
-    pub(crate) adapter: Option<String>,
-    /// Number of frames
-    #[arg(long)]
-    pub(crate) frames: Option<u32>,
-    /// Set a key of the scene, for example solver.substeps=20
-    #[arg(long = "set", value_name = "KEY=VALUE")]
 /// Options of `cutis sweep`.
 #[derive(Clone, Debug, Group)]
 pub(crate) struct SweepArgs {
@@ -345,6 +345,20 @@ pub(crate) struct SweepArgs {
     pub(crate) json: bool,
 }
 
+/// Options that change a scene.
+#[derive(Clone, Debug, Default, Group)]
+pub(crate) struct Change {
+    /// Backend of the solver: auto, cpu, reference or gpu
+    #[arg(long)]
+    pub(crate) backend: Option<String>,
+    /// GPU to use: part of its name, or its index in `cutis devices`
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) adapter: Option<String>,
+    /// Number of frames
+    #[arg(long)]
+    pub(crate) frames: Option<u32>,
+    /// Set a key of the scene, for example solver.substeps=20
+    #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) set: Vec<Override>,
     /// Remove a constraint kind from the scene
     #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(constraint_kinds()))]

@@ -1,10 +1,11 @@
 //! One function per subcommand. It calls the library and prints the result.
 
 mod devices;
+mod help;
 mod look;
 mod simulate;
-mod tune;
 mod sweep;
+mod tune;
 
 use cutis::{Error, report::Report, scene};
 
@@ -39,11 +40,21 @@ pub(crate) fn run(command: Command) -> Result<u8, Error> {
             print(&if json { pretty(&found) } else { devices::table(&found) });
             Ok(())
         }
+        Command::Completions { shell } => {
+            help::completions(shell);
+            Ok(())
+        }
+        Command::Man { folder: Some(folder), .. } => help::man(&folder),
+        Command::Man { folder: None, .. } => {
+            print(help::markdown().trim_end());
+            Ok(())
+        }
         Command::Scene { what } => {
             match what {
                 SceneCommand::New => print(scene::template().trim_end()),
                 SceneCommand::Schema => print(&pretty(&scene::schema())),
                 SceneCommand::Reference => print(scene::reference().trim_end()),
+                SceneCommand::StudySchema => print(&pretty(&cutis::sweep::Study::json_schema())),
                 SceneCommand::ReportSchema => print(&pretty(&Report::json_schema())),
             }
             Ok(())
@@ -55,5 +66,4 @@ pub(crate) fn run(command: Command) -> Result<u8, Error> {
 /// Indented JSON. Serializing plain data cannot fail.
 fn pretty(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).unwrap_or_else(|e| format!("{{\"error\": \"{e}\"}}"))
-                SceneCommand::StudySchema => print(&pretty(&cutis::sweep::Study::json_schema())),
 }

@@ -5,6 +5,7 @@ mod disk;
 mod exit_codes;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod help;
 #[cfg(unix)]
 mod interrupt;
 mod json;
@@ -14,8 +15,8 @@ mod printed;
 mod run_folder;
 mod slicer;
 mod steps;
-mod tune;
 mod sweep;
+mod tune;
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
