@@ -1,4 +1,4 @@
-"""`workflows/Snakefile` gives the table of `cutis sweep`, and repeats only the cases that changed."""
+"""`workflows/Snakefile` gives the table of `cutis sweep`, and repeats only what changed."""
 
 import csv
 import os

@@ -1,6 +1,7 @@
 //! Developer commands of the workspace, started by `cargo xtask`: run the tests, check the rules,
 //! count lines, pack the crates. They install nothing and change nothing outside the checkout.
 
+mod book;
 mod default_features;
 mod examples;
 mod lanes;
@@ -115,6 +116,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["tidy"] => tidy::run(&workspace),
         ["tidy", "--all"] => tidy::check(&workspace, true),
         ["licenses"] => steps::run_all(&workspace, Selection::Only("licenses")),
+        ["book"] => book::run(&workspace),
         ["lines"] => lines::run(&workspace, None),
         ["lines", "--at", revision] => lines::run(&workspace, Some(revision)),
         ["python"] => steps::build_for_python(&workspace).and_then(|()| python::run(&workspace)),

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 
 use crate::workspace::{Workspace, execute, exit_code};
-use crate::{default_features, examples, lanes, miri, publish, python, tidy, tools, vulkan};
+use crate::{book, default_features, examples, lanes, miri, publish, python, tidy, tools, vulkan};
 
 struct Step {
     name: &'static str,
@@ -30,6 +30,7 @@ const STEPS: &[Step] = &[
     Step { name: "instructions", quick: false, run: instructions },
     Step { name: "miri", quick: false, run: miri::run },
     Step { name: "documentation", quick: false, run: documentation },
+    Step { name: "book", quick: false, run: book::run },
     Step { name: "python", quick: false, run: python::run },
     Step { name: "publish", quick: false, run: publish::dry_run },
 ];

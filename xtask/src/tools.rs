@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 
 use crate::workspace::Workspace;
-use crate::{miri, python, vulkan};
+use crate::{book, miri, python, vulkan};
 
 /// Checks for every tool before the long steps begin. The slow steps need some that the quick ones
 /// do not.
@@ -16,6 +16,7 @@ pub fn require(workspace: &Workspace, slow_steps: bool) -> Result<()> {
     if slow_steps {
         let python = python::require(workspace)?;
         println!("the report is checked in {}", python::require_browser(workspace)?);
+        println!("the book is built by {}", book::require(workspace)?.display());
         println!("{python} with venv is installed; unsafe code is checked by {}", miri::require(workspace)?);
     }
     Ok(())

@@ -1,14 +1,18 @@
 //! The command line.
 
+mod sweep;
+
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args as Group, Parser, Subcommand, value_parser};
+use clap::{Args as Group, Parser, Subcommand};
 use cutis::mesh::{SkinMode, Split};
 use cutis::render::Side;
 use cutis::scene::{Override, constraint_kinds};
 use cutis::volume::{ReadOptions, sample::LatticeSize};
 use cutis::{FieldDirection, ResampleInput};
+
+pub(crate) use sweep::SweepArgs;
 
 /// Cut a CT scan and watch skin tension open the wound.
 ///
@@ -314,35 +318,6 @@ pub(crate) struct TuneArgs {
     /// Time limit for picking a setting, minutes; region and ablation may each take as long again
     #[arg(long, default_value_t = 5.0)]
     pub(crate) minutes: f64,
-}
-
-/// Options of `cutis sweep`.
-#[derive(Clone, Debug, Group)]
-pub(crate) struct SweepArgs {
-    /// Folder of the sweep [default: the study's name with `-sweep`, in the current folder]
-    #[arg(long)]
-    pub(crate) out: Option<PathBuf>,
-    /// Cases that run at the same time
-    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = value_parser!(u16).range(1..))]
-    pub(crate) jobs: u16,
-    /// Threads of each case [default: all cores, shared by the cases that run at the same time]
-    #[arg(long, value_name = "NUMBER", value_parser = value_parser!(u16).range(1..))]
-    pub(crate) threads: Option<u16>,
-    /// Run only the case with this name, in this process
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["list", "dry_run", "table", "jobs"])]
-    pub(crate) case: Option<String>,
-    /// Print the names of the cases; read no scan and run nothing
-    #[arg(long, conflicts_with_all = ["dry_run", "table"])]
-    pub(crate) list: bool,
-    /// Print which cases would run; run nothing
-    #[arg(long, conflicts_with = "table")]
-    pub(crate) dry_run: bool,
-    /// Write the table and the plots of the cases that are done; run nothing
-    #[arg(long)]
-    pub(crate) table: bool,
-    /// Print as JSON
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 /// Options that change a scene.

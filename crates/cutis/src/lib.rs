@@ -69,3 +69,7 @@ pub use tune::{TuneOptions, Tuning, tune};
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/book/extending.md")]
+struct Extending;

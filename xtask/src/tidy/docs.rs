@@ -78,6 +78,18 @@ pub fn ignored_examples(page: &str, text: &str) -> Vec<Finding> {
         .collect()
 }
 
+/// The page that lists the chapters of the book.
+const SUMMARY: &str = "docs/SUMMARY.md";
+
+/// Finds pages of `docs` that the list of chapters lacks.
+pub fn in_summary(files: &Files, summary: &str) -> Vec<Finding> {
+    let listed: Vec<String> =
+        summary.lines().flat_map(link_targets).filter_map(|target| resolve(SUMMARY, &target)).collect();
+    let pages = files.with_extension("md").filter(|path| path.starts_with("docs/") && *path != SUMMARY);
+    let missing = pages.filter(|page| !listed.iter().any(|listed| listed == page));
+    missing.map(|page| Finding::failure(page, 0, format!("is not in {SUMMARY}"))).collect()
+}
+
 /// Lines outside code blocks, numbered from 1.
 fn prose(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut in_code = false;
@@ -94,7 +106,7 @@ fn without_code(line: &str) -> String {
 }
 
 /// Targets of `[text](target)`, `![alt](target)`, `[label]: target` and `src="target"`.
-fn link_targets(line: &str) -> Vec<String> {
+pub fn link_targets(line: &str) -> Vec<String> {
     let mut targets = Vec::new();
     for (open, close) in [("](", ')'), ("src=\"", '"'), ("href=\"", '"')] {
         for piece in line.split(open).skip(1) {
@@ -113,7 +125,7 @@ fn link_targets(line: &str) -> Vec<String> {
 }
 
 /// The path from the root of a link on `page`. `None` if it leaves the repository.
-fn resolve(page: &str, link: &str) -> Option<String> {
+pub fn resolve(page: &str, link: &str) -> Option<String> {
     let mut parts: Vec<&str> = page.split('/').collect();
     parts.pop();
     for part in link.trim_end_matches('/').split('/') {
@@ -200,6 +212,14 @@ mod tests {
             ),
             5
         );
+    }
+
+    #[test]
+    fn pages_outside_the_book_are_caught() {
+        let found =
+            |summary: &str| in_summary(&files(), summary).into_iter().map(|f| f.place).collect::<Vec<_>>();
+        assert_eq!(found("- [a](ARCHITECTURE.md)\n  - [b](book/theory.md)\n"), [""; 0]);
+        assert_eq!(found("- [a](ARCHITECTURE.md)\n"), ["docs/book/theory.md"]);
     }
 
     #[test]

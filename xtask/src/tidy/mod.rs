@@ -21,6 +21,7 @@ use std::fmt;
 use anyhow::{Context, Result, bail};
 
 use crate::workspace::{Scope, Workspace};
+pub use docs::{link_targets, resolve};
 use files::Files;
 use not_clean::{Filter, Rule};
 use source::Source;
@@ -76,6 +77,7 @@ pub fn check(workspace: &Workspace, all: bool) -> Result<()> {
     let mut filter = Filter::new(all);
     let mut findings = in_manifests(workspace, &files, &mut filter)?;
     findings.extend(docs::required(&files));
+    findings.extend(docs::in_summary(&files, &files.read("docs/SUMMARY.md")?));
     findings.extend(in_files(workspace, &files, &mut filter)?);
     findings.extend(filter.warnings());
     for finding in &findings {

@@ -21,8 +21,8 @@ pub enum Ran {
     Before,
 }
 
-/// Runs a case of the study file `study` in its run folder unless it is done, with `threads` threads (0: all cores), and adds
-/// a line to its journal. Waits while another process runs the case.
+/// Runs a case of the study file `study` in its run folder unless it is done, with `threads`
+/// threads (0: all cores), and adds a line to its journal. Waits while another process runs it.
 ///
 /// # Errors
 /// The errors of [`run`](crate::run()), which the journal keeps, and [`Error::File`] if the folder
