@@ -318,6 +318,21 @@ fn calls_that_mean_nothing_are_refused() {
     assert_eq!(desk.names("."), ["scene.toml", "study.toml"]);
 }
 
+/// The studies in the book are valid for a scene of the repository.
+#[test]
+fn the_studies_in_the_book_are_valid() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let scene = format!("scene = \"{root}/fixtures/scenes/abdomen-incision.toml\"");
+    let desk = Desk::new();
+    for (page, cases) in [("sweeps", 14), ("values", 10)] {
+        let text = std::fs::read_to_string(format!("{root}/docs/book/{page}.md")).unwrap();
+        let study = text.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+        desk.put("study.toml", study.replace("scene = \"scene.toml\"", &scene));
+        let listed = desk.cutis(&["sweep", "study.toml", "--list"]).expect_success().stdout;
+        assert_eq!(listed.lines().count(), cases, "{page}");
+    }
+}
+
 /// A case alone is the one of the sweep, for any number of threads.
 #[test]
 fn cases_one_by_one_give_the_same_table() {
