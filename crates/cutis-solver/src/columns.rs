@@ -35,8 +35,8 @@ fn half(count: usize) -> usize {
 }
 
 impl<T: Scalar> System<T> {
-    /// Returns the memory in bytes that the vertices take by column, or 0 if too few constraints are
-    /// in rows, so that columns would not make their projection faster.
+    /// Returns the memory in bytes that the vertices take by column, or 0 if too few constraints
+    /// are in rows, so that columns would not make their projection faster.
     pub fn column_bytes(&self) -> usize {
         let all: usize = self.kinds.iter().map(|kind| kind.len()).sum();
         let in_rows: usize = self.kinds.iter().map(|kind| kind.constraints_in_rows()).sum();

@@ -210,7 +210,8 @@ fn follow(
     Ok(Found { name, free, constraints, prepared_s, steps, true_error: None, peak_gb: peak_gb(), complexity })
 }
 
-/// Largest memory of this process since it was reset, in 10⁹ bytes. `None` if the system does not tell.
+/// Largest memory of this process since it was reset, in 10⁹ bytes. `None` if the system does not
+/// tell.
 fn peak_gb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;

@@ -60,13 +60,13 @@ impl Shown {
     pub(super) fn shows(&self, center: Point3<f64>, radius: f64) -> bool {
         let (on_ray, direction, reach) = &self.close_up;
         let from_ray = center - on_ray;
-        let beside = from_ray - direction * direction.dot(&from_ray);
+        let across = from_ray - direction * direction.dot(&from_ray);
         let (middle, corner) = self.in_slices;
         let near_slice = |&(axis, at): &(usize, f64)| {
             let mut from_middle = center - middle;
             from_middle[axis] = 0.0;
             (center[axis] - at).abs() <= self.thickness_mm + radius && from_middle.norm() <= corner + radius
         };
-        beside.norm() <= reach + radius || self.slices.iter().any(near_slice)
+        across.norm() <= reach + radius || self.slices.iter().any(near_slice)
     }
 }
