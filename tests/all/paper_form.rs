@@ -33,7 +33,7 @@ fn the_paper_form_has_another_name_in_the_solver() {
 fn parts_and_colors_of_a_plan_have_the_key_of_the_kind() {
     let plan = plan(&[]);
     let memory: Vec<&str> = plan.memory.iter().map(|part| part.part.as_str()).collect();
-    assert_eq!(memory, ["vertices", "distance", "volume", "stc", "columns"]);
+    assert_eq!(memory, ["vertices", "distance", "volume", "stc"]);
     for kind in KINDS {
         assert!(plan.colors[kind] > 0, "{:?}", plan.colors);
         let part = plan.costs.parts.iter().find(|part| part.part == kind).unwrap();

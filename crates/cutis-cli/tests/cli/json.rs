@@ -96,7 +96,7 @@ fn check() {
     expect_keys(&found, &["ledger.parts[].ms_per_frame"]);
     let parts: Vec<&str> =
         found["ledger"]["parts"].as_array().unwrap().iter().map(|p| p["part"].as_str().unwrap()).collect();
-    let expected = ["vertices", "distance", "volume", "columns", "check"];
+    let expected = ["vertices", "distance", "volume", "check"];
     assert_eq!(parts, expected, "what is left out has no part");
     assert!(
         found["ledger"]["parts"][1]["host_bytes"].as_u64() == found["memory"][1]["bytes"].as_u64(),

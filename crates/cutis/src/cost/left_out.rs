@@ -41,12 +41,12 @@ pub(super) fn sections(scene: &Scene, backend: &Chosen) -> Vec<String> {
 }
 
 /// The parts that a region of interest and a graded lattice leave out. `memory` is the memory of
-/// the solver by part, and `by_column` tells whether the solver can keep vertices by column.
-pub(super) fn of_lattice(body: &Body, memory: &[MemoryPart], by_column: bool) -> Vec<String> {
-    [region(body, memory, by_column), grading(body)].into_iter().flatten().collect()
+/// the solver by part.
+pub(super) fn of_lattice(body: &Body, memory: &[MemoryPart]) -> Vec<String> {
+    [region(body, memory), grading(body)].into_iter().flatten().collect()
 }
 
-fn region(body: &Body, memory: &[MemoryPart], by_column: bool) -> Option<String> {
+fn region(body: &Body, memory: &[MemoryPart]) -> Option<String> {
     let mesh = &body.mesh;
     let inactive = mesh.inactive.as_ref().filter(|inactive| inactive.tets > 0)?;
     let kept_and_left = |part: &str| match KINDS.iter().find(|row| row.key == part) {
@@ -58,13 +58,7 @@ fn region(body: &Body, memory: &[MemoryPart], by_column: bool) -> Option<String>
         let [kept, left] = kept_and_left(&part.part);
         part.bytes as f64 * left as f64 / kept.max(1) as f64
     };
-    let has = |part: &str| memory.iter().any(|p| p.part == part);
-    // A region can be too small for columns, which the whole body would have.
-    let columns = match by_column && has("vertices") && !has("columns") && !has("incidences") {
-        true => (size_of::<[f32; 4]>() * (mesh.positions.len() + inactive.vertices)) as f64,
-        false => 0.0,
-    };
-    let bytes = memory.iter().map(saved).sum::<f64>() + columns;
+    let bytes: f64 = memory.iter().map(saved).sum();
     let why = body.picked_region.map_or(String::new(), |PickedRegion { wound_mm, error }| {
         format!(
             "; it was picked for wounds of {wound_mm:.0} mm, whose opening is about {:.0} % smaller than in \

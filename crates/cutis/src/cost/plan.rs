@@ -96,8 +96,7 @@ impl Plan {
         warnings.extend(idle_adapter(scene, &backend));
         let mut left_out = costs.left_out;
         left_out.extend(left_out::sections(scene, &backend));
-        let by_column = !backend.on_gpu() && !backend.is_reference();
-        left_out.extend(left_out::of_lattice(body, &memory, by_column));
+        left_out.extend(left_out::of_lattice(body, &memory));
         let plan = Self {
             backend: backend.report.clone(),
             sizes,
