@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::voxels::{Opened, VoxelType, decode_raw};
+use crate::voxels::{Opened, VoxelType, decode_raw, require_file};
 use crate::{Format, Grid, VolumeError, metaimage, nifti, nrrd, read};
 
 /// Part of the lines about segments that says where a segment is. It does not hold once the labels
@@ -43,6 +43,9 @@ impl LabelMap {
     /// header. [`VolumeError::Header`] for a NIfTI file whose values are scaled.
     pub fn read(path: impl AsRef<Path>) -> Result<(Self, Vec<String>), VolumeError> {
         let path = path.as_ref();
+        if !path.is_dir() {
+            require_file(path)?;
+        }
         if path.is_dir() || read::has_dicom_mark(path) {
             let reason = "a label map must be a NIfTI, NRRD or MetaImage file, not DICOM";
             return Err(VolumeError::NotNifti { path: path.into(), reason });

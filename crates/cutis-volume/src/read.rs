@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use crate::voxels::{Observer, Opened};
+use crate::voxels::{Observer, Opened, require_file};
 use crate::{Loaded, VolumeError, metaimage, nifti, nrrd, to_perpendicular_axes};
 
 /// How to read a volume.
@@ -51,6 +51,9 @@ fn read_files(
     options: &ReadOptions,
     observer: Option<&mut Observer<'_>>,
 ) -> Result<Loaded, VolumeError> {
+    if !path.is_dir() {
+        require_file(path)?;
+    }
     #[cfg(feature = "dicom")]
     if path.is_dir() || crate::dicom::is_dicom(path) {
         return crate::dicom::read_series(path, options, observer);

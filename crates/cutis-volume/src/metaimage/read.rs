@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::header::Header;
-use crate::voxels::{Compression, Layout, Observer, Opened, Source, again, decode, lines};
+use crate::voxels::{Compression, Layout, Observer, Opened, Source, again, data_file, decode, lines};
 use crate::{Loaded, VolumeError};
 
 /// Number of bytes in which a header has one of the fields that every image has.
@@ -54,7 +54,7 @@ pub(crate) fn with_open<T>(
     let header = Header::decode(path, &lines, &mut warnings)?;
     if let Some(name) = &header.data_file {
         source.finish()?;
-        source = Source::open_plain(&path.with_file_name(name), again(&mut observer))?;
+        source = Source::open_plain(&data_file(path, "ElementDataFile", name)?, again(&mut observer))?;
     }
     let before = source.position();
     if let (true, Some(size)) = (header.compressed, header.compressed_size) {

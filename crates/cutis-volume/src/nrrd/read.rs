@@ -4,7 +4,9 @@ use std::path::Path;
 
 use super::MAGIC;
 use super::header::{Encoding, Header};
-use crate::voxels::{Compression, Layout, Observer, Opened, Source, again, decode, header_error, lines};
+use crate::voxels::{
+    Compression, Layout, Observer, Opened, Source, again, data_file, decode, header_error, lines,
+};
 use crate::{Loaded, VolumeError};
 
 /// Reads an NRRD file. Its values are HU.
@@ -41,7 +43,7 @@ pub(crate) fn with_open<T>(
     let header = Header::decode(path, &lines[1..], &mut warnings)?;
     if let Some(name) = &header.data_file {
         source.finish()?;
-        source = Source::open_plain(&path.with_file_name(name), again(&mut observer))?;
+        source = Source::open_plain(&data_file(path, "data file", name)?, again(&mut observer))?;
     }
     let before = source.position();
     if header.encoding == Encoding::Gzip {

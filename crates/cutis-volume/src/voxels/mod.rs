@@ -1,6 +1,7 @@
 //! What the file formats share: bytes of a file, voxels of any real type, and compression.
 
 mod convert;
+mod data_file;
 mod decode;
 mod gzip;
 mod put;
@@ -8,6 +9,7 @@ mod source;
 mod text;
 
 pub(crate) use convert::VoxelType;
+pub(crate) use data_file::{data_file, require_file};
 pub(crate) use decode::{Layout, Opened, decode, decode_raw};
 pub(crate) use gzip::GzipWriter;
 pub(crate) use put::{PutVoxels, fits_int16, put_hu};

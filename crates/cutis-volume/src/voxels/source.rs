@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::bufread::ZlibDecoder;
 
+use super::data_file::require_file;
 use crate::VolumeError;
 use crate::gzip_members::GzipMembers;
 
@@ -65,6 +66,7 @@ impl<'a> Source<'a> {
         detect: bool,
     ) -> Result<Self, VolumeError> {
         let failed = |source| VolumeError::Io { path: path.into(), action: "read", source };
+        require_file(path)?;
         let mut file = File::open(path).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
         let mut magic = Vec::with_capacity(2);

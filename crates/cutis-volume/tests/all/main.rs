@@ -5,6 +5,7 @@ mod awkward;
 mod dicom;
 mod hostile;
 mod labels;
+mod outside;
 mod phantom;
 mod round_trip;
 mod text_formats;
