@@ -8,6 +8,9 @@ use crate::VolumeError;
 /// Longest header, bytes. Longer ones hold other data, such as the tags of a DICOM file.
 const LONGEST: usize = 1 << 20;
 
+/// Most axes of a file. The format NRRD allows as many.
+const MOST_AXES: usize = 16;
+
 /// Reads lines without their end until `last` is true for one. The file may end before.
 pub(crate) fn lines(
     source: &mut Source<'_>,
@@ -53,7 +56,9 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     numbers?.try_into().ok().filter(|numbers: &[f64; N]| numbers.iter().all(|number| number.is_finite()))
 }
 
-/// Sizes of axes with spaces between them: whole numbers above 0.
+/// Sizes of axes with spaces between them: whole numbers above 0. `None` for more than [`MOST_AXES`].
 pub(crate) fn sizes(text: &str) -> Option<Vec<u64>> {
-    text.split_whitespace().map(|part| part.parse().ok().filter(|&size| size > 0)).collect()
+    let size = |part: &str| part.parse().ok().filter(|&size| size > 0);
+    let sizes: Option<Vec<u64>> = text.split_whitespace().take(MOST_AXES + 1).map(size).collect();
+    sizes.filter(|sizes| sizes.len() <= MOST_AXES)
 }

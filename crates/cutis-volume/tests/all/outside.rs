@@ -96,3 +96,24 @@ fn a_pipe_is_refused_and_not_waited_for() {
         }
     }
 }
+
+/// A header of a megabyte once took time that grew with the square of its length.
+#[test]
+fn countless_axes_are_refused_at_once() {
+    let here = folder();
+    let many = format!("sizes: {}", "2 ".repeat(400_000));
+    let path = here.path().join("v.nrrd");
+    let text = NRRD.replace("sizes: 2 3 4", &many).replace("data file: NAME\n", "");
+    fs::write(&path, text.replace("space directions: (2,0,0) (0,3,0) (0,0,4)\n", "")).unwrap();
+    let start = Instant::now();
+    let error = read(&path).unwrap_err().to_string();
+    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+    assert!(error.contains("sizes") && error.len() < 1000, "{error}");
+    let path = here.path().join("v.mha");
+    fs::write(
+        &path,
+        META.replace("2 3 4\n", &format!("{}\n", "2 ".repeat(400_000))).replace("NAME", "LOCAL"),
+    )
+    .unwrap();
+    assert!(read(&path).unwrap_err().to_string().len() < 1000);
+}
