@@ -102,6 +102,21 @@ pub enum VolumeError {
         /// Bytes found after the header, or an upper bound of them for a compressed file.
         found_bytes: u64,
     },
+    /// A small compressed file unpacks to more than any scan does.
+    #[error(
+        "{path} has {file_bytes} bytes and unpacks to {bytes}, more than {times} times as many and more than 1 GiB, as a file that is \
+         made to fill the memory: if you trust it, unpack it first"
+    )]
+    Expansion {
+        /// Path of the file.
+        path: PathBuf,
+        /// Bytes on the disk.
+        file_bytes: u64,
+        /// Bytes that the header promises.
+        bytes: u64,
+        /// The largest expansion of a large volume.
+        times: u64,
+    },
     /// The volume does not fit into the memory of this machine.
     #[error("{path}: {shape:?} voxels are more than this machine can hold")]
     TooLarge {

@@ -15,6 +15,10 @@ use crate::gzip_members::GzipMembers;
 pub(crate) const PORTION: usize = 1 << 18;
 /// Largest expansion by deflate: a match of 258 bytes takes at least two bits.
 const DEFLATE_LIMIT: u64 = 1032;
+/// Compressed voxels of up to this size may unpack from any file.
+const FREE: u64 = 1 << 30;
+/// Beyond it, a file may unpack to so many times its length. Scans unpack to two or three times.
+const MOST_EXPANSION: u64 = 200;
 /// Number of bytes read after the last voxel, to reach the gzip checksum.
 const TAIL: u64 = 1 << 16;
 
@@ -98,11 +102,17 @@ impl<'a> Source<'a> {
         self.at
     }
 
-    /// Returns an error if a file of this length cannot hold the voxels.
+    /// Returns an error if a file of this length cannot hold the voxels, or would unpack to so much
+    /// that it is made to fill the memory.
     pub(crate) fn expect(&self, voxel_offset: u64, bytes: u64) -> Result<(), VolumeError> {
         let most = if self.compressed { self.len.saturating_mul(DEFLATE_LIMIT) } else { self.len };
+        let usual = if self.compressed { self.len.saturating_mul(MOST_EXPANSION).max(FREE) } else { most };
         match voxel_offset.checked_add(bytes) {
-            Some(end) if end <= most => Ok(()),
+            Some(end) if end <= usual => Ok(()),
+            Some(end) if end <= most => {
+                let (path, file_bytes) = (self.path.clone(), self.len);
+                Err(VolumeError::Expansion { path, file_bytes, bytes: end, times: MOST_EXPANSION })
+            }
             _ => Err(VolumeError::Truncated {
                 path: self.path.clone(),
                 expected_bytes: bytes,

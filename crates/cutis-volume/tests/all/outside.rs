@@ -117,3 +117,28 @@ fn countless_axes_are_refused_at_once() {
     .unwrap();
     assert!(read(&path).unwrap_err().to_string().len() < 1000);
 }
+
+/// A file of some megabytes of zeros in gzip unpacks to gigabytes. An uncompressed file cannot.
+#[test]
+fn a_small_file_that_unpacks_to_gigabytes_is_refused_before_it_is_unpacked() {
+    use std::io::Write;
+    let here = folder();
+    let header = NRRD.replace("data file: NAME\n", "").replace("sizes: 2 3 4", "sizes: 1000 1000 1000");
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    // Two gigabytes would take long to pack. The claim is enough, if the file could hold it.
+    packed.write_all(&[0; 1 << 16]).unwrap();
+    let mut bytes = header.replace("encoding: raw", "encoding: gzip").into_bytes();
+    bytes.extend(packed.finish().unwrap());
+    bytes.resize(3 << 20, 0);
+    let path = here.path().join("v.nrrd");
+    fs::write(&path, &bytes).unwrap();
+    let error = read(&path).unwrap_err();
+    assert!(
+        matches!(error, VolumeError::Expansion { file_bytes: 3_145_728, bytes: 2_000_000_000, .. }),
+        "{error}"
+    );
+    // Control: a file that is long enough for the claim is unpacked, and then found to be short.
+    bytes.resize(11 << 20, 0);
+    fs::write(&path, &bytes).unwrap();
+    assert!(matches!(read(&path), Err(VolumeError::Truncated { .. })));
+}
