@@ -12,7 +12,7 @@ use flate2::read::DeflateDecoder;
 
 use super::codestream::Codec;
 use super::error::DicomError;
-use super::lengths::{self, Encoding};
+use super::lengths::{self, Encoding, Header};
 use crate::VolumeError;
 
 /// Bytes of preamble and prefix at the beginning of a file (PS3.10, section 7.1).
@@ -68,28 +68,28 @@ pub(super) fn parse(path: &Path, bytes: &[u8], whole: bool) -> Result<DefaultDic
     }
 }
 
-/// The transfer syntax in the file meta information, and the position of the data set after it.
+/// The transfer syntax in the file meta information, and the position of the data set after it. The
+/// elements are those that the parser sees, so that it allocates for no longer ones.
 fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), &'static str> {
     const SHORT: &str = "its file meta information is incomplete";
     if bytes.get(128..PREFIX) != Some(b"DICM") {
         return Err("the letters DICM are missing at byte 128");
     }
-    let (mut at, mut syntax) = (PREFIX, None);
+    let (mut at, mut syntax, mut promised) = (PREFIX, None, None);
     while bytes.get(at..at + 2) == Some(&[2, 0]) {
-        let header = bytes.get(at..at + 8).ok_or(SHORT)?;
-        let (length, value) = match &header[4..6] {
-            b"OB" | b"OW" | b"UN" | b"UT" | b"UR" | b"UC" => {
-                let long: [u8; 4] = bytes.get(at + 8..at + 12).ok_or(SHORT)?.try_into().map_err(|_| SHORT)?;
-                (u32::from_le_bytes(long) as usize, at + 12)
-            }
-            _ => (usize::from(u16::from_le_bytes([header[6], header[7]])), at + 8),
-        };
-        let end = value.checked_add(length).ok_or(SHORT)?;
-        let text = bytes.get(value..end).ok_or(SHORT)?;
-        if header[2..4] == [0x10, 0] {
-            syntax = Some(String::from_utf8_lossy(text).trim_end_matches(['\0', ' ']).to_owned());
+        let header = Header::read(&bytes[at..], false, true).ok_or(SHORT)?;
+        let value = at + header.size;
+        at = value.checked_add(header.length as usize).ok_or(SHORT)?;
+        let value = bytes.get(value..at).ok_or(SHORT)?;
+        match header.tag[1] {
+            // The length of all that follows.
+            0 => promised = value.first_chunk().map(|&length| at + u32::from_le_bytes(length) as usize),
+            0x10 => syntax = Some(String::from_utf8_lossy(value).trim_end_matches(['\0', ' ']).to_owned()),
+            _ => {}
         }
-        at = end;
+    }
+    if promised.is_some_and(|end| end > at) {
+        return Err("its file meta information ends before the length that it states");
     }
     Ok((syntax.ok_or("its file meta information names no transfer syntax")?, at))
 }

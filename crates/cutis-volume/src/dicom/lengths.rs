@@ -84,17 +84,20 @@ fn end(bytes: &[u8], at: usize, length: u32) -> Result<usize, &'static str> {
     end.ok_or("it is truncated: an element is longer than the rest of the file")
 }
 
-struct Header {
-    tag: [u16; 2],
+/// The header of an element.
+pub(super) struct Header {
+    pub(super) tag: [u16; 2],
     /// Type of the value. Empty if the encoding does not give it.
     vr: [u8; 2],
-    length: u32,
+    pub(super) length: u32,
     /// Bytes of the header.
-    size: usize,
+    pub(super) size: usize,
 }
 
 impl Header {
-    fn read(bytes: &[u8], big_endian: bool, explicit_vr: bool) -> Option<Self> {
+    /// Reads a header. `None` if the bytes end within it. An unknown type has a long length, as in
+    /// the parser.
+    pub(super) fn read(bytes: &[u8], big_endian: bool, explicit_vr: bool) -> Option<Self> {
         let short = |at: usize| {
             let pair: [u8; 2] = bytes.get(at..at + 2)?.try_into().ok()?;
             Some(if big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) })

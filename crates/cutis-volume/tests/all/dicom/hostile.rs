@@ -45,6 +45,26 @@ fn lengths_beyond_the_file_are_refused() {
     assert!(matches!(error, DicomError::Pixels { .. }), "{error}");
 }
 
+/// The parser takes the length of an element of unknown type from another place. It allocated 775
+/// MB for this file of 1 KB.
+#[test]
+fn file_meta_information_is_read_as_the_parser_reads_it() {
+    let good = bytes_of(&Slice::at(0.0));
+    let find = |mark: &[u8]| good.windows(mark.len()).position(|part| part == mark).unwrap();
+    let mut unknown = good.clone();
+    let at = find(b"\x02\x00\x10\x00UI") + 4;
+    unknown[at..at + 2].copy_from_slice(b"zz");
+    let error = read(&unknown).unwrap_err().to_string();
+    assert!(error.contains("file meta information is incomplete"), "{error}");
+    // The length of the group reaches into the data set, whose lengths have another form.
+    let mut long = good.clone();
+    let at = find(b"\x02\x00\x00\x00UL\x04\x00") + 8;
+    let length = u32::from_le_bytes(good[at..at + 4].try_into().unwrap());
+    long[at..at + 4].copy_from_slice(&(length + 40).to_le_bytes());
+    let error = read(&long).unwrap_err().to_string();
+    assert!(error.contains("ends before the length"), "{error}");
+}
+
 /// A slice whose pixels are the fragment of a compressed stream.
 fn compressed(syntax: &'static str, stream: Vec<u8>) -> Slice {
     let mut slice = Slice { syntax, ..Slice::at(0.0) };
