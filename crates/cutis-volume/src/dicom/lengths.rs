@@ -5,6 +5,9 @@
 
 /// Deepest nesting of sequences. Enhanced images have about four levels.
 const DEEPEST: usize = 32;
+/// Most elements and items. A slice has some hundred, and a parser takes far more memory for a short
+/// element than the file.
+const MOST: usize = 100_000;
 const ITEM: [u16; 2] = [0xfffe, 0xe000];
 const ITEM_END: [u16; 2] = [0xfffe, 0xe00d];
 const SEQUENCE_END: [u16; 2] = [0xfffe, 0xe0dd];
@@ -30,7 +33,7 @@ struct Open {
 
 /// Returns why the data set cannot be parsed, if an element does not end in it.
 pub(super) fn check(bytes: &[u8], encoding: Encoding) -> Result<(), &'static str> {
-    let mut at = 0;
+    let (mut at, mut count) = (0, 0);
     let mut open: Vec<Open> = Vec::new();
     while at < bytes.len() {
         while open.last().is_some_and(|inner| inner.end == Some(at)) {
@@ -42,6 +45,10 @@ pub(super) fn check(bytes: &[u8], encoding: Encoding) -> Result<(), &'static str
         let header = Header::read(&bytes[at..], encoding.big_endian, explicit_vr)
             .ok_or("it ends within the header of an element")?;
         at += header.size;
+        count += 1;
+        if count > MOST {
+            return Err("it has more than 100,000 elements");
+        }
         match (header.tag, header.length) {
             (ITEM_END | SEQUENCE_END, _) => {
                 open.pop().filter(|inner| inner.end.is_none()).ok_or("a sequence ends that did not begin")?;
@@ -160,5 +167,12 @@ mod tests {
         let deep = (0..40).fold(Vec::new(), |inner, _| nested(&inner));
         assert!(check(&deep, EXPLICIT).unwrap_err().contains("nested"));
         assert!(check(b"\xfe\xff\xdd\xe0\0\0\0\0", EXPLICIT).is_err());
+    }
+
+    #[test]
+    fn countless_elements_are_refused() {
+        let element = b"\x08\x00\x60\x00CS\0\0";
+        assert_eq!(check(&element.repeat(MOST), EXPLICIT), Ok(()));
+        assert!(check(&element.repeat(MOST + 1), EXPLICIT).unwrap_err().contains("100,000"));
     }
 }
