@@ -20,6 +20,17 @@ pub(super) enum Codec {
 /// What to do with a compression that is not read.
 const DECOMPRESS: &str = "decompress the files first, for example with `gdcmconv --raw IN OUT`";
 
+/// Most pixels per byte of a lossless JPEG stream: each has a code of at least one bit.
+const LOSSLESS: usize = 8;
+/// Most pixels per byte of a lossy JPEG stream: a block of 64 has a code of at least one bit.
+const LOSSY: usize = 512;
+/// Most pixels per byte of a large JPEG 2000 stream. Scans have fewer than ten.
+const JPEG_2000: usize = 1000;
+/// Pixels that a JPEG 2000 stream of any length may have: an empty slice takes a few bytes.
+const FREE: usize = 1 << 22;
+/// Most tiles of a JPEG 2000 image. Each takes some kilobytes of memory.
+const MOST_TILES: usize = 1024;
+
 impl Codec {
     pub(super) fn of(uid: &str) -> Self {
         match uid {
@@ -86,16 +97,31 @@ pub(super) fn check(
                 );
             }
             same_size(found, size)?;
+            dense(size, stream, if lossless { LOSSLESS } else { LOSSY })?;
             wide_enough(bits, format)
         }
         Codec::Jpeg2000 => {
-            let (found, bits) =
+            let (found, bits, tiles) =
                 jpeg2000_size(stream).ok_or("the JPEG 2000 stream has no header of an image")?;
             same_size(found, size)?;
+            if tiles > MOST_TILES {
+                return Err("the JPEG 2000 image is divided into more than 1024 tiles");
+            }
+            if size[0] * size[1] > FREE {
+                dense(size, stream, JPEG_2000)?;
+            }
             wide_enough(bits, format)
         }
         Codec::Rle => rle(stream, size[0] * size[1], format.bits_allocated as usize / 8),
         Codec::Raw | Codec::Refused(..) => Ok(()),
+    }
+}
+
+/// Refuses a stream that is too short for its image, before a decoder allocates for it.
+fn dense(size: [usize; 2], stream: &[u8], pixels_per_byte: usize) -> Result<(), &'static str> {
+    match size[0] * size[1] <= stream.len().saturating_mul(pixels_per_byte) {
+        true => Ok(()),
+        false => Err("the compressed stream is too short for Columns x Rows pixels"),
     }
 }
 
@@ -133,16 +159,21 @@ fn jpeg_size(stream: &[u8]) -> Option<([usize; 2], u8, bool)> {
     }
 }
 
-/// Columns, rows and bits of the SIZ segment, the first one of a JPEG 2000 codestream
-/// (ISO 15444-1, A.5.1). A JP2 file has boxes before the codestream.
-fn jpeg2000_size(stream: &[u8]) -> Option<([usize; 2], u8)> {
+/// Columns and rows, bits, and the number of tiles from the SIZ segment, the first one of a JPEG 2000
+/// codestream (ISO 15444-1, A.5.1). A JP2 file has boxes before the codestream.
+fn jpeg2000_size(stream: &[u8]) -> Option<([usize; 2], u8, usize)> {
     let start = stream.windows(4).position(|bytes| bytes == [0xff, 0x4f, 0xff, 0x51])?;
     let siz = stream.get(start + 4..start + 44)?;
     let number = |at: usize| Some(u32::from_be_bytes(siz.get(at..at + 4)?.try_into().ok()?) as usize);
-    let columns = number(4)?.checked_sub(number(12)?)?;
-    let rows = number(8)?.checked_sub(number(16)?)?;
+    let (mut size, mut tiles) = ([0; 2], 1usize);
+    for axis in 0..2 {
+        let [end, first, tile, first_tile] = [4, 12, 20, 28].map(|at| number(at + 4 * axis));
+        let tile = tile.filter(|&tile| tile > 0)?;
+        size[axis] = end?.checked_sub(first?)?;
+        tiles = tiles.checked_mul(end?.checked_sub(first_tile?)?.div_ceil(tile))?;
+    }
     let components = u16::from_be_bytes([siz[36], siz[37]]);
-    (components == 1).then_some(([columns, rows], (siz[38] & 0x7f) + 1))
+    (components == 1).then_some((size, (siz[38] & 0x7f) + 1, tiles))
 }
 
 /// Each byte of a pixel has a segment of runs. Each must have at least `pixels` bytes (PS3.5,
@@ -203,11 +234,43 @@ mod tests {
             let mut bytes = vec![0xff, 0x4f, 0xff, 0x51, 0, 41, 0, 0, 0, 0, 0, columns, 0, 0, 0, 5];
             bytes.resize(40, 0);
             bytes.extend([0, 1, 11, 1, 1, 0, 0, 0, 0]);
+            // Tiles of one column and five rows.
+            (bytes[27], bytes[31]) = (1, 5);
             bytes
         };
         assert_eq!(check(Codec::Jpeg2000, &stream(6), [6, 5], FORMAT), Ok(()));
         assert!(check(Codec::Jpeg2000, &stream(7), [6, 5], FORMAT).is_err());
         assert!(check(Codec::Jpeg2000, &stream(6)[..30], [6, 5], FORMAT).is_err());
+        assert_eq!(jpeg2000_size(&stream(6)).map(|(.., tiles)| tiles), Some(6));
+    }
+
+    /// Sizes and streams that agree with each other, but would take gigabytes.
+    #[test]
+    fn streams_that_are_too_short_for_their_image_are_refused() {
+        let jpeg = |kind: u8| {
+            let mut bytes = vec![0xff, 0xd8, 0xff, kind, 0, 11, 8, 0, 64, 0, 64, 1, 1, 0x11, 0];
+            bytes.resize(64, 0);
+            bytes
+        };
+        let format = PixelFormat { bits_allocated: 8, bits_stored: 8, high_bit: 7, signed: false };
+        let size = [64, 64];
+        assert_eq!(check(Codec::Jpeg, &jpeg(0xc0), size, format), Ok(()));
+        assert!(check(Codec::Jpeg, &jpeg(0xc3), size, format).unwrap_err().contains("too short"));
+        assert_eq!(check(Codec::Jpeg, &[jpeg(0xc3), vec![0; 512]].concat(), size, format), Ok(()));
+        let jpeg2000 = |side: u16, tile: u16| {
+            let mut bytes = vec![0xff, 0x4f, 0xff, 0x51, 0, 41, 0, 0];
+            for number in [side, side, 0, 0, tile, tile, 0, 0] {
+                bytes.extend(u32::from(number).to_be_bytes());
+            }
+            bytes.extend([0, 1, 11, 1, 1, 0, 0, 0, 0]);
+            bytes
+        };
+        let checked = |side: u16, tile: u16| {
+            check(Codec::Jpeg2000, &jpeg2000(side, tile), [usize::from(side); 2], FORMAT)
+        };
+        assert_eq!((checked(2048, 2048), checked(2048, 64)), (Ok(()), Ok(())));
+        assert!(checked(2048, 32).unwrap_err().contains("tiles"));
+        assert!(checked(65535, 65535).unwrap_err().contains("too short"));
     }
 
     #[test]
