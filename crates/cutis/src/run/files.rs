@@ -9,8 +9,8 @@ use cutis_volume::{PartialFile, VolumeError};
 use sha2::{Digest, Sha256};
 
 use super::series;
-use crate::Error;
 use crate::scene::OutputSection;
+use crate::{Error, Progress};
 
 /// Writes a whole file under a temporary name in the same folder, then renames it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
@@ -133,6 +133,16 @@ paths! {
 }
 
 impl RunFolder {
+    /// Removes the unfinished files of killed runs.
+    pub(crate) fn remove_abandoned(&self, progress: &dyn Progress) {
+        let folders = [self.0.clone(), self.series_folder()];
+        let count: usize = folders.iter().map(PartialFile::remove_abandoned).sum();
+        if count > 0 {
+            let folder = self.0.display();
+            progress.note(&format!("removed {count} unfinished files of a killed run from {folder}"));
+        }
+    }
+
     /// The files that a run with these outputs writes.
     ///
     /// `has_lines` says whether the body has lines of tension to draw.

@@ -75,6 +75,7 @@ fn run_with(
 ) -> Result<Report, Error> {
     let (mut clock, folder) = (Clock::new(progress), RunFolder(options.out.clone()));
     files::check_writable(&folder.0)?;
+    folder.remove_abandoned(progress);
     let prepare::Prepared { source, body, model, backend, plan } = prepare(loaded, request, &mut clock)?;
     let setup = simulate::Setup { loaded, options, folder: &folder, source: &source, body: &body };
     let simulated = simulate(&setup, model, &backend, plan, &mut clock)?;
