@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use cutis::{Error, LoadedScene};
+use sha2::{Digest, Sha256};
 
 use crate::scenes::{SMALL, frames, run_in, scene};
 
@@ -79,7 +80,8 @@ fn a_checkpoint_that_does_not_fit_is_refused_by_name() {
     }
     for (position, expected) in [
         (0, "begin"),
-        (20, "differ"),
+        (7, "version 5"),
+        (20, "damaged"),
         (41, "damaged"),
         (45, "damaged"),
         (1000, "damaged"),
@@ -92,5 +94,50 @@ fn a_checkpoint_that_does_not_fit_is_refused_by_name() {
         assert!(matches!(error, Error::Checkpoint { .. }), "{error:?}");
     }
     std::fs::write(&file, &good).unwrap();
+    run_in(folder.path(), &dragged("10"), true).unwrap();
+}
+
+/// A checksum is no proof of a good writer: lengths that contradict the scene must not panic.
+#[test]
+fn a_checkpoint_with_false_lengths_and_a_right_checksum_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("checkpoint.bin");
+    run_in(folder.path(), &dragged("5"), false).unwrap();
+    let good = std::fs::read(&file).unwrap();
+    let vertices = u64::from_le_bytes(good[44..52].try_into().unwrap());
+    // The history: the number of wounds, sutures, handles and rows.
+    let history = 52 + 12 * vertices as usize;
+    let counts: Vec<u32> =
+        good[history..history + 16].as_chunks().0.iter().map(|&count| u32::from_le_bytes(count)).collect();
+    assert_eq!(counts, [1, 0, 1, 6]);
+    let changed = |at: usize, value: &[u8]| {
+        let mut bytes = good[..good.len() - 32].to_vec();
+        bytes[at..at + value.len()].copy_from_slice(value);
+        let seal: [u8; 32] = Sha256::digest(&bytes).into();
+        [bytes, seal.to_vec()].concat()
+    };
+    let nan = f32::NAN.to_le_bytes();
+    for (what, at, value) in [
+        ("frames", 40, 4u32.to_le_bytes()),
+        ("no vertices", 44, [0; 4]),
+        ("fewer vertices", 44, (vertices as u32 - 1).to_le_bytes()),
+        ("countless vertices", 44, [255; 4]),
+        ("no wounds", history, [0; 4]),
+        ("countless wounds", history, [255; 4]),
+        ("sutures", history + 4, 1u32.to_le_bytes()),
+        ("no handles", history + 8, [0; 4]),
+        ("no rows", history + 12, [0; 4]),
+        ("fewer rows", history + 12, 5u32.to_le_bytes()),
+        ("many rows", history + 12, (vertices as u32).to_le_bytes()),
+        ("a position that is not a number", 52, nan),
+    ] {
+        std::fs::write(&file, changed(at, &value)).unwrap();
+        let error = run_in(folder.path(), &dragged("10"), true).expect_err(what);
+        assert!(!error.to_string().is_empty(), "{what}");
+        let is_typed = matches!(error, Error::Checkpoint { .. }) || value == nan;
+        assert!(is_typed && error.is_bad_input(), "{what}: {error:?}");
+    }
+    // Control: the right lengths.
+    std::fs::write(&file, changed(40, &5u32.to_le_bytes())).unwrap();
     run_in(folder.path(), &dragged("10"), true).unwrap();
 }

@@ -59,6 +59,7 @@ pub use error::Error;
 pub use model::{ScanTension, SceneCt, SceneSystem, build_system, build_system_and_ct};
 pub use output::{FieldDirection, ResampleInput, ResampleRequest, report, resample_run};
 pub use progress::{Progress, Silent};
+pub use run::checkpoint::Checkpoint;
 pub use run::files::RunFolder;
 #[cfg(feature = "gpu")]
 pub use run::run_on;

@@ -82,40 +82,72 @@ impl Checkpoint {
     /// Reads a checkpoint of a scene with `vertices` vertices.
     ///
     /// # Errors
-    /// [`Error::File`] if it cannot be read, [`Error::Checkpoint`] if it is damaged or of another
-    /// scene.
+    /// [`Error::File`] if it cannot be read, [`Error::Checkpoint`] if it is missing, damaged or of
+    /// another scene.
     pub(crate) fn read(path: &Path, fingerprint: &[u8; 32], vertices: usize) -> Result<Self, Error> {
         let fail = |why: String| Error::Checkpoint { path: path.into(), why };
         if !path.exists() {
             return Err(fail("there is none; a run with run.checkpoint_every above 0 writes it".into()));
         }
         let bytes = files::read(path)?;
-        let least = HEADER + 24 * vertices + history::EMPTY + SEAL;
-        if bytes.len() < HEADER + SEAL || bytes[..7] != MAGIC[..7] {
-            return Err(fail("it does not begin as one".into()));
-        }
-        if bytes[7] != MAGIC[7] {
-            return Err(fail("another version of the program wrote it; begin again without --resume".into()));
-        }
+        let saved = Self::parse(path, &bytes)?;
         if bytes[8..40] != fingerprint[..] {
             return Err(fail("scene, volume or program version differ from those that wrote it".into()));
         }
-        if bytes.len() < least || bytes.len() % 4 != least % 4 {
-            return Err(fail(format!("it has {} bytes; {vertices} vertices need {least}", bytes.len())));
+        match saved.positions.len() == vertices {
+            true => Ok(saved),
+            false => Err(fail(format!("it has {} vertices, and the body {vertices}", saved.positions.len()))),
         }
-        let (content, seal) = bytes.split_at(bytes.len() - SEAL);
-        if Sha256::digest(content)[..] != *seal {
-            return Err(fail("its checksum is wrong: the file is damaged".into()));
+    }
+
+    /// Reads a checkpoint from the bytes of a file. `path` names it in messages. Which scene wrote
+    /// it is not checked.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] for a file of another kind or version, for one that is truncated or
+    /// changed, and for lengths that contradict each other.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, Error> {
+        let fail = |why: String| Error::Checkpoint { path: path.into(), why };
+        let (kind, version) = MAGIC.split_at(MAGIC.len() - 1);
+        if !bytes.starts_with(kind) {
+            return Err(fail("it does not begin as one".into()));
         }
-        let frame = u32::from_le_bytes([content[40], content[41], content[42], content[43]]);
-        let words = |bytes: &[u8]| -> Vec<u32> {
-            bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
-        };
-        let (positions, rest) = content[HEADER..].split_at(12 * vertices);
+        match bytes.get(kind.len()) {
+            Some(found) if version == [*found] => {}
+            Some(found) if found.is_ascii_digit() => {
+                let [found, own] = [*found, version[0]].map(char::from);
+                let why = format!(
+                    "it has version {found}, and this program reads version {own}; begin again without --resume"
+                );
+                return Err(fail(why));
+            }
+            _ => return Err(fail("it does not begin as one".into())),
+        }
+        let damaged = || fail("its checksum is wrong: the file is damaged or truncated".into());
+        let (content, seal) = bytes.split_last_chunk::<SEAL>().ok_or_else(damaged)?;
+        if content.len() < HEADER || Sha256::digest(content)[..] != seal[..] {
+            return Err(damaged());
+        }
+        // The checksum is no proof of a good writer, so that the lengths are checked too.
+        let (header, rest) = content.split_at(HEADER);
+        let frame = u32::from_le_bytes([header[40], header[41], header[42], header[43]]);
+        let count = header[44..].iter().rev().fold(0, |count, &byte| count << 8 | u64::from(byte));
+        let vertices = usize::try_from(count).ok().filter(|&count| count <= rest.len() / 24);
+        let vertices =
+            vertices.ok_or_else(|| fail(format!("it holds fewer bytes than {count} vertices need")))?;
+        let (positions, rest) = rest.split_at(12 * vertices);
         let (history, rest) = history::decode(rest).ok_or_else(|| fail("its history is damaged".into()))?;
-        let positions = words(positions);
-        let positions =
-            positions.chunks_exact(3).map(|p| Point3::from([p[0], p[1], p[2]].map(f32::from_bits)));
-        Ok(Self { frame, positions: positions.collect(), words: words(rest), history })
+        let words = |bytes: &[u8]| -> Vec<u32> {
+            bytes.as_chunks::<4>().0.iter().map(|&word| u32::from_le_bytes(word)).collect()
+        };
+        let (positions, words) = (words(positions), words(rest));
+        if words.len() < 3 * vertices || rest.len() % 4 != 0 {
+            return Err(fail(format!(
+                "it holds {} bytes after the history of {vertices} vertices",
+                rest.len()
+            )));
+        }
+        let positions = positions.as_chunks::<3>().0.iter().map(|p| Point3::from(p.map(f32::from_bits)));
+        Ok(Self { frame, positions: positions.collect(), words, history })
     }
 }

@@ -21,6 +21,14 @@ pub(crate) struct FrameRow {
     pub(crate) handles: Vec<f64>,
 }
 
+impl FrameRow {
+    /// Whether both rows are of the same frame, and of the same wounds, sutures and handles.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let shape = |row: &Self| (row.frame, row.gapes.len(), row.sutures.len(), row.handles.len());
+        shape(self) == shape(other)
+    }
+}
+
 /// Mean and shortest time of the frames that this run computed.
 pub(crate) fn frame_times(rows: &[FrameRow]) -> Frames {
     let times: Vec<f64> = rows.iter().filter_map(|row| row.ms).collect();

@@ -85,8 +85,14 @@ impl RunLoop<'_> {
         let lips = Lips::new(self.gapes);
         let mut times = PartTimes::new(self.timing);
         let mut rows = self.history.clone();
-        if rows.is_empty() {
-            rows.push(self.row(simulation, &lips, self.done(), None)?);
+        let now = self.row(simulation, &lips, self.done(), None)?;
+        match rows.last() {
+            None if self.resumed.is_none() => rows.push(now),
+            Some(last) if last.is_like(&now) && rows.len() as u64 == u64::from(now.frame) + 1 => {}
+            _ => {
+                let why = "its history is not that of this scene".into();
+                return Err(Error::Checkpoint { path: self.folder.checkpoint(), why });
+            }
         }
         if let Some(series) = &self.series {
             series.begin(self.resumed.is_some())?;
