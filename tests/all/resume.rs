@@ -64,7 +64,9 @@ fn a_checkpoint_that_does_not_fit_is_refused_by_name() {
         assert!(text.contains(file.to_str().unwrap()) && text.contains(expected), "{what}: {text}");
         error
     };
-    let missing = refused("missing", &dragged("5"), "run.checkpoint_every");
+    let mut without = dragged("5");
+    without.scene.run.checkpoint_every = 0;
+    let missing = refused("missing", &without, "run.checkpoint_every");
     assert!(matches!(missing, Error::Checkpoint { .. }), "{missing:?}");
 
     run_in(folder.path(), &dragged("5"), false).unwrap();
@@ -95,6 +97,18 @@ fn a_checkpoint_that_does_not_fit_is_refused_by_name() {
     }
     std::fs::write(&file, &good).unwrap();
     run_in(folder.path(), &dragged("10"), true).unwrap();
+}
+
+/// A run with checkpoints that ended before the first of them can be repeated by the same command.
+#[test]
+fn resuming_before_the_first_checkpoint_begins_again() {
+    let [fresh, resumed] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    run_in(fresh.path(), &dragged("5"), false).unwrap();
+    assert_eq!(run_in(resumed.path(), &dragged("5"), true).unwrap().frames.count, 5);
+    for file in ["checkpoint.bin", "skin.vtu"] {
+        let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
+        assert!(read(fresh.path()) == read(resumed.path()), "{file} differs");
+    }
 }
 
 /// A checksum is no proof of a good writer: lengths that contradict the scene must not panic.

@@ -54,7 +54,8 @@ pub(crate) enum Command {
         out: Option<PathBuf>,
         #[command(flatten)]
         change: Change,
-        /// Resume from the checkpoint in the run folder
+        /// Resume from the checkpoint in the run folder, or begin if a run with checkpoints has
+        /// written none yet
         #[arg(long)]
         resume: bool,
         /// Print report.json on standard output

@@ -38,7 +38,8 @@ use simulate::simulate;
 pub struct RunOptions {
     /// Run folder; it is created if it does not exist.
     pub out: PathBuf,
-    /// Whether to resume from the checkpoint in the run folder.
+    /// Whether to resume from the checkpoint in the run folder. Without one the run begins at its
+    /// first frame if it writes checkpoints itself, and is refused otherwise.
     pub resume: bool,
 }
 

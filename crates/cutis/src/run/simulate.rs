@@ -60,7 +60,8 @@ pub(super) fn simulate(
     plan.warnings.extend(stale_files(setup));
     plan.warnings.iter().for_each(|warning| clock.progress.note(warning));
     let fingerprint = checkpoint::fingerprint(scene, &source.sha256);
-    let resumed = if options.resume { Some(resume(setup, &fingerprint, &mut *simulation)?) } else { None };
+    let resumes = options.resume && !begins_again(setup, clock.progress);
+    let resumed = if resumes { Some(resume(setup, &fingerprint, &mut *simulation)?) } else { None };
     let (resumed, history) = resumed.unzip();
     let run_loop = RunLoop {
         run: &scene.run,
@@ -110,6 +111,16 @@ fn stale_files(setup: &Setup<'_>) -> Option<String> {
             stale.join(", ")
         )
     })
+}
+
+/// Whether there is nothing to resume from, because a run with checkpoints ended before the first.
+fn begins_again(setup: &Setup<'_>, progress: &dyn Progress) -> bool {
+    let path = setup.folder.checkpoint();
+    let again = setup.loaded.scene.run.checkpoint_every > 0 && !path.exists();
+    if again {
+        progress.note(&format!("there is no {} yet: the run begins at its first frame", path.display()));
+    }
+    again
 }
 
 /// Restores the state of the run folder's checkpoint, and returns its frame and the rows up to it.
