@@ -33,3 +33,24 @@ fn a_folder_that_cannot_be_written_is_refused_before_the_ct_is_read() {
         assert!(!done.stderr.contains("make the phantom"), "{}", done.stderr);
     }
 }
+
+/// A killed run once removed the series of an earlier run and kept its checkpoint, from which
+/// `--resume` then made an incomplete series.
+#[test]
+fn a_checkpoint_goes_with_its_series() {
+    let desk = Desk::new();
+    let run = |output: &str, frames: &str, every: &str| {
+        let [output, every] = [format!("output={output}"), format!("run.checkpoint_every={every}")];
+        let set = ["--frames", frames, "--set", &output, "--set", &every];
+        desk.cutis(&[&["run", "scene.toml", "--out", "run"][..], &set].concat()).expect_success();
+    };
+    run("{ series_every = 1 }", "2", "1");
+    assert_eq!(desk.names("run"), ["checkpoint.bin", "skin-series", "skin.pvd"]);
+    run("{ series_every = 1 }", "1", "0");
+    assert_eq!(desk.names("run"), ["skin-series", "skin.pvd"]);
+    assert_eq!(desk.names("run/skin-series"), ["skin-000000.vtp", "skin-000001.vtp"]);
+    // Control: a run without a series leaves a checkpoint alone.
+    run("{}", "2", "1");
+    run("{}", "1", "0");
+    assert!(desk.path("run/checkpoint.bin").exists());
+}

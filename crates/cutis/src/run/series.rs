@@ -31,9 +31,11 @@ impl<'a> Series<'a> {
         })
     }
 
-    /// Removes the files of an earlier run that this run does not continue.
+    /// Removes the files of an earlier run that this run does not continue. Its checkpoint goes
+    /// first, because nothing could resume from it without the files of the series.
     pub(super) fn begin(&self, resumed: bool) -> Result<(), Error> {
         if !resumed {
+            remove_file(&self.folder.checkpoint())?;
             remove(self.folder)?;
         }
         files::create_folder(&self.folder.series_folder())
@@ -93,16 +95,21 @@ pub(super) fn remove(folder: &RunFolder) -> Result<(), Error> {
         .map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())).collect())
         .unwrap_or_default();
     for path in paths.into_iter().filter(|path| is_of_series(path)).chain([folder.series()]) {
-        match fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(Error::File { path, action: "remove", why: error.to_string() });
-            }
-            _ => {}
-        }
+        remove_file(&path)?;
     }
     // A folder with files of the user stays.
     let _ = fs::remove_dir(inside);
     Ok(())
+}
+
+/// Removes a file if it exists.
+fn remove_file(path: &Path) -> Result<(), Error> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::File { path: path.into(), action: "remove", why: error.to_string() })
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
