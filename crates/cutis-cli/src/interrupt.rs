@@ -1,6 +1,8 @@
-//! Ctrl-C during a run: no partial file stays, and the last line says how to resume.
+//! Ctrl-C during a run: its state is saved, no partial file stays, and the last line says how to
+//! resume.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 
 use cutis::RunFolder;
@@ -8,7 +10,23 @@ use cutis::RunFolder;
 use crate::terminal;
 
 /// Exit code of a program that SIGINT ended.
-const INTERRUPTED: i32 = 130;
+pub(crate) const INTERRUPTED: u8 = 130;
+
+/// Whether the present stage asks for the wish of the user, so that it can end by itself.
+static ASKS: AtomicBool = AtomicBool::new(false);
+/// Whether the user pressed Ctrl-C.
+static PRESSED: AtomicBool = AtomicBool::new(false);
+
+/// Whether the user pressed Ctrl-C. A stage that asks ends by itself.
+pub(crate) fn is_asked() -> bool {
+    ASKS.store(true, Ordering::SeqCst);
+    PRESSED.load(Ordering::SeqCst)
+}
+
+/// The next stage has not asked yet.
+pub(crate) fn stage_ended() {
+    ASKS.store(false, Ordering::SeqCst);
+}
 
 /// A run that can be interrupted.
 pub(crate) struct Interruptible {
@@ -21,8 +39,10 @@ pub(crate) struct Interruptible {
 }
 
 impl Interruptible {
-    /// Waits for Ctrl-C in the background, and then ends the program. Without a handler, which a
-    /// system may refuse, Ctrl-C ends the program as it always does.
+    /// Waits for Ctrl-C in the background. A run that can be resumed then ends after the present
+    /// frame and saves its state. Everything else ends at once, and so does a run at the second
+    /// Ctrl-C. Without a handler, which a system may refuse, Ctrl-C ends the program as it always
+    /// does.
     #[expect(
         clippy::disallowed_methods,
         reason = "the run goes on in other threads; its partial files are removed"
@@ -30,10 +50,26 @@ impl Interruptible {
     pub(crate) fn watch(self) {
         let start = SystemTime::now();
         let _ = ctrlc::set_handler(move || {
+            let is_first = !PRESSED.swap(true, Ordering::SeqCst);
+            if is_first && self.can_resume && ASKS.load(Ordering::SeqCst) {
+                terminal::interrupted("the run ends after this frame; Ctrl-C again ends it at once");
+                return;
+            }
             terminal::interrupted(&self.message(start));
             remove_partial_files(&self.out);
-            std::process::exit(INTERRUPTED);
+            std::process::exit(INTERRUPTED.into());
         });
+    }
+
+    /// The message of a run that has saved its state.
+    pub(crate) fn saved(checkpoint: &Path, resumed: bool) -> String {
+        let call: Vec<String> = std::env::args().map(|word| quoted(&word)).collect();
+        let resume = if resumed { "" } else { " --resume" };
+        format!(
+            "interrupted; {} holds a state of this run. To continue: {}{resume}",
+            checkpoint.display(),
+            call.join(" ")
+        )
     }
 
     fn message(&self, start: SystemTime) -> String {
@@ -41,15 +77,7 @@ impl Interruptible {
         let written = std::fs::metadata(&checkpoint).and_then(|facts| facts.modified());
         let is_ours = written.is_ok_and(|written| self.resumed || written >= start);
         match (self.can_resume, is_ours) {
-            (true, true) => {
-                let call: Vec<String> = std::env::args().map(|word| quoted(&word)).collect();
-                let resume = if self.resumed { "" } else { " --resume" };
-                format!(
-                    "interrupted; {} holds a state of this run. To continue: {}{resume}",
-                    checkpoint.display(),
-                    call.join(" ")
-                )
-            }
+            (true, true) => Self::saved(&checkpoint, self.resumed),
             (true, false) => "interrupted; there is no checkpoint of this run to resume from: \
                               run.checkpoint_every = 10 saves its state after every tenth frame"
                 .into(),
@@ -63,14 +91,15 @@ impl Interruptible {
 pub(crate) fn watch_sweep() {
     let _ = ctrlc::set_handler(move || {
         terminal::interrupted("interrupted; the same command goes on with the cases that are not done");
-        std::process::exit(INTERRUPTED);
+        std::process::exit(INTERRUPTED.into());
     });
 }
 
 /// Removes the hidden files of this process from the run folder.
 fn remove_partial_files(folder: &Path) {
     let prefix = format!(".cutis-{}-", std::process::id());
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let folders = [folder.to_owned(), RunFolder(folder.to_owned()).series_folder()];
+    let entries = folders.iter().flat_map(|folder| std::fs::read_dir(folder).into_iter().flatten().flatten());
     let is_ours = |name: &str| name.starts_with(&prefix) && name.ends_with(".part");
     for entry in entries.filter(|entry| entry.file_name().to_str().is_some_and(is_ours)) {
         // The program ends, and there is nobody to tell of a file that stays.

@@ -1,4 +1,5 @@
-//! The `cutis` program. Exit codes: 0 done, 1 failed while running, 2 bad input or usage.
+//! The `cutis` program. Exit codes: 0 done, 1 failed while running, 2 bad input or usage, 130
+//! interrupted by Ctrl-C.
 
 mod args;
 mod commands;
@@ -24,6 +25,8 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(code) => ExitCode::from(code),
+        // The command has said how to resume.
+        Err(cutis::Error::Interrupted { .. }) => ExitCode::from(interrupt::INTERRUPTED),
         Err(error) => {
             terminal::error(&error);
             ExitCode::from(error.exit_code())

@@ -145,6 +145,14 @@ pub enum Error {
     #[cfg(feature = "gpu")]
     #[error("{0}; the backend \"cpu\" needs no GPU")]
     Gpu(#[from] GpuError),
+    /// The user asked for the end of a run, and its state was saved.
+    #[error("interrupted after frame {frame}; {} holds this state: continue with --resume", checkpoint.display())]
+    Interrupted {
+        /// The last frame that was computed.
+        frame: u32,
+        /// The checkpoint.
+        checkpoint: PathBuf,
+    },
     /// The device of the backend failed during a run.
     #[error(
         "frame {frame}: {source}; {}",
@@ -241,7 +249,11 @@ impl Error {
                     | GpuError::OutOfMemory { .. }
             ),
             Self::Rest(e) => !matches!(e, RestError::NotAtRest { .. }),
-            Self::Resample(_) | Self::Render(_) | Self::Stopped { .. } | Self::NoSetting { .. } => false,
+            Self::Resample(_)
+            | Self::Render(_)
+            | Self::Interrupted { .. }
+            | Self::Stopped { .. }
+            | Self::NoSetting { .. } => false,
         }
     }
 }

@@ -9,7 +9,7 @@ use cutis::{Error, LoadedScene, Override, Plan, Progress, ResampleRequest, RunOp
 use super::pretty;
 use crate::args::Change;
 use crate::interrupt::Interruptible;
-use crate::terminal::{Terminal, print};
+use crate::terminal::{self, Terminal, print};
 
 /// Error of the state of rest in the demo.
 const DEMO_ERROR: &str = "0.01";
@@ -55,7 +55,11 @@ pub(crate) fn run(
     let loaded = change.applied(Scene::load(scene, &change.overrides(None))?);
     let options = RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume };
     Interruptible { out: options.out.clone(), can_resume: true, resumed: resume }.watch();
-    finish(&loaded, options, json)
+    finish(&loaded, options, json).inspect_err(|error| {
+        if let Error::Interrupted { checkpoint, .. } = error {
+            terminal::interrupted(&Interruptible::saved(checkpoint, resume));
+        }
+    })
 }
 
 /// The run folder of a scene that names none.

@@ -43,6 +43,14 @@ impl Progress for ModuleProgress {
         self.with(|slot| *slot = Some(Stage { name, start, total, percent: 0 }));
     }
 
+    fn set_total(&self, total: u64) {
+        self.with(|slot| {
+            if let Some(stage) = slot {
+                stage.total = total;
+            }
+        });
+    }
+
     fn advance(&self, done: u64) {
         self.with(|slot| {
             let Some(stage) = slot.as_mut().filter(|stage| stage.total > 0) else { return };

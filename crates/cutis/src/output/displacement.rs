@@ -45,10 +45,13 @@ pub(super) fn write_field(
     let mut writer = VectorWriter::create(path, grid)?;
     let mut coverage: Vec<u8> = Vec::new();
     coverage.try_reserve_exact(grid.len()).map_err(|_| VolumeError::Shape { shape: grid.shape })?;
-    field.for_each::<ResampleError>(&|done, _total| progress.advance(done as u64), |slab| {
-        coverage.extend(slab.coverage.iter().map(|&of| of as u8));
-        Ok(writer.push(&slab.vectors_mm)?)
-    })?;
+    field.for_each::<ResampleError>(
+        &|done, total| progress.advance_of(done as u64, total as u64),
+        |slab| {
+            coverage.extend(slab.coverage.iter().map(|&of| of as u8));
+            Ok(writer.push(&slab.vectors_mm)?)
+        },
+    )?;
     writer.finish()?;
     let count = |of: Coverage| coverage.iter().filter(|&&value| value == of as u8).count() as u64;
     let report = Resample {

@@ -122,7 +122,7 @@ fn warped<const N: usize>(
     progress: &dyn Progress,
 ) -> Result<(Vec<u8>, Resample), Error> {
     let (values, _) = labels.bytes().as_chunks::<N>();
-    let advance = |done: usize, _total: usize| progress.advance(done as u64);
+    let advance = |done: usize, total: usize| progress.advance_of(done as u64, total as u64);
     let (warped, counts) = resample_labels(labels.grid(), values, [0; N], &warp.warp(), &advance)?;
     let report = Resample {
         covered_voxels: counts.covered_voxels as u64,

@@ -120,7 +120,7 @@ impl BodyWarp {
             volume,
             &self.mesh.warp(&self.deformed),
             self.on_device.as_ref(),
-            &|done, _total| progress.advance(done as u64),
+            &|done, total| progress.advance_of(done as u64, total as u64),
         )?;
         Ok((volume, counts(report)))
     }
@@ -150,7 +150,7 @@ impl BodyWarp {
         let (body, shell) = (around(body), around(shell));
         let tets = [body.as_slice(), &shell, &around(later)].concat();
         let warp = Warp { tets: &tets, body_tets: body.len(), removed, ..self.mesh.warp(rest) };
-        let progress = |done: usize, _total: usize| progress.advance(done as u64);
+        let progress = |done: usize, total: usize| progress.advance_of(done as u64, total as u64);
         Ok(Cow::Owned(stages.resample(volume, &warp, None, &progress)?.0))
     }
 }

@@ -200,6 +200,9 @@ impl RunLoop<'_> {
     ) -> Result<(), Error> {
         let RunSection { frames, checkpoint_every: every, .. } = *self.run;
         for frame in self.done() + 1..=frames {
+            if progress.is_stopped() {
+                return Err(self.interrupted(simulation, frame - 1, at, rows));
+            }
             at.frame = frame;
             let start = Instant::now();
             if self.timing == Timing::EveryFrame {
@@ -218,13 +221,40 @@ impl RunLoop<'_> {
                 series.frame(simulation, frame, frames)?;
             }
             if every > 0 && (frame % every == 0 || frame == frames) {
-                let saved = Checkpoint { history: rows.clone(), ..simulation.save(frame)? };
-                saved.write(&self.folder.checkpoint(), &self.fingerprint)?;
-                at.saved = Some((frame, self.folder.checkpoint()));
+                self.save(simulation, frame, at, rows)?;
             }
             progress.advance(u64::from(frame - self.done()));
         }
         Ok(())
+    }
+
+    /// Writes a checkpoint.
+    fn save(
+        &self,
+        simulation: &mut dyn Simulation,
+        frame: u32,
+        at: &mut Position,
+        rows: &[FrameRow],
+    ) -> Result<(), Error> {
+        let saved = Checkpoint { history: rows.to_vec(), ..simulation.save(frame)? };
+        saved.write(&self.folder.checkpoint(), &self.fingerprint)?;
+        at.saved = Some((frame, self.folder.checkpoint()));
+        Ok(())
+    }
+
+    /// Saves the state of a run that the user ends, unless the last checkpoint has it.
+    fn interrupted(
+        &self,
+        simulation: &mut dyn Simulation,
+        frame: u32,
+        at: &mut Position,
+        rows: &[FrameRow],
+    ) -> Error {
+        let is_saved = at.saved.as_ref().is_some_and(|(saved, _)| *saved == frame);
+        match if is_saved { Ok(()) } else { self.save(simulation, frame, at, rows) } {
+            Ok(()) => Error::Interrupted { frame, checkpoint: self.folder.checkpoint() },
+            Err(error) => error,
+        }
     }
 
     /// Times the parts of one more frame, if they are not timed in every frame. The state is no
