@@ -9,6 +9,8 @@ mod help;
 #[cfg(unix)]
 mod interrupt;
 mod json;
+#[cfg(unix)]
+mod killed;
 mod looks;
 mod paper_form;
 mod printed;
