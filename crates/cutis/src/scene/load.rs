@@ -15,6 +15,10 @@ const MAX_SCENE_BYTES: u64 = 1 << 20;
 /// Most parts of an override's dotted key. The deepest key of a scene has four parts.
 const MAX_KEY_PARTS: usize = 16;
 
+/// Longest reason that a message quotes, characters. It may hold a name from the file, and the list
+/// of the names that are valid.
+const MAX_REASON: usize = 2000;
+
 /// One `--set key=value`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Override {
@@ -151,9 +155,12 @@ impl Scene {
             let found = lookup(&value, &key).map(|v| shorten(&v.to_string())).unwrap_or_default();
             Error::SceneKey {
                 file: file.into(),
-                key: steps.name(&key),
+                key: shorten(&steps.name(&key)),
                 value: found,
-                why: nearest::with_suggestion(&e.inner().to_string().trim().replace('\n', " ")),
+                why: nearest::with_suggestion(&first_chars(
+                    &e.inner().to_string().trim().replace('\n', " "),
+                    MAX_REASON,
+                )),
             }
         })?;
         crate::model::fill_defaults(&mut scene);
@@ -192,12 +199,13 @@ fn set(mut at: &mut toml::Value, key: &str, new: toml::Value) -> Result<(), Stri
             toml::Value::Array(entries) => {
                 let count = entries.len();
                 part.parse::<usize>().ok().and_then(|n| entries.get_mut(n)).ok_or_else(|| {
-                    format!("`{part}` must be the number of one of the {count} entries, from 0")
+                    format!("`{}` must be the number of one of the {count} entries, from 0", shorten(part))
                 })?
             }
             other => {
                 return Err(format!(
-                    "`{part}` cannot be set inside the value {}",
+                    "`{}` cannot be set inside the value {}",
+                    shorten(part),
                     shorten(&other.to_string())
                 ));
             }
@@ -226,7 +234,11 @@ fn lookup<'a>(value: &'a toml::Value, path: &str) -> Option<&'a toml::Value> {
 
 /// The first 120 characters of a text.
 fn shorten(text: &str) -> String {
-    match text.char_indices().nth(120) {
+    first_chars(text, 120)
+}
+
+fn first_chars(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.into(),
     }
