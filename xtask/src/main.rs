@@ -36,6 +36,7 @@ usage: cargo xtask COMMAND
   python              compare inputs and outputs with nibabel, pydicom, pynrrd and SimpleITK, a bent
                       beam with scikit-fem, and the workflow of Snakemake with `cutis sweep`
   book                build the book as a site in target/book, and check its links
+  fuzz [OPTIONS]      try damaged and hostile inputs with every reader; `fuzz --help` lists the options
   lines [--at REV]    count lines per tree and language, in the checkout or in a revision of git
   publish --dry-run   pack every crate as for crates.io and build it from its package
   study NAME [OPTIONS]
@@ -120,6 +121,9 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
         ["lines"] => lines::run(&workspace, None),
         ["lines", "--at", revision] => lines::run(&workspace, Some(revision)),
         ["python"] => steps::build_for_python(&workspace).and_then(|()| python::run(&workspace)),
+        ["fuzz", options @ ..] => {
+            return workspace::exit_code(&mut steps::fuzz_command(&workspace, options)?);
+        }
         ["publish", "--dry-run"] => publish::dry_run(&workspace),
         ["publish"] => bail!(
             "`cargo xtask` only offers `publish --dry-run`; make a release with `cargo publish --workspace`"

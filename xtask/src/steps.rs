@@ -27,6 +27,7 @@ const STEPS: &[Step] = &[
     Step { name: "no-default-features", quick: false, run: default_features::run },
     Step { name: "third-party", quick: false, run: third_party },
     Step { name: "parity", quick: false, run: parity },
+    Step { name: "fuzz", quick: false, run: fuzz_briefly },
     Step { name: "instructions", quick: false, run: instructions },
     Step { name: "miri", quick: false, run: miri::run },
     Step { name: "documentation", quick: false, run: documentation },
@@ -201,6 +202,20 @@ fn instructions(workspace: &Workspace) -> Result<()> {
         return Ok(());
     }
     execute(workspace.command(workspace.study("debug")?).arg("instructions"))
+}
+
+/// Changed inputs for every reader, for a bounded time.
+fn fuzz_briefly(workspace: &Workspace) -> Result<()> {
+    execute(&mut fuzz_command(workspace, &["--seconds", "20"])?)
+}
+
+/// The program that tries changed inputs. It is built with checks of integer overflow, and with the
+/// features that its dependencies have in the whole workspace.
+pub fn fuzz_command(workspace: &Workspace, options: &[&str]) -> Result<Command> {
+    execute(workspace.cargo("build").args(["--workspace", "--bins", "--quiet"]))?;
+    let mut command = workspace.command(workspace.fuzz()?);
+    command.args(options);
+    Ok(command)
 }
 
 /// Only libraries, because the program `cutis` and the crate `cutis` would write the same page.

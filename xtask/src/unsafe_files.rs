@@ -66,6 +66,11 @@ pub const UNSAFE_FILES: &[UnsafeFile] = &[
         }),
     },
     UnsafeFile {
+        path: "tests/fuzz/harness/memory.rs",
+        reason: "an allocator that counts; it only forwards to the allocator of the system",
+        tests: None,
+    },
+    UnsafeFile {
         path: "crates/cutis-solver-cpu/tests/allocations.rs",
         reason: "an allocator that counts; it only forwards to the allocator of the system",
         tests: None,

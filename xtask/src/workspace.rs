@@ -109,6 +109,11 @@ impl Workspace {
         self.built(&format!("{profile}/study"), "cargo build -p cutis-studies --bin study")
     }
 
+    /// The program that tries changed inputs with every reader.
+    pub fn fuzz(&self) -> Result<PathBuf> {
+        self.built("debug/fuzz", "cargo build --workspace --bins")
+    }
+
     /// A program in the build folder. If it is missing, the error names the command that builds it.
     fn built(&self, path: &str, build: &str) -> Result<PathBuf> {
         let program = self.target_dir()?.join(format!("{path}{}", std::env::consts::EXE_SUFFIX));

@@ -88,7 +88,7 @@ const LAYERS: &[Layer] = &[
 const TEST_HELPERS: &[&str] = &["cutis-test-kit", "cutis-resample-twin"];
 
 /// Tests and studies. They may use any crate, and no product crate uses them.
-const TESTS_AND_STUDIES: &[&str] = &["cutis-studies", "cutis-tests"];
+const TESTS_AND_STUDIES: &[&str] = &["cutis-fuzz", "cutis-studies", "cutis-tests"];
 
 /// Whether the crate is for tests and studies, which are not published.
 fn is_unpublished(name: &str) -> bool {
