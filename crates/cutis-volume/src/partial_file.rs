@@ -13,8 +13,9 @@ static NUMBER: AtomicU32 = AtomicU32::new(0);
 ///
 /// The bytes go to a hidden file in the same folder, which [`PartialFile::commit`] renames to the
 /// target. If the `PartialFile` is dropped before that, the hidden file is removed and the target
-/// does not change. A killed process leaves its hidden files, which [`PartialFile::remove_abandoned`]
-/// removes. A process locks its hidden files, so that others can tell them from abandoned ones.
+/// does not change. A killed process leaves its hidden files, which
+/// [`PartialFile::remove_abandoned`] removes. A process locks its hidden files, so that others can
+/// tell them from abandoned ones.
 #[derive(Debug)]
 pub struct PartialFile {
     file: Option<File>,

@@ -159,8 +159,8 @@ fn jpeg_size(stream: &[u8]) -> Option<([usize; 2], u8, bool)> {
     }
 }
 
-/// Columns and rows, bits, and the number of tiles from the SIZ segment, the first one of a JPEG 2000
-/// codestream (ISO 15444-1, A.5.1). A JP2 file has boxes before the codestream.
+/// Columns and rows, bits, and the number of tiles from the SIZ segment, the first one of a JPEG
+/// 2000 codestream (ISO 15444-1, A.5.1). A JP2 file has boxes before the codestream.
 fn jpeg2000_size(stream: &[u8]) -> Option<([usize; 2], u8, usize)> {
     let start = stream.windows(4).position(|bytes| bytes == [0xff, 0x4f, 0xff, 0x51])?;
     let siz = stream.get(start + 4..start + 44)?;

@@ -5,8 +5,8 @@
 
 /// Deepest nesting of sequences. Enhanced images have about four levels.
 const DEEPEST: usize = 32;
-/// Most elements and items. A slice has some hundred, and a parser takes far more memory for a short
-/// element than the file.
+/// Most elements and items. A slice has some hundred, and a parser takes far more memory for a
+/// short element than the file.
 const MOST: usize = 100_000;
 const ITEM: [u16; 2] = [0xfffe, 0xe000];
 const ITEM_END: [u16; 2] = [0xfffe, 0xe00d];

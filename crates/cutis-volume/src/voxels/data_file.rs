@@ -1,5 +1,5 @@
-//! The file of voxels that a header names. It must lie in the folder of the header, so that a header
-//! from elsewhere cannot make a program read other files.
+//! The file of voxels that a header names. It must lie in the folder of the header, so that a
+//! header from elsewhere cannot make a program read other files.
 
 use std::fs;
 use std::io;

@@ -56,7 +56,8 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     numbers?.try_into().ok().filter(|numbers: &[f64; N]| numbers.iter().all(|number| number.is_finite()))
 }
 
-/// Sizes of axes with spaces between them: whole numbers above 0. `None` for more than [`MOST_AXES`].
+/// Sizes of axes with spaces between them: whole numbers above 0. `None` for more than
+/// [`MOST_AXES`].
 pub(crate) fn sizes(text: &str) -> Option<Vec<u64>> {
     let size = |part: &str| part.parse().ok().filter(|&size| size > 0);
     let sizes: Option<Vec<u64>> = text.split_whitespace().take(MOST_AXES + 1).map(size).collect();
