@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System as SystemAllocator};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use cutis_coloring::greedy;
+use cutis_coloring::Groups;
 use cutis_constraints::{Distance, Volume};
 use cutis_solver::{Formulation, Settings, Solver, SolverReference, Stiffness, System, SystemBuilder};
 use cutis_solver_cpu::SolverCpu;
@@ -31,8 +31,9 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+/// A lattice with nearly all constraints in rows.
 fn body(volumes: bool) -> System<f32> {
-    let lattice = Kuhn::new([30, 20, 20], 0.1);
+    let lattice = Kuhn::new([40, 18, 18], 0.1);
     let count = lattice.positions.len();
     let system = SystemBuilder::<f32>::new(&lattice.positions, &vec![1.0; count])
         .unwrap()
@@ -40,13 +41,13 @@ fn body(volumes: bool) -> System<f32> {
             &lattice.edges,
             &Default::default(),
             Stiffness::compliance(1e-4),
-            &greedy(&lattice.edges, count).unwrap(),
+            &Groups::from_colors(&lattice.edge_colors).unwrap(),
         )
         .unwrap();
     if !volumes {
         return system.build();
     }
-    let groups = greedy(&lattice.tets, count).unwrap();
+    let groups = Groups::from_colors(&lattice.tet_colors).unwrap();
     let compliance = Stiffness::compliance(1e-6);
     system
         .add_from_rest::<Volume, 4>(&lattice.tets, &Default::default(), compliance, &groups)
@@ -105,7 +106,7 @@ fn steps_allocate_nothing_and_memory_is_only_for_parts_in_use() {
 
     // A vertex has 4 + 3 + 3 numbers. A spring has two indices and a length. To these come color
     // offsets, a few runs of each color, and two indices for sixteen springs in a row.
-    let lattice = Kuhn::new([30, 20, 20], 0.1);
+    let lattice = Kuhn::new([40, 18, 18], 0.1);
     let solver = SolverReference::new(body(false), settings(1)).unwrap();
     let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();
     assert_eq!(bytes[0], lattice.positions.len() * 40);
