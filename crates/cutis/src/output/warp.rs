@@ -90,7 +90,7 @@ impl BodyWarp {
         progress: &dyn Progress,
     ) -> Result<(Volume, Resample), Error> {
         let (warp, on_device) = (self.mesh.warp(&self.deformed), self.on_device.as_ref());
-        let progress = |done: usize, _total: usize| progress.advance(done as u64);
+        let progress = |done: usize, total: usize| progress.advance_of(done as u64, total as u64);
         let (resampled, report) = stages.resample_where(volume, &warp, on_device, is_needed, &progress)?;
         self.with_walls(volume, (resampled, counts(report)))
     }
