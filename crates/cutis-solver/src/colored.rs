@@ -5,7 +5,7 @@
 //! vertex. The fields of a batch are private and never change. (2) [`Colored`] borrows the vertices
 //! mutably for its whole lifetime, so that no other code reads or moves them. (3) The chunks are
 //! ranges of one color that do not overlap, and atomic counters that only grow hand out each chunk
-//! once: a counter per share, where the shares are ranges of chunks that do not overlap. So two
+//! once: a counter per share, where the shares are ranges that do not overlap. So two
 //! threads never access the same vertex or the same multiplier. (4) A batch finds the rows of its
 //! runs by comparison of the checked indices, and reads adjacent vertices only where each of them
 //! is a vertex of a constraint of the chunk. [`Columns`](crate::Columns) have a place for each
@@ -30,7 +30,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
-use crate::batch::{ConstraintChunk, Load, Store, TeamForces, VertexChunk};
+use crate::batch::{ConstraintChunk, Load, ROW, Store, TeamForces, VertexChunk};
 use crate::loads::load_of;
 use crate::teams::{MOST_NEIGHBORS, Neighborhood, TEAM, TEAM_CHUNK};
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
@@ -146,11 +146,11 @@ impl<'a, T: Scalar> Colored<'a, T> {
         true
     }
 
-    /// The constraints of a share: some of the chunks.
+    /// The constraints of a share: an equal part of the color, which starts with a whole row.
     fn share(&self, share: usize) -> Range<usize> {
-        let start = |share: usize| {
-            let first = self.chunks() * share / self.shares;
-            self.range.end.min(self.range.start + first * CHUNK)
+        let start = |share: usize| match share == self.shares {
+            true => self.range.end,
+            false => self.range.start + self.range.len() * share / self.shares / ROW * ROW,
         };
         start(share)..start(share + 1)
     }
