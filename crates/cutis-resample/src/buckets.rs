@@ -7,6 +7,9 @@ use crate::tiling::{TileBox, Tiling};
 /// Number of tets in a chunk that is sorted independently.
 const CHUNK: usize = 1 << 16;
 
+/// The number of no tile.
+const NONE: u32 = u32::MAX;
+
 /// For each tile the tets that touch it, in ascending order. A counting sort of chunks with fixed
 /// sizes runs in parallel, so that the result does not depend on the number of threads.
 pub struct Buckets {
@@ -25,10 +28,19 @@ impl Buckets {
         let tiles = tiling.len();
         let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().filter_map(|chunk| {
             let tets = chunk * CHUNK..count.min((chunk + 1) * CHUNK);
-            let touched = || tets.clone().filter_map(|tet| Some((tet as u32, tiles_of(tet)?)));
             let mut offsets = vec![0_u32; tiles + 1];
-            for (_, touched) in touched() {
-                tiling.each(&touched, |tile| offsets[tile + 1] += 1);
+            // Most tets touch one tile, which the second pass need not find again.
+            let mut only = vec![NONE; tets.len()];
+            let mut several = Vec::new();
+            for (only, tet) in only.iter_mut().zip(tets.clone()) {
+                let Some(touched) = tiles_of(tet) else { continue };
+                if let Some(tile) = tiling.only(&touched) {
+                    *only = tile as u32;
+                    offsets[tile + 1] += 1;
+                } else {
+                    tiling.each(&touched, |tile| offsets[tile + 1] += 1);
+                    several.push((tet, touched));
+                }
             }
             for tile in 0..tiles {
                 offsets[tile + 1] += offsets[tile];
@@ -38,12 +50,18 @@ impl Buckets {
             }
             let mut next = offsets.clone();
             let mut order = vec![0; offsets[tiles] as usize];
-            for (tet, touched) in touched() {
-                tiling.each(&touched, |tile| {
+            let mut several = several.into_iter().peekable();
+            for (&only, tet) in only.iter().zip(tets) {
+                let mut put = |tile: usize| {
                     let slot = &mut next[tile];
-                    order[*slot as usize] = tet;
+                    order[*slot as usize] = tet as u32;
                     *slot += 1;
-                });
+                };
+                if only != NONE {
+                    put(only as usize);
+                } else if let Some((_, touched)) = several.next_if(|(of, _)| *of == tet) {
+                    tiling.each(&touched, put);
+                }
             }
             Some(Chunk { order, offsets })
         });

@@ -90,6 +90,13 @@ impl Tiling {
         TilesNear(tiles)
     }
 
+    /// The number of the tile of a box that has one tile.
+    #[inline(always)]
+    pub fn only(&self, tiles: &TileBox) -> Option<usize> {
+        let is_one = (0..3).all(|axis| tiles.end[axis] == tiles.first[axis] + 1);
+        is_one.then(|| self.number(tiles.first.map(|tile| tile as usize)))
+    }
+
     /// Calls `visit` with the number of each tile of a box.
     #[inline(always)]
     pub fn each(&self, tiles: &TileBox, mut visit: impl FnMut(usize)) {
