@@ -6,7 +6,7 @@
 //! does not make up for it (the watchdog of Chamberlain, Powell, Lemarechal and Pedersen, Math.
 //! Program. Study 16, 1982).
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use crate::Search;
 use crate::energy::State;
@@ -36,7 +36,8 @@ pub(crate) struct Moved {
 
 /// A full step that raised the energy. It stays if the next step makes up for it.
 pub(crate) struct Pending {
-    pub state: State,
+    /// Positions of all vertices before the step.
+    pub x: Vec<Point3<f64>>,
     pub direction: Vec<Vector3<f64>>,
     /// Slope of the energy along the direction in J, negative.
     pub slope: f64,
@@ -68,8 +69,8 @@ impl Search<'_> {
     /// Takes a full step back that raised the energy, and makes a shorter one. Returns its
     /// direction.
     pub(crate) fn undo(&mut self) -> Option<(Vec<Vector3<f64>>, Moved)> {
-        let Pending { state, direction, slope, change } = self.pending.take()?;
-        self.state = state;
+        let Pending { x, direction, slope, change } = self.pending.take()?;
+        self.state = self.body.at(x);
         self.energy_change_j -= change;
         self.relaxed = false;
         if let Some(step) = self.steps.last_mut() {

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::blocks::{Block, Blocks, ROWS};
+use crate::blocks::{Block, ROWS};
+use crate::smoother::Operator;
 
 /// Couplings weaker than this share of the geometric mean of both diagonal blocks join no nodes.
 const WEAK: f64 = 0.02;
@@ -22,9 +23,9 @@ impl Aggregates {
     /// Computing 56, 1996). A node whose neighbors are all free forms an aggregate with them. The
     /// rest join the aggregate to which they couple most. Nodes with many neighbors come first,
     /// because larger aggregates make smaller levels.
-    pub fn of<const B: usize>(matrix: &Blocks<B, B>) -> Self {
-        let count = matrix.height();
-        let size = |row: usize| matrix.get(row, row).map_or(0.0, |block| norm(&block));
+    pub fn of<const B: usize, const L: usize>(matrix: &impl Operator<B, L>) -> Self {
+        let (count, pattern) = (matrix.nodes(), matrix.pattern());
+        let size = |row: usize| pattern.find(row, row).map_or(0.0, |place| norm(&matrix.block(place)));
         let sizes: Vec<f64> = (0..count).into_par_iter().with_min_len(ROWS).map(size).collect();
         let strong = |row: usize| {
             matrix.row(row).filter_map({
@@ -36,8 +37,8 @@ impl Aggregates {
                 }
             })
         };
-        let neighbors = |row: usize| matrix.starts[row + 1] - matrix.starts[row];
-        let mean = matrix.columns.len().div_ceil(count.max(1));
+        let neighbors = |row: usize| pattern.row(row).len();
+        let mean = pattern.columns.len().div_ceil(count.max(1));
         let (most, few): (Vec<usize>, Vec<usize>) = (0..count).partition(|&row| neighbors(row) >= mean);
         let mut of = vec![NONE; count];
         let mut aggregates = 0;

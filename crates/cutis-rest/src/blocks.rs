@@ -13,14 +13,42 @@ const PADDING: usize = 8;
 /// A block with `R` rows and `C` columns, column by column.
 pub(crate) type Block<const R: usize, const C: usize> = [[f64; R]; C];
 
-/// A sparse matrix of blocks with `R` rows and `C` columns each. The blocks of a row of blocks are
-/// in the order of their columns.
-#[derive(Clone, Debug)]
-pub(crate) struct Blocks<const R: usize, const C: usize> {
+/// Where the blocks of a sparse matrix are. The blocks of a row are in the order of their columns.
+pub(crate) struct Pattern {
     /// Start of each row of blocks, and the end of the last one.
     pub starts: Vec<usize>,
     /// Column of each block.
     pub columns: Vec<u32>,
+}
+
+impl Pattern {
+    /// Number of rows of blocks.
+    pub fn height(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Places of the blocks of a row.
+    #[inline]
+    pub fn places(&self, row: usize) -> Range<usize> {
+        self.starts[row]..self.starts[row + 1]
+    }
+
+    /// Columns of the blocks of a row.
+    #[inline]
+    pub fn row(&self, row: usize) -> &[u32] {
+        &self.columns[self.places(row)]
+    }
+
+    /// The place of the block in a row and a column, if it is stored.
+    pub fn find(&self, row: usize, column: usize) -> Option<usize> {
+        let found = self.row(row).binary_search(&(column as u32)).ok()?;
+        Some(self.starts[row] + found)
+    }
+}
+
+/// A sparse matrix of blocks with `R` rows and `C` columns each.
+pub(crate) struct Blocks<const R: usize, const C: usize> {
+    pub pattern: Pattern,
     /// Number of columns of blocks.
     pub width: usize,
     /// The blocks one after the other, each column by column, and some zeros.
@@ -28,27 +56,22 @@ pub(crate) struct Blocks<const R: usize, const C: usize> {
 }
 
 impl<const R: usize, const C: usize> Blocks<R, C> {
-    /// A matrix with zeros at these places.
-    pub fn zeros(starts: Vec<usize>, columns: Vec<u32>, width: usize) -> Self {
-        let values = vec![0.0; R * C * columns.len() + PADDING];
-        Self { starts, columns, width, values }
-    }
-
     /// A matrix row by row: `row` adds the blocks of a row to the sums.
-    pub fn by_rows(height: usize, width: usize, row: impl Fn(&mut Sums<R, C>, usize) + Sync) -> Self {
+    pub fn by_rows(rows: Range<usize>, width: usize, row: impl Fn(&mut Sums<R, C>, usize) + Sync) -> Self {
         let part = |sums: &mut Sums<R, C>, part: usize| {
             let (mut ends, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
-            for n in part * ROWS..((part + 1) * ROWS).min(height) {
+            let start = rows.start + part * ROWS;
+            for n in start..(start + ROWS).min(rows.end) {
                 row(sums, n);
                 sums.take(&mut columns, &mut values);
                 ends.push(columns.len());
             }
             (ends, columns, values)
         };
-        let parts = 0..height.div_ceil(ROWS);
+        let parts = 0..rows.len().div_ceil(ROWS);
         let parts: Vec<_> = parts.into_par_iter().map_init(|| Sums::new(width), part).collect();
         let count = parts.iter().map(|(_, columns, _)| columns.len()).sum();
-        let mut starts = Vec::with_capacity(height + 1);
+        let mut starts = Vec::with_capacity(rows.len() + 1);
         let mut columns = Vec::with_capacity(count);
         let mut values = Vec::with_capacity(R * C * count + PADDING);
         starts.push(0);
@@ -59,23 +82,21 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
             values.extend(numbers);
         }
         values.resize(values.len() + PADDING, 0.0);
-        Self { starts, columns, width, values }
+        Self { pattern: Pattern { starts, columns }, width, values }
     }
 
-    /// Number of rows of blocks.
-    pub fn height(&self) -> usize {
-        self.starts.len() - 1
+    /// Appends the rows of another matrix.
+    pub fn append(&mut self, rows: Self) {
+        let before = self.pattern.columns.len();
+        self.pattern.starts.extend(rows.pattern.starts[1..].iter().map(|end| before + end));
+        self.pattern.columns.extend(rows.pattern.columns);
+        self.values.truncate(self.values.len() - PADDING);
+        self.values.extend(rows.values);
     }
 
     /// Number of numbers.
     pub fn len(&self) -> usize {
-        R * C * self.columns.len()
-    }
-
-    /// Places of the blocks of a row.
-    #[inline]
-    pub fn places(&self, row: usize) -> Range<usize> {
-        self.starts[row]..self.starts[row + 1]
+        R * C * self.pattern.columns.len()
     }
 
     /// A block in double precision.
@@ -92,14 +113,8 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
     /// Columns and blocks of a row.
     #[inline]
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, Block<R, C>)> {
-        self.places(row).map(|place| (self.columns[place] as usize, self.block(place)))
-    }
-
-    /// The block in a row and a column, if it is stored.
-    pub fn get(&self, row: usize, column: usize) -> Option<Block<R, C>> {
-        let places = self.places(row);
-        let found = self.columns[places.clone()].binary_search(&(column as u32)).ok()?;
-        Some(self.block(places.start + found))
+        let pattern = &self.pattern;
+        pattern.places(row).map(|place| (pattern.columns[place] as usize, self.block(place)))
     }
 
     /// Adds a block times a vector. The rest of the sum, beyond `R`, has no meaning.
@@ -117,8 +132,8 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
     #[inline(always)]
     pub fn row_times<const L: usize, const M: usize>(&self, row: usize, x: &[[f32; M]]) -> [f32; L] {
         let mut sum = [0.0; L];
-        for place in self.places(row) {
-            self.add_times(place, &x[self.columns[place] as usize], &mut sum);
+        for place in self.pattern.places(row) {
+            self.add_times(place, &x[self.pattern.columns[place] as usize], &mut sum);
         }
         sum[R..].fill(0.0);
         sum
@@ -132,9 +147,9 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         x: &[[f32; M]],
     ) -> [f32; L] {
         let mut products = [[0.0; M]; C];
-        for place in self.places(row) {
+        for place in self.pattern.places(row) {
             let values = &self.values[R * C * place..][..R * (C - 1) + M];
-            let x = &x[self.columns[place] as usize];
+            let x = &x[self.pattern.columns[place] as usize];
             for (column, products) in products.iter_mut().enumerate() {
                 for n in 0..M {
                     products[n] += values[R * column + n] * x[n];
@@ -148,32 +163,17 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         sum
     }
 
-    /// The same matrix with each block transposed at its place.
-    pub fn with_transposed_blocks(&self) -> Blocks<C, R> {
-        let mut values = vec![0.0; self.values.len()];
-        let blocks = values.par_chunks_exact_mut(R * C).zip(self.values.par_chunks_exact(R * C));
-        blocks.with_min_len(ROWS).for_each(|(to, from)| {
-            for column in 0..C {
-                for row in 0..R {
-                    to[C * row + column] = from[R * column + row];
-                }
+    /// Transposes each block at its place.
+    pub fn with_transposed_blocks(self) -> Blocks<C, R> {
+        let Self { pattern, width, mut values } = self;
+        values.par_chunks_exact_mut(R * C).with_min_len(ROWS).for_each(|block| {
+            let mut transposed = [[0.0; C]; R];
+            for (n, &x) in block.iter().enumerate() {
+                transposed[n % R][n / R] = x;
             }
+            block.copy_from_slice(transposed.as_flattened());
         });
-        Blocks { starts: self.starts.clone(), columns: self.columns.clone(), width: self.width, values }
-    }
-
-    /// The values of the rows, for threads that fill `rows` rows each.
-    pub fn parts_mut(&mut self, rows: usize) -> Vec<&mut [f32]> {
-        let mut rest = &mut self.values[..];
-        let mut parts = Vec::new();
-        let ends = self.starts[1..].chunks(rows).map(|ends| ends[ends.len() - 1]);
-        let mut start = 0;
-        for end in ends {
-            let (part, after) = std::mem::take(&mut rest).split_at_mut(R * C * (end - start));
-            parts.push(part);
-            (rest, start) = (after, end);
-        }
-        parts
+        Blocks { pattern, width, values }
     }
 }
 
@@ -256,17 +256,18 @@ pub(crate) struct Columns {
 impl Columns {
     pub fn of<const R: usize, const C: usize>(matrix: &Blocks<R, C>) -> Self {
         let mut starts = vec![0; matrix.width + 1];
-        for &column in &matrix.columns {
+        let Pattern { columns, .. } = &matrix.pattern;
+        for &column in columns {
             starts[column as usize + 1] += 1;
         }
         for column in 0..matrix.width {
             starts[column + 1] += starts[column];
         }
         let mut next = starts.clone();
-        let mut blocks = vec![(0, 0); matrix.columns.len()];
-        for row in 0..matrix.height() {
-            for place in matrix.places(row) {
-                let at = &mut next[matrix.columns[place] as usize];
+        let mut blocks = vec![(0, 0); columns.len()];
+        for row in 0..matrix.pattern.height() {
+            for place in matrix.pattern.places(row) {
+                let at = &mut next[columns[place] as usize];
                 blocks[*at] = (row as u32, place as u32);
                 *at += 1;
             }

@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use cutis_coloring::{Incidence, Tuples};
 use cutis_constraints::Scalar;
-use cutis_solver::{Kind, Stiffness, System, Values};
+use cutis_solver::System;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::RestError;
+use crate::blocks::Pattern;
+use crate::constraints::Constraints;
 use crate::energy::{PART, State};
 use crate::matrix::is_curved;
 
@@ -22,10 +24,9 @@ pub struct Body {
     pub(crate) free: Vec<u32>,
     /// For each vertex its place in `free`, or [`FIXED`].
     pub(crate) place: Vec<u32>,
-    /// For each free vertex the free ones that share a constraint with it, and itself, ascending.
-    /// The start of each list in `columns`, and the end of the last one.
-    pub(crate) starts: Vec<usize>,
-    pub(crate) columns: Vec<u32>,
+    /// For each free vertex the places of the free ones that share a constraint with it, and its
+    /// own, ascending.
+    pub(crate) pattern: Arc<Pattern>,
     /// Weight and load of each free vertex in N.
     pub(crate) weights: Vec<Vector3<f64>>,
     /// Origin of the positions, in the caller's coordinates.
@@ -34,48 +35,51 @@ pub struct Body {
     pub(crate) start: Vec<Point3<f64>>,
 }
 
-/// The constraints of one kind.
+/// The constraints of one kind, by the parts of the free vertices, [`PART`] in each. A part owns a
+/// constraint if no part before has one of its vertices.
 pub(crate) struct Elements {
-    pub kind: Kind<f64>,
-    compliance: Arc<Values<f64>>,
-    /// The constraints that count, ascending. `None` if all do.
-    all: Option<Vec<u32>>,
+    pub kind: Arc<dyn Constraints>,
     /// Starts of the parts in `constraints`, and the end of the last one.
     starts: Vec<usize>,
-    /// The constraints at the free vertices of each part, ascending.
+    /// Number of constraints that each part owns.
+    owned: Vec<usize>,
+    /// The constraints at the free vertices of each part: those that it owns, ascending, and the
+    /// others, ascending.
     constraints: Vec<u32>,
     /// Whether the value is curved as a function of a single vertex.
     pub curved: bool,
 }
 
 impl Elements {
-    /// `1/α` of a constraint.
-    #[inline]
-    pub fn stiffness(&self, k: usize) -> f64 {
-        1.0 / self.compliance.at(k)
+    /// The constraints at the vertices that have these places. `lists` has those at each part,
+    /// each of them once.
+    pub fn new(kind: Arc<dyn Constraints>, curved: bool, place: &[u32], lists: Vec<Vec<u32>>) -> Self {
+        let arity = kind.arity();
+        let divided = |(part, list): (usize, Vec<u32>)| {
+            let owns = |k: &u32| {
+                let vertices = &kind.indices()[*k as usize * arity..][..arity];
+                vertices.iter().all(|&v| place[v as usize] as usize / PART >= part)
+            };
+            let (mut list, others): (Vec<u32>, Vec<u32>) = list.into_iter().partition(owns);
+            let owned = list.len();
+            list.extend(others);
+            (owned, list)
+        };
+        let (owned, lists): (Vec<_>, _) = lists.into_par_iter().enumerate().map(divided).unzip();
+        let (starts, constraints) = joined(lists);
+        Self { kind, starts, owned, constraints, curved }
     }
 
-    /// Number of constraints that count.
-    pub fn count(&self) -> usize {
-        self.all.as_ref().map_or(self.kind.len(), Vec::len)
-    }
-
-    /// One of the constraints that count.
-    #[inline]
-    pub fn nth(&self, n: usize) -> usize {
-        self.all.as_ref().map_or(n, |all| all[n] as usize)
-    }
-
-    /// The same kind with other lists.
-    pub fn with(&self, starts: Vec<usize>, constraints: Vec<u32>, all: Option<Vec<u32>>) -> Self {
-        let Self { kind, compliance, curved, .. } = self;
-        Self { kind: kind.clone(), compliance: compliance.clone(), all, starts, constraints, curved: *curved }
-    }
-
-    /// The constraints at a part of the free vertices, [`PART`] of them.
+    /// The constraints at a part of the free vertices. Those that it owns come first.
     #[inline]
     pub fn of_part(&self, part: usize) -> &[u32] {
         &self.constraints[self.starts[part]..self.starts[part + 1]]
+    }
+
+    /// The constraints that a part of the free vertices owns.
+    #[inline]
+    pub fn owned(&self, part: usize) -> &[u32] {
+        &self.constraints[self.starts[part]..][..self.owned[part]]
     }
 
     /// The vertices of a constraint.
@@ -100,43 +104,39 @@ impl Body {
                 return Err(RestError::Value { what, value, expected });
             }
         }
-        let system = system.to_f64();
         let vertices = system.vertices();
         let mut place = vec![FIXED; vertices.len()];
         let (mut free, mut weights) = (Vec::new(), Vec::new());
         for (v, vertex) in vertices.iter().enumerate() {
-            if vertex.inverse_mass() > 0.0 {
+            let inverse_mass = vertex.inverse_mass().to_f64();
+            if inverse_mass > 0.0 {
                 place[v] = free.len() as u32;
                 free.push(v as u32);
-                let load = system.loads().get(v).copied().unwrap_or_default();
-                weights.push(Vector3::from(gravity_m_s2) / vertex.inverse_mass() + load);
+                let load = system.loads().get(v).map(|load| load.map(T::to_f64)).unwrap_or_default();
+                weights.push(Vector3::from(gravity_m_s2) / inverse_mass + load);
             }
         }
         if free.is_empty() {
             return Err(RestError::NothingMoves { vertices: vertices.len() });
         }
-        let start: Vec<Point3<f64>> = vertices.iter().map(|vertex| vertex.position()).collect();
+        let start: Vec<Point3<f64>> =
+            vertices.iter().map(|vertex| vertex.position().map(T::to_f64)).collect();
         let mut kinds = Vec::new();
         let mut incidences = Vec::new();
         for kind in system.kinds() {
             let tuples = Tuples { vertices: kind.indices(), arity: kind.arity() };
             let incidence = Incidence::new(tuples, start.len())?;
-            kinds.push(elements(kind.clone(), &start, &free, &incidence)?);
+            kinds.push(elements(Arc::new(kind.clone()), &start, &free, &place, &incidence)?);
             incidences.push(incidence);
         }
-        let (starts, columns) = neighbors(&kinds, &incidences, &free, &place);
-        let origin = system.origin().coords;
-        Ok(Self { kinds, free, place, starts, columns, weights, origin, start })
+        let pattern = Arc::new(neighbors(&kinds, &incidences, &free, &place));
+        let origin = system.origin().coords.map(T::to_f64);
+        Ok(Self { kinds, free, place, pattern, weights, origin, start })
     }
 
     /// Places of the vertices that can move.
     pub(crate) fn places(&self, state: &State) -> Vec<Point3<f64>> {
         self.free.iter().map(|&v| state.x[v as usize]).collect()
-    }
-
-    /// Places of the free vertices that share a constraint with that at a place, and itself.
-    pub(crate) fn row(&self, place: usize) -> &[u32] {
-        &self.columns[self.starts[place]..self.starts[place + 1]]
     }
 
     /// Whether a vertex cannot move.
@@ -151,20 +151,13 @@ impl Body {
 }
 
 fn elements(
-    kind: Kind<f64>,
+    kind: Arc<dyn Constraints>,
     start: &[Point3<f64>],
     free: &[u32],
+    place: &[u32],
     incidence: &Incidence,
 ) -> Result<Elements, RestError> {
-    let Stiffness::Compliance(compliance) = kind.stiffness().clone() else {
-        return Err(RestError::PbdStiffness { kind: kind.name() });
-    };
-    for constraint in 0..kind.len() {
-        let compliance = compliance.at(constraint);
-        if !(compliance > 0.0 && (1.0 / compliance).is_finite()) {
-            return Err(RestError::Rigid { kind: kind.name(), constraint, compliance });
-        }
-    }
+    kind.check()?;
     let arity = kind.arity().max(1) as u32;
     let of_part = |free: &[u32]| {
         let places = free.iter().flat_map(|&v| incidence.of(v));
@@ -173,20 +166,13 @@ fn elements(
         constraints.dedup();
         constraints
     };
-    let (starts, constraints) = joined(free.par_chunks(PART).map(of_part).collect());
-    let compliance = Arc::new(compliance);
-    let mut elements = Elements { kind, compliance, all: None, starts, constraints, curved: false };
-    elements.curved = is_curved(&elements, start);
-    Ok(elements)
+    let lists = free.par_chunks(PART).map(of_part).collect();
+    let curved = is_curved(&*kind, start);
+    Ok(Elements::new(kind, curved, place, lists))
 }
 
-/// See [`Body::starts`].
-fn neighbors(
-    kinds: &[Elements],
-    incidences: &[Incidence],
-    free: &[u32],
-    place: &[u32],
-) -> (Vec<usize>, Vec<u32>) {
+/// See [`Body::pattern`].
+fn neighbors(kinds: &[Elements], incidences: &[Incidence], free: &[u32], place: &[u32]) -> Pattern {
     let of_part = |free: &[u32]| -> (Vec<usize>, Vec<u32>) {
         let (mut counts, mut columns, mut row) = (Vec::new(), Vec::new(), Vec::new());
         for &v in free {
@@ -215,7 +201,7 @@ fn neighbors(
         starts.push(starts[starts.len() - 1] + count);
     }
     let (_, columns) = joined(parts.into_iter().map(|(_, columns)| columns).collect());
-    (starts, columns)
+    Pattern { starts, columns }
 }
 
 /// Lists one after the other: the start of each one, and the end of the last one.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::Body;
-use crate::body::Elements;
+use crate::constraints::Evaluation;
 
 /// Vertices or constraints that a thread takes at once. Sums of parts are added in order, so that a
 /// result does not depend on the number of threads.
@@ -14,7 +14,7 @@ pub(crate) const PART: usize = 4096;
 pub(crate) struct State {
     /// Positions of all vertices.
     pub x: Vec<Point3<f64>>,
-    /// For each kind `C` of each constraint that counts.
+    /// For each part of the free vertices, `C` of the constraints that it owns, kind by kind.
     values: Vec<Vec<f64>>,
     /// `−∇U` at each free vertex, in N.
     pub forces: Vec<Vector3<f64>>,
@@ -35,33 +35,17 @@ impl State {
     }
 }
 
-/// Memory to evaluate a constraint.
+/// Memory to evaluate a constraint, and to differentiate it.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// Positions of its vertices.
-    pub places: Vec<Point3<f64>>,
-    pub gradients: Vec<Vector3<f64>>,
+    pub own: Evaluation,
     /// Gradients at other positions.
     pub ahead: Vec<Vector3<f64>>,
     /// Second derivatives, see [`Scratch::differentiate`].
     pub curvature: Vec<Matrix3<f64>>,
 }
 
-impl Scratch {
-    /// `C` and `∇C` of a constraint.
-    #[inline]
-    pub fn evaluate(&mut self, elements: &Elements, k: usize, x: &[Point3<f64>]) -> f64 {
-        let vertices = elements.vertices(k);
-        if self.places.len() != vertices.len() {
-            self.places.resize(vertices.len(), Point3::origin());
-            self.gradients.resize(vertices.len(), Vector3::zeros());
-        }
-        for (place, &v) in self.places.iter_mut().zip(vertices) {
-            *place = x[v as usize];
-        }
-        elements.kind.evaluate(k, &self.places, &mut self.gradients)
-    }
-
+impl Evaluation {
     /// How much `C` changes if each coordinate changes by its own size.
     fn reach(&self) -> f64 {
         self.gradients.iter().zip(&self.places).map(|(g, x)| norm_1(g) * norm_1(&x.coords)).sum()
@@ -71,79 +55,78 @@ impl Scratch {
 impl Body {
     /// Evaluates all constraints.
     pub(crate) fn at(&self, x: Vec<Point3<f64>>) -> State {
-        let mut noise = 0.0;
-        let mut values = Vec::with_capacity(self.kinds.len());
-        for elements in &self.kinds {
-            let mut c = vec![0.0; elements.count()];
-            let evaluate = |scratch: &mut Scratch, (part, c): (usize, &mut [f64])| -> f64 {
-                let mut noise = 0.0;
-                for (n, c) in c.iter_mut().enumerate() {
-                    let k = elements.nth(part * PART + n);
-                    *c = scratch.evaluate(elements, k, &x);
-                    noise += c.abs() * elements.stiffness(k) * scratch.reach();
-                }
-                noise
-            };
-            let parts = c.par_chunks_mut(PART).enumerate();
-            let sums: Vec<f64> = parts.map_init(Scratch::default, evaluate).collect();
-            noise += sums.iter().sum::<f64>();
-            values.push(c);
-        }
         let mut forces = self.weights.clone();
-        let part = |scratch: &mut Scratch, (part, forces): (usize, &mut [Vector3<f64>])| {
-            let rows = part * PART..part * PART + forces.len();
-            let mut sizes: Vec<[f64; 2]> = forces.iter().map(|force| [force.norm(), 0.0]).collect();
-            for elements in &self.kinds {
-                for &k in elements.of_part(part) {
-                    let k = k as usize;
-                    let c = scratch.evaluate(elements, k, &x);
-                    let stiffness = elements.stiffness(k);
-                    let reach = scratch.reach() * stiffness;
-                    for (gradient, &v) in scratch.gradients.iter().zip(elements.vertices(k)) {
-                        let row = self.place[v as usize] as usize;
-                        if rows.contains(&row) {
-                            let n = row - rows.start;
-                            let size = gradient.norm();
-                            forces[n] -= gradient * (c * stiffness);
-                            sizes[n][0] += size * (c * stiffness).abs();
-                            sizes[n][1] += size * reach;
-                        }
+        let parts = forces.par_chunks_mut(PART).enumerate();
+        let parts = parts
+            .map_init(Evaluation::default, |scratch, (part, forces)| self.part_at(&x, scratch, part, forces));
+        let (values, sums): (Vec<Vec<f64>>, Vec<[f64; 4]>) = parts.unzip();
+        let sum = |n: usize| sums.iter().map(|sums| sums[n]).sum::<f64>();
+        let (norm, scale, floor) = (sum(0).sqrt(), sum(1).sqrt(), f64::EPSILON * sum(2).sqrt());
+        State { x, values, forces, norm, scale, floor, noise: f64::EPSILON * sum(3) }
+    }
+
+    /// Adds the forces on a part of the free vertices. Returns `C` of the constraints that it owns,
+    /// the squares of the forces, of their sizes and of their rounding, and the energy of the
+    /// rounding.
+    fn part_at(
+        &self,
+        x: &[Point3<f64>],
+        scratch: &mut Evaluation,
+        part: usize,
+        forces: &mut [Vector3<f64>],
+    ) -> (Vec<f64>, [f64; 4]) {
+        let rows = part * PART..part * PART + forces.len();
+        let mut sizes: Vec<[f64; 2]> = forces.iter().map(|force| [force.norm(), 0.0]).collect();
+        let mut values = Vec::with_capacity(self.kinds.iter().map(|kind| kind.owned(part).len()).sum());
+        let mut noise = 0.0;
+        for elements in &self.kinds {
+            let owned = elements.owned(part).len();
+            for (n, &k) in elements.of_part(part).iter().enumerate() {
+                elements.kind.evaluate(k as usize, x, scratch);
+                let Evaluation { c, stiffness, .. } = *scratch;
+                let reach = scratch.reach() * stiffness;
+                if n < owned {
+                    values.push(c);
+                    noise += c.abs() * reach;
+                }
+                for (gradient, &v) in scratch.gradients.iter().zip(elements.vertices(k as usize)) {
+                    let row = self.place[v as usize] as usize;
+                    if rows.contains(&row) {
+                        let n = row - rows.start;
+                        let size = gradient.norm();
+                        forces[n] -= gradient * (c * stiffness);
+                        sizes[n][0] += size * (c * stiffness).abs();
+                        sizes[n][1] += size * reach;
                     }
                 }
             }
-            let mut squares = [0.0; 3];
-            for (force, [size, rounding]) in forces.iter().zip(sizes) {
-                squares[0] += force.norm_squared();
-                squares[1] += size * size;
-                squares[2] += rounding * rounding;
-            }
-            squares
-        };
-        let parts = forces.par_chunks_mut(PART).enumerate().map_init(Scratch::default, part);
-        let parts: Vec<[f64; 3]> = parts.collect();
-        let root = |n: usize| parts.iter().map(|squares| squares[n]).sum::<f64>().sqrt();
-        let (norm, scale, floor) = (root(0), root(1), f64::EPSILON * root(2));
-        State { x, values, forces, norm, scale, floor, noise: f64::EPSILON * noise }
+        }
+        let mut sums = [0.0, 0.0, 0.0, noise];
+        for (force, [size, rounding]) in forces.iter().zip(sizes) {
+            sums[0] += force.norm_squared();
+            sums[1] += size * size;
+            sums[2] += rounding * rounding;
+        }
+        (values, sums)
     }
 
     /// The energy at `to` minus that at `from`, constraint by constraint, so that it is as accurate
     /// as its own size.
     pub(crate) fn difference(&self, from: &State, to: &State) -> f64 {
-        let mut sum = 0.0;
-        for (elements, (from, to)) in self.kinds.iter().zip(from.values.iter().zip(&to.values)) {
-            let part = |(part, (from, to)): (usize, (&[f64], &[f64]))| -> f64 {
-                let pairs = from.iter().zip(to).enumerate();
-                let change = |(n, (from, to)): (usize, (&f64, &f64))| {
-                    0.5 * (to - from) * (to + from) * elements.stiffness(elements.nth(part * PART + n))
-                };
-                pairs.map(change).sum()
-            };
-            let parts: Vec<f64> =
-                from.par_chunks(PART).zip(to.par_chunks(PART)).enumerate().map(part).collect();
-            sum += parts.iter().sum::<f64>();
-        }
+        let part = |(part, (from, to)): (usize, (&Vec<f64>, &Vec<f64>))| -> f64 {
+            let (mut sum, mut start) = (0.0, 0);
+            for elements in &self.kinds {
+                let owned = elements.owned(part);
+                let own = start..start + owned.len();
+                sum += elements.kind.energy_change(owned, &from[own.clone()], &to[own.clone()]);
+                start = own.end;
+            }
+            sum
+        };
+        let parts = from.values.par_iter().zip(&to.values).enumerate();
+        let parts: Vec<f64> = parts.map(part).collect();
         let work = |(weight, &v): (&Vector3<f64>, &u32)| weight.dot(&(to.x[v as usize] - from.x[v as usize]));
-        sum - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
+        parts.iter().sum::<f64>() - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
     }
 
     /// A placement with the free vertices moved.

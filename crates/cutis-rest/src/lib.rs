@@ -27,6 +27,7 @@ mod aggregates;
 mod blocks;
 mod body;
 mod conjugate;
+mod constraints;
 mod energy;
 mod error;
 mod follow;

@@ -5,8 +5,11 @@
 //! farther than the others come to rest by themselves, with all others held (nonlinear elimination:
 //! Lanzkron, Rose and Wilkes, SIAM J. Sci. Comput. 17, 1996). This lowers the energy of the body.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 
+use crate::blocks::Pattern;
 use crate::body::{Elements, FIXED};
 use crate::energy::PART;
 use crate::{Body, Options, Search};
@@ -41,7 +44,7 @@ impl Body {
         let far = |place: &u32| step[*place as usize].norm_squared() > FAR * FAR * mean;
         let mut chosen: Vec<u32> = (0..step.len() as u32).filter(far).collect();
         for _ in 0..RINGS {
-            let rings = chosen.iter().flat_map(|&place| self.row(place as usize));
+            let rings = chosen.iter().flat_map(|&place| self.pattern.row(place as usize));
             let mut next: Vec<u32> = rings.copied().collect();
             next.sort_unstable();
             next.dedup();
@@ -60,12 +63,14 @@ impl Body {
         let kinds = self.kinds.iter().map(|elements| elements.of_vertices(chosen, &free, &place)).collect();
         let (mut starts, mut columns) = (vec![0], Vec::new());
         for &row in chosen {
-            let inside = self.row(row as usize).iter().map(|&n| place[self.free[n as usize] as usize]);
+            let inside =
+                self.pattern.row(row as usize).iter().map(|&n| place[self.free[n as usize] as usize]);
             columns.extend(inside.filter(|&column| column != FIXED));
             starts.push(columns.len());
         }
         let weights = chosen.iter().map(|&place| self.weights[place as usize]).collect();
-        Self { kinds, free, place, starts, columns, weights, origin: self.origin, start: x.to_vec() }
+        let pattern = Arc::new(Pattern { starts, columns });
+        Self { kinds, free, place, pattern, weights, origin: self.origin, start: x.to_vec() }
     }
 }
 
@@ -80,15 +85,14 @@ impl Elements {
             parts.iter().flat_map(|&part| self.of_part(part)).copied().filter(inside).collect();
         all.sort_unstable();
         all.dedup();
-        let (mut starts, mut constraints) = (vec![0], Vec::new());
-        for first in (0..free.len()).step_by(PART) {
+        let of_part = |first: usize| -> Vec<u32> {
             let own = first as u32..(first + PART) as u32;
             let touches =
                 |&k: &u32| self.vertices(k as usize).iter().any(|&v| own.contains(&place[v as usize]));
-            constraints.extend(all.iter().copied().filter(touches));
-            starts.push(constraints.len());
-        }
-        self.with(starts, constraints, Some(all))
+            all.iter().copied().filter(touches).collect()
+        };
+        let lists = (0..free.len()).step_by(PART).map(of_part).collect();
+        Self::new(self.kind.clone(), self.curved, place, lists)
     }
 }
 

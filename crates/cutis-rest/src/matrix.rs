@@ -1,13 +1,15 @@
 //! The matrix of a Newton step.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::Body;
-use crate::blocks::{Block, Blocks};
-use crate::body::{Elements, FIXED};
+use crate::blocks::{Block, Pattern};
+use crate::body::FIXED;
+use crate::constraints::{Constraints, Evaluation};
 use crate::energy::{PART, Scratch};
 use crate::smoother::Operator;
 
@@ -31,20 +33,22 @@ pub(crate) enum Curvature {
 /// precision, `A x` at a node is `S_i x_i + Σ_j A_ij (x_j − x_i)`. Then rounding is relative to the
 /// strain and not to the displacement.
 pub(crate) struct Matrix {
-    blocks: Blocks<3, 3>,
+    pattern: Arc<Pattern>,
+    /// The blocks one after the other, each column by column, and a zero, so that four numbers can
+    /// be read at the last column.
+    values: Vec<f32>,
     /// `S_i`, with a zero after each column.
     sums: Vec<[[f32; 4]; 3]>,
 }
 
-impl Matrix {
-    pub fn blocks(&self) -> &Blocks<3, 3> {
-        &self.blocks
-    }
-}
-
 impl Operator<3, 4> for Matrix {
-    fn nodes(&self) -> usize {
-        self.sums.len()
+    fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    fn block(&self, place: usize) -> Block<3, 3> {
+        let values = &self.values[9 * place..][..9];
+        std::array::from_fn(|column| std::array::from_fn(|row| f64::from(values[3 * column + row])))
     }
 
     fn diagonal(&self, node: usize) -> Block<3, 3> {
@@ -54,7 +58,7 @@ impl Operator<3, 4> for Matrix {
                 to[n] = f64::from(from[n]);
             }
         }
-        for (column, block) in self.blocks.row(node) {
+        for (column, block) in self.row(node) {
             if column != node {
                 for (to, from) in sum.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
                     *to -= from;
@@ -68,13 +72,19 @@ impl Operator<3, 4> for Matrix {
     fn row_times(&self, node: usize, x: &[[f32; 4]]) -> [f32; 4] {
         let own = x[node];
         let mut sum = [0.0; 4];
-        for place in self.blocks.places(node) {
-            let other = &x[self.blocks.columns[place] as usize];
+        let places = self.pattern.places(node);
+        for place in places {
+            let other = &x[self.pattern.columns[place] as usize];
+            let values = &self.values[9 * place..][..10];
             let mut difference = [0.0; 4];
             for n in 0..4 {
                 difference[n] = other[n] - own[n];
             }
-            self.blocks.add_times(place, &difference, &mut sum);
+            for column in 0..3 {
+                for row in 0..4 {
+                    sum[row] += values[3 * column + row] * difference[column];
+                }
+            }
         }
         for (column, x) in self.sums[node].iter().zip(own) {
             for n in 0..4 {
@@ -90,30 +100,39 @@ impl Body {
     /// A matrix of zeros with a block for each pair of vertices that share a constraint.
     pub(crate) fn empty_matrix(&self) -> Matrix {
         let count = self.free.len();
-        let (starts, columns) = (self.starts.clone(), self.columns.clone());
-        Matrix { blocks: Blocks::zeros(starts, columns, count), sums: vec![[[0.0; 4]; 3]; count] }
+        Matrix {
+            pattern: self.pattern.clone(),
+            values: vec![0.0; 9 * self.pattern.columns.len() + 1],
+            sums: vec![[[0.0; 4]; 3]; count],
+        }
     }
 
     /// Writes `Σ (∇C∇Cᵀ + C∇²C)/α`, with the second term of some constraints, at positions `x` of
     /// all vertices. Adds `shift` times the blocks on the diagonal (Levenberg and Marquardt): it
     /// shortens steps, and holds a body that nothing else holds.
     pub(crate) fn fill(&self, matrix: &mut Matrix, x: &[Point3<f64>], curvature: Curvature, shift: f64) {
-        let Matrix { blocks, sums } = matrix;
-        let parts: Vec<_> =
-            blocks.parts_mut(PART).into_iter().zip(sums.chunks_mut(PART)).enumerate().collect();
-        let scratch = || (Scratch::default(), Vec::new());
-        parts.into_par_iter().for_each_init(scratch, |(scratch, work), (part, (values, sums))| {
+        let Matrix { pattern, values, sums } = matrix;
+        let mut rest = &mut values[..];
+        let mut parts = Vec::new();
+        for (part, sums) in sums.chunks_mut(PART).enumerate() {
             let rows = part * PART..part * PART + sums.len();
+            let count = pattern.starts[rows.end] - pattern.starts[rows.start];
+            let (values, after) = rest.split_at_mut(9 * count);
+            parts.push((rows, values, sums));
+            rest = after;
+        }
+        let scratch = || (Scratch::default(), Vec::new());
+        parts.into_par_iter().for_each_init(scratch, |(scratch, work), (rows, values, sums)| {
             self.rows(rows.clone(), x, curvature, scratch, work);
             for (to, from) in values.iter_mut().zip(work.as_flattened().as_flattened()) {
                 *to = *from as f32;
             }
-            let start = self.starts[rows.start];
+            let start = pattern.starts[rows.start];
             for (row, sum) in rows.zip(sums) {
                 let mut whole = [[0.0; 3]; 3];
-                let columns = &self.columns[self.starts[row]..self.starts[row + 1]];
-                let blocks = &work[self.starts[row] - start..self.starts[row + 1] - start];
-                for (&column, block) in columns.iter().zip(blocks) {
+                let places = pattern.places(row);
+                let blocks = &work[places.start - start..places.end - start];
+                for (&column, block) in pattern.row(row).iter().zip(blocks) {
                     let factor = if column as usize == row { 1.0 + shift } else { 1.0 };
                     let whole = whole.as_flattened_mut().iter_mut();
                     whole.zip(block.as_flattened()).for_each(|(to, x)| *to += factor * x);
@@ -132,7 +151,7 @@ impl Body {
         scratch: &mut Scratch,
         to: &mut Vec<Block<3, 3>>,
     ) {
-        let (starts, columns) = (&self.starts, &self.columns);
+        let starts = &self.pattern.starts;
         let start = starts[rows.start];
         to.clear();
         to.resize(starts[rows.end] - start, [[0.0; 3]; 3]);
@@ -140,8 +159,8 @@ impl Body {
             for &k in elements.of_part(rows.start / PART) {
                 let k = k as usize;
                 let vertices = elements.vertices(k);
-                let c = scratch.evaluate(elements, k, x);
-                let stiffness = elements.stiffness(k);
+                elements.kind.evaluate(k, x, &mut scratch.own);
+                let Evaluation { c, stiffness, .. } = scratch.own;
                 let counts = match curvature {
                     Curvature::All => c != 0.0,
                     Curvature::Stretched => elements.curved && c > 0.0,
@@ -152,11 +171,11 @@ impl Body {
                         continue;
                     }
                     if counts {
-                        scratch.differentiate(elements, k, own);
+                        scratch.differentiate(&*elements.kind, k, own);
                     }
-                    let columns = &columns[starts[row]..starts[row + 1]];
+                    let columns = self.pattern.row(row);
                     let to = &mut to[starts[row] - start..starts[row + 1] - start];
-                    let left = scratch.gradients[own] * stiffness;
+                    let left = scratch.own.gradients[own] * stiffness;
                     for (b, &other) in vertices.iter().enumerate() {
                         let column = self.place[other as usize];
                         if column == FIXED {
@@ -164,7 +183,7 @@ impl Body {
                         }
                         let smaller = columns.iter().map(|&c| u32::from(c < column));
                         let block = &mut to[smaller.sum::<u32>() as usize];
-                        add_outer(block, &left, &scratch.gradients[b]);
+                        add_outer(block, &left, &scratch.own.gradients[b]);
                         if counts {
                             add(block, c * stiffness, &scratch.curvature[b]);
                         }
@@ -198,8 +217,8 @@ fn add(to: &mut Block<3, 3>, factor: f64, matrix: &Matrix3<f64>) {
 impl Scratch {
     /// Forward differences of the gradients over the position of one vertex, after
     /// [`evaluate`](Self::evaluate): `∂²C/∂x_own∂x_b` for each vertex `b`.
-    fn differentiate(&mut self, elements: &Elements, k: usize, own: usize) {
-        let Self { places, gradients, ahead, curvature } = self;
+    fn differentiate(&mut self, kind: &dyn Constraints, k: usize, own: usize) {
+        let Self { own: Evaluation { places, gradients, .. }, ahead, curvature } = self;
         curvature.clear();
         curvature.resize(places.len(), Matrix3::zeros());
         let first = places[0];
@@ -213,7 +232,7 @@ impl Scratch {
             let place = places[own][axis];
             let moved = place + step;
             places[own][axis] = moved;
-            elements.kind.evaluate(k, places, ahead);
+            kind.gradients(k, places, ahead);
             places[own][axis] = place;
             let scale = 1.0 / (moved - place);
             for (curvature, (ahead, at)) in curvature.iter_mut().zip(ahead.iter().zip(&*gradients)) {
@@ -227,16 +246,16 @@ impl Scratch {
 
 /// Whether the value of some constraint of a kind is curved as a function of a single vertex.
 /// Lengths are, volumes are not.
-pub(crate) fn is_curved(elements: &Elements, x: &[Point3<f64>]) -> bool {
+pub(crate) fn is_curved(kind: &dyn Constraints, x: &[Point3<f64>]) -> bool {
     let mut scratch = Scratch::default();
-    let count = elements.kind.len();
+    let count = kind.len();
     (0..count).step_by(count.div_ceil(TRIED).max(1)).any(|k| {
-        scratch.evaluate(elements, k, x);
-        let size = scratch.gradients.iter().map(Vector3::norm).fold(0.0, f64::max);
-        let first = scratch.places[0];
-        let extent = scratch.places.iter().map(|place| (place - first).norm()).fold(0.0, f64::max);
-        (0..scratch.places.len()).any(|own| {
-            scratch.differentiate(elements, k, own);
+        kind.evaluate(k, x, &mut scratch.own);
+        let Evaluation { places, gradients, .. } = &scratch.own;
+        let size = gradients.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let extent = places.iter().map(|place| (place - places[0]).norm()).fold(0.0, f64::max);
+        (0..kind.arity()).any(|own| {
+            scratch.differentiate(kind, k, own);
             scratch.curvature[own].norm() * extent > 1e-3 * size
         })
     })

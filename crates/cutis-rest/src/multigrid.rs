@@ -9,7 +9,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3};
 use rayon::prelude::*;
 
 use crate::aggregates::Aggregates;
-use crate::blocks::{Blocks, Columns, ROWS, add_product, add_transposed_product};
+use crate::blocks::{Blocks, Columns, ROWS};
 use crate::matrix::Matrix;
 use crate::smoother::{Operator, Smoother};
 use crate::transfer::{self, Modes};
@@ -56,28 +56,28 @@ impl Multigrid {
     /// Builds the levels for a matrix with one node at each place, in m.
     pub fn new(matrix: &Matrix, places: &[Point3<f64>]) -> Self {
         if matrix.nodes() <= BOTTOM {
-            return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix, matrix.blocks()) };
+            return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix) };
         }
-        let modes: Vec<Modes<3>> = places.iter().map(transfer::rigid_modes).collect();
-        let (fine, mut matrix, mut modes) = Level::new(matrix, matrix.blocks(), &modes);
+        let modes = places.iter().map(transfer::rigid_modes).collect();
+        let (fine, mut matrix, mut modes) = Level::new(matrix, modes);
         let mut coarse = Vec::new();
-        while matrix.height() > BOTTOM {
-            let before = matrix.height();
-            let (level, next, next_modes) = Level::new(&matrix, &matrix, &modes);
+        while matrix.pattern.height() > BOTTOM {
+            let before = matrix.pattern.height();
+            let (level, next, next_modes) = Level::new(&matrix, modes);
             coarse.push(Coarse { matrix, level });
             (matrix, modes) = (next, next_modes);
-            if matrix.height() * 10 > before * 9 {
+            if matrix.pattern.height() * 10 > before * 9 {
                 break;
             }
         }
-        Self { fine: Some(fine), coarse, bottom: Bottom::new::<RIGID, LANES>(&matrix, &matrix) }
+        Self { fine: Some(fine), coarse, bottom: Bottom::new::<RIGID, LANES>(&matrix) }
     }
 
     /// Adapts the smoother of the finest level to another matrix. The other levels stay.
     pub fn update(&mut self, matrix: &Matrix) {
         match &mut self.fine {
             Some(fine) => fine.smoother.update(matrix),
-            None => self.bottom = Bottom::new(matrix, matrix.blocks()),
+            None => self.bottom = Bottom::new(matrix),
         }
     }
 
@@ -94,7 +94,7 @@ impl Multigrid {
     /// Numbers in the matrices of all levels over those of the first one.
     pub fn complexity(&self, matrix: &Matrix) -> f64 {
         let coarse: usize = self.coarse.iter().map(|coarse| coarse.matrix.len()).sum();
-        1.0 + coarse as f64 / matrix.blocks().len() as f64
+        1.0 + coarse as f64 / (9 * matrix.pattern().columns.len()) as f64
     }
 }
 
@@ -111,38 +111,19 @@ fn below(levels: &mut [Coarse], bottom: &Bottom, right: &[[f32; LANES]], to: &mu
 impl<const B: usize, const L: usize> Level<B, L> {
     /// Builds a level for a matrix, and the matrix and modes of the next one.
     fn new(
-        operator: &impl Operator<B, L>,
-        matrix: &Blocks<B, B>,
-        modes: &[Modes<B>],
+        matrix: &impl Operator<B, L>,
+        modes: Vec<Modes<B>>,
     ) -> (Self, Blocks<RIGID, RIGID>, Vec<Modes<RIGID>>) {
         let aggregates = Aggregates::of(matrix);
         let (tentative, next_modes) = transfer::tentative(&aggregates, modes);
-        let smoother = Smoother::new(operator);
+        let smoother = Smoother::new(matrix);
         let inverse = |node: usize| smoother.inverse(node);
         let prolongation = transfer::smoothed(matrix, inverse, smoother.largest, &aggregates, &tentative);
+        drop(tentative);
         let columns = Columns::of(&prolongation);
-        let product = Blocks::<B, RIGID>::by_rows(matrix.height(), aggregates.count, |sums, row| {
-            for place in matrix.places(row) {
-                let (column, mut block) = (matrix.columns[place] as usize, matrix.block(place));
-                if column == row {
-                    block = operator.diagonal(row);
-                }
-                for (to, right) in prolongation.row(column) {
-                    add_product(sums.at(to), &block, &right);
-                }
-            }
-        });
-        let next = Blocks::<RIGID, RIGID>::by_rows(aggregates.count, aggregates.count, |sums, row| {
-            for &(fine, place) in columns.of_column(row) {
-                let left = prolongation.block(place as usize);
-                for (to, right) in product.row(fine as usize) {
-                    add_transposed_product(sums.at(to), &left, &right);
-                }
-            }
-            hold_missing_modes(sums.at(row));
-        });
+        let next = transfer::galerkin(matrix, &prolongation, &columns);
         let prolongation = prolongation.with_transposed_blocks();
-        let zero = vec![[0.0; L]; matrix.height()];
+        let zero = vec![[0.0; L]; matrix.nodes()];
         let coarse = vec![[0.0; LANES]; aggregates.count];
         let level = Self { smoother, prolongation, columns, residual: zero, coarse };
         (level, next, next_modes)
@@ -178,24 +159,14 @@ impl<const B: usize, const L: usize> Level<B, L> {
     }
 }
 
-/// Gives the unknowns of missing modes, whose rows are zero, a diagonal.
-fn hold_missing_modes(block: &mut [[f64; RIGID]; RIGID]) {
-    let largest = (0..RIGID).map(|n| block[n][n]).fold(0.0, f64::max);
-    for n in 0..RIGID {
-        if block[n][n] <= 1e-14 * largest {
-            block[n][n] = if largest > 0.0 { largest } else { 1.0 };
-        }
-    }
-}
-
 impl Bottom {
-    fn new<const B: usize, const L: usize>(operator: &impl Operator<B, L>, matrix: &Blocks<B, B>) -> Self {
-        let size = B * matrix.height();
+    fn new<const B: usize, const L: usize>(matrix: &impl Operator<B, L>) -> Self {
+        let size = B * matrix.nodes();
         let mut dense = DMatrix::zeros(size, size);
-        for row in 0..matrix.height() {
+        for row in 0..matrix.nodes() {
             for (column, mut block) in matrix.row(row) {
                 if column == row {
-                    block = operator.diagonal(row);
+                    block = matrix.diagonal(row);
                 }
                 for (j, of_column) in block.iter().enumerate() {
                     for (i, &value) in of_column.iter().enumerate() {

@@ -234,26 +234,29 @@ impl<'a> Search<'a> {
             _ => self.shift,
         };
         self.energy_change_j += change;
-        let state = self.relax(state, &solution.x, length, rises);
         let before = std::mem::replace(&mut self.state, state);
-        self.pending = rises.then_some(Pending { state: before, direction: solution.x, slope, change });
+        if rises {
+            self.pending = Some(Pending { x: before.x, direction: solution.x, slope, change });
+        } else {
+            self.pending = None;
+            drop(before);
+            if length == 1.0 {
+                self.relax(&solution.x);
+            }
+        }
         self.steps.push(step);
         Ok(&self.steps[self.steps.len() - 1])
     }
 
     /// Brings the vertices to rest that moved much farther than the others in a step.
-    fn relax(&mut self, state: State, step: &[Vector3<f64>], length: f64, rises: bool) -> State {
-        if rises || length < 1.0 {
-            return state;
-        }
-        let Some(x) = self.body.relaxed(&state.x, step) else { return state };
+    fn relax(&mut self, step: &[Vector3<f64>]) {
+        let Some(x) = self.body.relaxed(&self.state.x, step) else { return };
         let relaxed = self.body.at(x);
-        let change = self.body.difference(&state, &relaxed);
-        if !(change < 0.0 && relaxed.is_finite()) {
-            return state;
+        let change = self.body.difference(&self.state, &relaxed);
+        if change < 0.0 && relaxed.is_finite() {
+            self.energy_change_j += change;
+            self.state = relaxed;
         }
-        self.energy_change_j += change;
-        relaxed
     }
 
     /// Solves for a step, and searches along it.

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, SMatrix};
 use rayon::prelude::*;
 
-use crate::blocks::{Block, Blocks, ROWS};
+use crate::blocks::{Block, Blocks, Pattern, ROWS};
 use crate::vectors::{Vector, add, dot};
 
 /// Matrix products of a smoother.
@@ -15,12 +15,24 @@ const POWER_STEPS: [usize; 2] = [12, 3];
 
 /// A matrix with one row of blocks per node.
 pub(crate) trait Operator<const B: usize, const L: usize>: Sync {
-    /// Number of nodes.
-    fn nodes(&self) -> usize;
+    /// Where the blocks are.
+    fn pattern(&self) -> &Pattern;
+    /// A block. On the diagonal it may be less exact than [`diagonal`](Self::diagonal).
+    fn block(&self, place: usize) -> Block<B, B>;
     /// The block of a node on the diagonal.
     fn diagonal(&self, node: usize) -> Block<B, B>;
     /// The row of a node times a vector.
     fn row_times(&self, node: usize, x: &[[f32; L]]) -> [f32; L];
+    /// Number of nodes.
+    fn nodes(&self) -> usize {
+        self.pattern().height()
+    }
+    /// Columns and blocks of a row.
+    #[inline]
+    fn row(&self, node: usize) -> impl Iterator<Item = (usize, Block<B, B>)> {
+        let pattern = self.pattern();
+        pattern.places(node).map(|place| (pattern.columns[place] as usize, self.block(place)))
+    }
     /// The matrix times a vector.
     fn times(&self, x: &[[f32; L]], to: &mut [[f32; L]]) {
         let row = |(node, to): (usize, &mut [f32; L])| *to = self.row_times(node, x);
@@ -29,12 +41,16 @@ pub(crate) trait Operator<const B: usize, const L: usize>: Sync {
 }
 
 impl<const B: usize, const L: usize> Operator<B, L> for Blocks<B, B> {
-    fn nodes(&self) -> usize {
-        self.height()
+    fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    fn block(&self, place: usize) -> Block<B, B> {
+        Blocks::block(self, place)
     }
 
     fn diagonal(&self, node: usize) -> Block<B, B> {
-        self.get(node, node).unwrap_or([[0.0; B]; B])
+        self.pattern.find(node, node).map_or([[0.0; B]; B], |place| Blocks::block(self, place))
     }
 
     #[inline(always)]

@@ -4,8 +4,12 @@ use nalgebra::{Point3, SMatrix};
 use rayon::prelude::*;
 
 use crate::aggregates::Aggregates;
-use crate::blocks::{Block, Blocks, ROWS, add_product};
+use crate::blocks::{Block, Blocks, Columns, ROWS, add_product, add_transposed_product};
 use crate::multigrid::RIGID;
+use crate::smoother::Operator;
+
+/// Parts in which the matrix of the next level is made.
+const CHUNKS: usize = 8;
 
 /// Displacements of a node in each rigid motion of the body.
 pub(crate) type Modes<const B: usize> = Block<B, RIGID>;
@@ -22,15 +26,15 @@ pub(crate) fn rigid_modes(place: &Point3<f64>) -> Modes<3> {
 /// have, because it has few nodes, are zero.
 pub(crate) fn tentative<const B: usize>(
     aggregates: &Aggregates,
-    modes: &[Modes<B>],
+    modes: Vec<Modes<B>>,
 ) -> (Vec<Modes<B>>, Vec<Modes<RIGID>>) {
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); aggregates.count];
     for (node, &aggregate) in aggregates.of.iter().enumerate() {
         members[aggregate as usize].push(node as u32);
     }
     let found: Vec<_> =
-        members.par_iter().with_min_len(ROWS / 8).map(|nodes| orthonormal(nodes, modes)).collect();
-    let mut of_nodes = vec![[[0.0; B]; RIGID]; modes.len()];
+        members.par_iter().with_min_len(ROWS / 8).map(|nodes| orthonormal(nodes, &modes)).collect();
+    let mut of_nodes = modes;
     for (nodes, (blocks, _)) in members.iter().zip(&found) {
         for (&node, block) in nodes.iter().zip(blocks) {
             of_nodes[node as usize] = std::array::from_fn(|n| block.column(n).into_owned().into());
@@ -77,15 +81,15 @@ fn orthonormal<const B: usize>(
 /// The prolongation after one step of damped Jacobi (Vaněk, Mandel and Brezina, Computing 56,
 /// 1996). `inverse` is that of each diagonal block, and `largest` the largest eigenvalue of the
 /// matrix times these.
-pub(crate) fn smoothed<const B: usize>(
-    matrix: &Blocks<B, B>,
+pub(crate) fn smoothed<const B: usize, const L: usize>(
+    matrix: &impl Operator<B, L>,
     inverse: impl Fn(usize) -> Block<B, B> + Sync,
     largest: f32,
     aggregates: &Aggregates,
     tentative: &[Modes<B>],
 ) -> Blocks<B, RIGID> {
     let damping = -4.0 / 3.0 / f64::from(largest);
-    Blocks::by_rows(tentative.len(), aggregates.count, |sums, row| {
+    Blocks::by_rows(0..tentative.len(), aggregates.count, |sums, row| {
         let own = sums.at(aggregates.of[row] as usize);
         for (to, from) in own.as_flattened_mut().iter_mut().zip(tentative[row].as_flattened()) {
             *to += from;
@@ -98,4 +102,67 @@ pub(crate) fn smoothed<const B: usize>(
             add_product(sums.at(aggregates.of[column] as usize), &step, &tentative[column]);
         }
     })
+}
+
+/// The matrix of the next level, `Pᵀ A P` with the prolongation `P`. `columns` are those of `P`.
+///
+/// `A P` has more numbers than `A`. So only the rows are stored at a time that some rows of the
+/// result need.
+pub(crate) fn galerkin<const B: usize, const L: usize>(
+    matrix: &impl Operator<B, L>,
+    prolongation: &Blocks<B, RIGID>,
+    columns: &Columns,
+) -> Blocks<RIGID, RIGID> {
+    let count = prolongation.width;
+    let chunk = count.div_ceil(CHUNKS).max(ROWS);
+    let mut place = vec![u32::MAX; matrix.nodes()];
+    let mut whole: Option<Blocks<RIGID, RIGID>> = None;
+    for start in (0..count).step_by(chunk) {
+        let rows = start..(start + chunk).min(count);
+        let mut fine: Vec<u32> = Vec::new();
+        for &(node, _) in rows.clone().flat_map(|row| columns.of_column(row)) {
+            if place[node as usize] == u32::MAX {
+                place[node as usize] = 0;
+                fine.push(node);
+            }
+        }
+        fine.sort_unstable();
+        fine.iter().enumerate().for_each(|(n, &node)| place[node as usize] = n as u32);
+        let product = Blocks::<B, RIGID>::by_rows(0..fine.len(), count, |sums, n| {
+            let row = fine[n] as usize;
+            for (column, mut block) in matrix.row(row) {
+                if column == row {
+                    block = matrix.diagonal(row);
+                }
+                for (to, right) in prolongation.row(column) {
+                    add_product(sums.at(to), &block, &right);
+                }
+            }
+        });
+        let next = Blocks::<RIGID, RIGID>::by_rows(rows, count, |sums, row| {
+            for &(node, at) in columns.of_column(row) {
+                let left = prolongation.block(at as usize);
+                for (to, right) in product.row(place[node as usize] as usize) {
+                    add_transposed_product(sums.at(to), &left, &right);
+                }
+            }
+            hold_missing_modes(sums.at(row));
+        });
+        fine.iter().for_each(|&node| place[node as usize] = u32::MAX);
+        match &mut whole {
+            Some(whole) => whole.append(next),
+            none => *none = Some(next),
+        }
+    }
+    whole.unwrap_or_else(|| Blocks::by_rows(0..0, count, |_, _| ()))
+}
+
+/// Gives the unknowns of missing modes, whose rows are zero, a diagonal.
+fn hold_missing_modes(block: &mut [[f64; RIGID]; RIGID]) {
+    let largest = (0..RIGID).map(|n| block[n][n]).fold(0.0, f64::max);
+    for n in 0..RIGID {
+        if block[n][n] <= 1e-14 * largest {
+            block[n][n] = if largest > 0.0 { largest } else { 1.0 };
+        }
+    }
 }
