@@ -18,7 +18,10 @@ const EXACT: f64 = 1e-6;
 /// Stated error at which the other searches end.
 const FINE: f64 = 1e-3;
 /// Lattice spacings of the whole demo without a region, mm.
-const SPACINGS_MM: [f64; 5] = [7.0, 5.0, 4.0, 3.0, 2.4];
+const SPACINGS_MM: [f64; 6] = [7.0, 5.0, 4.0, 3.0, 2.4, 1.28];
+/// A body with more vertices that can move is only searched to [`AT_REST`], which takes minutes.
+/// Its true error is not known.
+const LARGE: usize = 2_000_000;
 
 /// Tensions of the skin, N/m, and its modulus over its tension.
 const TENSIONS_N_PER_M: [f64; 3] = [5.0, 30.0, 150.0];
@@ -174,13 +177,18 @@ fn one(name: &str, scene: &str, set: &[String], most: usize) -> Result<Option<Fo
     if body.free_count() > most {
         return Ok(None);
     }
-    let mut search = Search::new(&body, &Options { error: FINE, ..Options::default() })?;
+    let is_large = body.free_count() > LARGE;
+    let error = if is_large { AT_REST } else { FINE };
+    let mut search = Search::new(&body, &Options { error, ..Options::default() })?;
     let mut early = None;
     let mut found = follow(name.into(), &system, &body, prepared_s, &mut search, |search, stated| {
-        if stated <= AT_REST && early.is_none() {
+        if stated <= AT_REST && early.is_none() && !is_large {
             early = Some(search.positions());
         }
     })?;
+    if is_large {
+        return Ok(Some(found));
+    }
     let start = system.system.to_f64().positions();
     found.true_error = early.map(|x| distance(&x, &search.positions(), &start));
     Ok(Some(found))
@@ -224,9 +232,9 @@ pub fn distance(x: &[Point3<f64>], rest: &[Point3<f64>], start: &[Point3<f64>]) 
     (square(x) / square(start)).sqrt()
 }
 
-/// Checks that the stated errors hold.
+/// Checks that the stated errors hold where the true ones are known.
 pub fn check(all: &[&[Found]], checks: &mut Checks) {
-    for found in all.iter().copied().flatten() {
+    for found in all.iter().copied().flatten().filter(|found| found.free <= LARGE) {
         let (name, error) = (&found.name, found.true_error.unwrap_or(f64::INFINITY));
         let what = format!("{name}: {} from rest where 1 % is stated", percent(error));
         checks.add(what, error <= AT_REST);
