@@ -4,11 +4,13 @@
 mod book;
 mod default_features;
 mod examples;
+mod installed;
 mod lanes;
 mod lines;
 mod miri;
 mod publish;
 mod python;
+mod static_program;
 mod steps;
 mod tidy;
 mod tools;
@@ -38,7 +40,10 @@ usage: cargo xtask COMMAND
   book                build the book as a site in target/book, and check its links
   fuzz [OPTIONS]      try damaged and hostile inputs with every reader; `fuzz --help` lists the options
   lines [--at REV]    count lines per tree and language, in the checkout or in a revision of git
-  publish --dry-run   pack every crate as for crates.io and build it from its package
+  publish --dry-run   pack every crate as for crates.io, build it from its package, install the
+                      program from its package and run it
+  static              build a program for Linux that needs no file of the system, and run it in an
+                      empty root folder; without GPUs
   study NAME [OPTIONS]
                       run a study; `study NAME --help` lists its options. With --write it writes its
                       tables and charts into docs/results/NAME.md:
@@ -125,6 +130,7 @@ fn dispatch(words: &[&str]) -> Result<ExitCode> {
             return workspace::exit_code(&mut steps::fuzz_command(&workspace, options)?);
         }
         ["publish", "--dry-run"] => publish::dry_run(&workspace),
+        ["static"] => static_program::run(&workspace),
         ["publish"] => bail!(
             "`cargo xtask` only offers `publish --dry-run`; make a release with `cargo publish --workspace`"
         ),

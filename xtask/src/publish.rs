@@ -1,5 +1,5 @@
-//! `cargo xtask publish --dry-run`: packs every publishable crate and compiles each from its
-//! package.
+//! `cargo xtask publish --dry-run`: packs every publishable crate, compiles each from its package,
+//! and installs the program from its package.
 //!
 //! `cargo publish --dry-run` can compile packages too. But it unpacks them into cargo's home folder
 //! and reuses the packages of an earlier run, because name and version are the same. So this module
@@ -11,7 +11,11 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
+use crate::installed;
 use crate::workspace::{Scope, Workspace, execute};
+
+/// The crate of the program.
+const PROGRAM: &str = "cutis-cli";
 
 /// Name and version of a crate.
 struct Package {
@@ -51,7 +55,8 @@ pub fn dry_run(workspace: &Workspace) -> Result<()> {
         execute(command.env("CARGO_TARGET_DIR", &target))?;
     }
     println!("{} crates compile from their packages", packages.len());
-    Ok(())
+    let program = packages.iter().find(|package| package.name == PROGRAM).context("no program is packed")?;
+    installed::try_package(workspace, &folder.join(program.folder()), &program.version)
 }
 
 /// The members of the workspace without `publish = false`.
