@@ -9,7 +9,15 @@ import numpy as np
 import pydicom
 import SimpleITK
 from pydicom.dataset import Dataset, FileMetaDataset
-from pydicom.uid import CTImageStorage, ExplicitVRLittleEndian, ImplicitVRLittleEndian, generate_uid
+from pydicom.sequence import Sequence
+from pydicom.uid import (
+    CTImageStorage,
+    EnhancedCTImageStorage,
+    ExplicitVRLittleEndian,
+    ImplicitVRLittleEndian,
+    RLELossless,
+    generate_uid,
+)
 from scipy import ndimage
 
 from _compare import Seen, Tally, by_nibabel, data_folder, differences, require_rejection, run_program
@@ -279,9 +287,96 @@ def check_written(tally):
             require_voxel_rejection(expected.values)
 
 
+def group(**values):
+    """A functional group: a sequence with one item."""
+    item = Dataset()
+    for keyword, value in values.items():
+        setattr(item, keyword, value)
+    return Sequence([item])
+
+
+def write_enhanced(path, rng, syntax, *, turn, frames):
+    """An enhanced CT by pydicom: random voxels, each frame with its own position, orientation and
+    scaling, in an order that is not that of the positions."""
+    file = Dataset()
+    file.file_meta = FileMetaDataset()
+    file.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
+    file.file_meta.MediaStorageSOPClassUID = file.SOPClassUID = EnhancedCTImageStorage
+    file.file_meta.MediaStorageSOPInstanceUID = file.SOPInstanceUID = generate_uid()
+    file.Modality, file.SeriesInstanceUID, file.SeriesNumber = "CT", generate_uid(), 5
+    file.StudyInstanceUID, file.FrameOfReferenceUID = generate_uid(), generate_uid()
+    file.ImageType = ["ORIGINAL", "PRIMARY", "VOLUME", "NONE"]
+    file.Rows, file.Columns, file.NumberOfFrames = 7, 9, frames
+    file.SamplesPerPixel, file.PhotometricInterpretation = 1, "MONOCHROME2"
+    file.BitsAllocated, file.BitsStored, file.HighBit, file.PixelRepresentation = 16, 12, 11, 0
+    shared = Dataset()
+    shared.PixelMeasuresSequence = group(PixelSpacing=[0.75, 0.5], SliceThickness=2.0)
+    file.SharedFunctionalGroupsSequence = Sequence([shared])
+    file.PerFrameFunctionalGroupsSequence = Sequence()
+    for n in rng.permutation(frames):
+        own = Dataset()
+        position = np.array([-12.0, 30.0, 4.0]) + 2.5 * n * turn[:, 2]
+        own.PlanePositionSequence = group(ImagePositionPatient=[f"{value:.9f}" for value in position])
+        orientation = [f"{value:.11f}" for value in turn[:, :2].T.ravel()]
+        own.PlaneOrientationSequence = group(ImageOrientationPatient=orientation)
+        own.PixelValueTransformationSequence = group(
+            RescaleSlope=int(n % 2 + 1), RescaleIntercept=-1000 - 10 * int(n), RescaleType="HU"
+        )
+        file.PerFrameFunctionalGroupsSequence.append(own)
+    file.PixelData = rng.integers(0, 4096, size=(frames, 7, 9)).astype("<u2").tobytes()
+    if syntax != ExplicitVRLittleEndian:
+        file.compress(syntax)
+    file.save_as(path, enforce_file_format=True)
+
+
+def expected_frames(path):
+    """The voxels and the affine of an enhanced CT, by its functional groups."""
+    file = pydicom.dcmread(path)
+    frames = []
+    for own, stored in zip(file.PerFrameFunctionalGroupsSequence, file.pixel_array, strict=True):
+        scaling = own.PixelValueTransformationSequence[0]
+        hu = stored.astype(np.int64) * int(scaling.RescaleSlope) + int(scaling.RescaleIntercept)
+        position = np.array(own.PlanePositionSequence[0].ImagePositionPatient, dtype=float)
+        frames.append((position, hu.T))
+    own = file.PerFrameFunctionalGroupsSequence[0].PlaneOrientationSequence[0]
+    row, column = np.array(own.ImageOrientationPatient, dtype=float).reshape(2, 3)
+    frames.sort(key=lambda frame: frame[0] @ np.cross(row, column))
+    spacing = file.SharedFunctionalGroupsSequence[0].PixelMeasuresSequence[0].PixelSpacing
+    affine = np.eye(4)
+    affine[:3, 0], affine[:3, 1] = row * float(spacing[1]), column * float(spacing[0])
+    affine[:3, 2] = (frames[-1][0] - frames[0][0]) / (len(frames) - 1)
+    affine[:3, 3] = frames[0][0]
+    affine[:2] *= -1.0
+    return Seen.of_values(np.stack([hu for _, hu in frames], axis=-1), affine, None)
+
+
+def check_enhanced(tally):
+    """Enhanced CT by pydicom, stored plainly and in run length encoding."""
+    rng = np.random.default_rng(11)
+    for syntax in (ExplicitVRLittleEndian, RLELossless):
+        for oblique in (False, True):
+            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] if oblique else np.eye(3)
+            turn[:, 2] *= np.sign(np.linalg.det(turn))
+            with tempfile.TemporaryDirectory() as name:
+                path = Path(name) / "scan.dcm"
+                # More frames than are decoded at a time.
+                write_enhanced(path, rng, syntax, turn=turn, frames=21)
+                ours, process = convert(path.parent)
+                label = f"enhanced, {syntax.name}, {'oblique' if oblique else 'axial'}"
+                if ours is None:
+                    tally.check(label, [f"was refused: {process.stderr}"])
+                    continue
+                expected = expected_frames(path)
+                tally.check(f"{label} in place", differences(ours, expected))
+                tally.check(f"{label} voxels", voxel_problems(ours.values, expected.values))
+                require_rejection(expected)
+                require_voxel_rejection(expected.values)
+
+
 def main():
     tally = Tally("DICOM series")
     check_written(tally)
+    check_enhanced(tally)
     folder = data_folder()
     if folder is not None:
         check_refused(folder / "dicom", tally)

@@ -205,6 +205,35 @@ fn slice(syntax: &str, size: [u16; 2], pixels: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// A sequence of items with these data sets.
+fn sequence(tag: [u16; 2], items: &[Vec<u8>]) -> Vec<u8> {
+    let item = |data: &Vec<u8>| {
+        let length = (data.len() as u32).to_le_bytes();
+        [b"\xfe\xff\x00\xe0".as_slice(), &length, data].concat()
+    };
+    element(tag, b"SQ", &items.iter().flat_map(item).collect::<Vec<u8>>())
+}
+
+/// An enhanced CT with two frames of 4 columns and 3 rows.
+fn enhanced() -> Vec<u8> {
+    let group = |tag, elements: &[Vec<u8>]| sequence(tag, &[elements.concat()]);
+    let frame = |position: &[u8]| {
+        let place = group([0x20, 0x9113], &[element([0x20, 0x32], b"DS", position)]);
+        let scaling = [([0x28, 0x1052], b"-1024".as_slice()), ([0x28, 0x1053], b"1")];
+        let scaling = scaling.map(|(tag, value)| element(tag, b"DS", value));
+        [place, group([0x28, 0x9145], &scaling)].concat()
+    };
+    let shared = group([0x20, 0x9116], &[element([0x20, 0x37], b"DS", b"1\\0\\0\\0\\1\\0")]);
+    let stored: Vec<u8> = (1000..1024u16).flat_map(u16::to_le_bytes).collect();
+    let data = [
+        element([0x28, 8], b"IS", b"2"),
+        sequence([0x5200, 0x9229], &[shared]),
+        sequence([0x5200, 0x9230], &[frame(b"10\\20\\30"), frame(b"10\\20\\32")]),
+        element([0x7fe0, 0x10], b"OW", &stored),
+    ];
+    slice(RAW, [4, 3], &data.concat())
+}
+
 /// Pixels in one fragment, after an empty table of offsets.
 fn fragment(stream: &[u8]) -> Vec<u8> {
     let mut bytes =
@@ -258,6 +287,7 @@ pub(crate) fn dicom() -> Vec<Vec<u8>> {
     let size = [4, 3];
     vec![
         slice(RAW, size, &raw),
+        enhanced(),
         slice("1.2.840.10008.1.2.1.99", size, &raw),
         slice("1.2.840.10008.1.2.5", size, &fragment(&runs())),
         slice("1.2.840.10008.1.2.4.70", size, &fragment(&jpeg(size))),

@@ -1,6 +1,23 @@
 //! Errors of DICOM series. They never show names, dates or identifiers of a patient.
 
+use std::fmt;
 use std::path::PathBuf;
+
+/// A slice: its file, and the frame of a file with several.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SliceSource {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Number of the frame from 1, if the file has several slices.
+    pub frame: Option<u32>,
+}
+
+impl fmt::Display for SliceSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.path.display())?;
+        self.frame.map_or(Ok(()), |frame| write!(f, " (frame {frame})"))
+    }
+}
 
 /// Why DICOM files are not a CT volume.
 #[derive(Debug, thiserror::Error)]
@@ -59,20 +76,20 @@ pub enum DicomError {
         series: Vec<String>,
     },
     /// A needed attribute is missing.
-    #[error("{path}: the attribute {tag} is missing: expected {expected}")]
+    #[error("{slice}: the attribute {tag} is missing: expected {expected}")]
     Missing {
-        /// Path of the file.
-        path: PathBuf,
+        /// The slice.
+        slice: SliceSource,
         /// Keyword of the attribute.
         tag: &'static str,
         /// The valid values.
         expected: &'static str,
     },
     /// An attribute has an invalid value.
-    #[error("{path}: the attribute {tag} is {value}: expected {expected}")]
+    #[error("{slice}: the attribute {tag} is {value}: expected {expected}")]
     Invalid {
-        /// Path of the file.
-        path: PathBuf,
+        /// The slice.
+        slice: SliceSource,
         /// Keyword of the attribute.
         tag: &'static str,
         /// The value found.
@@ -101,10 +118,10 @@ pub enum DicomError {
         remedy: &'static str,
     },
     /// The pixel data are not what the header says, or the decoder fails.
-    #[error("{path}: the pixels cannot be decoded: {reason}")]
+    #[error("{slice}: the pixels cannot be decoded: {reason}")]
     Pixels {
-        /// Path of the file.
-        path: PathBuf,
+        /// The slice.
+        slice: SliceSource,
         /// What is wrong.
         reason: &'static str,
     },
@@ -114,10 +131,10 @@ pub enum DicomError {
          move the files of the other scan, or the copies, to another folder"
     )]
     SamePosition {
-        /// Path of the one file.
-        first: PathBuf,
-        /// Path of the other file.
-        second: PathBuf,
+        /// The one slice.
+        first: SliceSource,
+        /// The other slice.
+        second: SliceSource,
         /// Distance along the normal of the slices, mm.
         gap_mm: f64,
     },
@@ -128,10 +145,10 @@ pub enum DicomError {
         if *count == 1 { "" } else { "s" }, if *count == 1 { "s" } else { "" }
     )]
     MissingSlices {
-        /// Path of the file before the gap.
-        before: PathBuf,
-        /// Path of the file after the gap.
-        after: PathBuf,
+        /// The slice before the gap.
+        before: SliceSource,
+        /// The slice after the gap.
+        after: SliceSource,
         /// Distance along the normal of the slices, mm.
         gap_mm: f64,
         /// Distance of other slices, mm.

@@ -17,7 +17,7 @@ use crate::VolumeError;
 
 /// Bytes of preamble and prefix at the beginning of a file (PS3.10, section 7.1).
 const PREFIX: usize = 132;
-/// Largest file. A slice has about half a megabyte, and an uncompressed one at most 8 GB.
+/// Largest file. A slice has about half a megabyte, and a file with several some hundred slices.
 const LARGEST: u64 = 1 << 31;
 /// Largest expansion of a deflated file. Slices expand by a factor of two to ten.
 const MOST_INFLATED: u64 = 200;
@@ -35,7 +35,7 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, VolumeError> {
     let failed = |source| VolumeError::Io { path: path.into(), action: "read", source };
     let mut file = File::open(path).map_err(failed)?;
     if file.metadata().map_err(failed)?.len() > LARGEST {
-        let reason = "it has more than 2 GB, which no single slice has";
+        let reason = "it has more than 2 GB";
         return Err(DicomError::Damaged { path: path.into(), reason }.into());
     }
     let mut bytes = Vec::new();

@@ -5,9 +5,11 @@
 
 /// Deepest nesting of sequences. Enhanced images have about four levels.
 const DEEPEST: usize = 32;
-/// Most elements and items. A slice has some hundred, and a parser takes far more memory for a
-/// short element than the file.
+/// Most elements and items, next to one for each [`BYTES_PER_ELEMENT`]. A slice has some hundred,
+/// and a parser takes far more memory for a short element than the file.
 const MOST: usize = 100_000;
+/// An enhanced image has some hundred elements for each frame, and a frame has 100 kB or more.
+const BYTES_PER_ELEMENT: usize = 500;
 const ITEM: [u16; 2] = [0xfffe, 0xe000];
 const ITEM_END: [u16; 2] = [0xfffe, 0xe00d];
 const SEQUENCE_END: [u16; 2] = [0xfffe, 0xe0dd];
@@ -46,8 +48,8 @@ pub(super) fn check(bytes: &[u8], encoding: Encoding) -> Result<(), &'static str
             .ok_or("it ends within the header of an element")?;
         at += header.size;
         count += 1;
-        if count > MOST {
-            return Err("it has more than 100,000 elements");
+        if count > MOST + bytes.len() / BYTES_PER_ELEMENT {
+            return Err("it has more than 100,000 elements and one for every 500 bytes");
         }
         match (header.tag, header.length) {
             (ITEM_END | SEQUENCE_END, _) => {
@@ -173,6 +175,6 @@ mod tests {
     fn countless_elements_are_refused() {
         let element = b"\x08\x00\x60\x00CS\0\0";
         assert_eq!(check(&element.repeat(MOST), EXPLICIT), Ok(()));
-        assert!(check(&element.repeat(MOST + 1), EXPLICIT).unwrap_err().contains("100,000"));
+        assert!(check(&element.repeat(2 * MOST), EXPLICIT).unwrap_err().contains("100,000"));
     }
 }

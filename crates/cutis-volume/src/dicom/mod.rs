@@ -7,6 +7,7 @@
 mod codestream;
 mod error;
 mod file;
+mod frames;
 mod lengths;
 mod list;
 mod pixels;
@@ -16,7 +17,7 @@ mod slice;
 mod stack;
 mod tags;
 
-pub use error::DicomError;
+pub use error::{DicomError, SliceSource};
 pub use list::{Listing, SeriesInfo, list};
 
 pub(crate) use file::is_dicom;

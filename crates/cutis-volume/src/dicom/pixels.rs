@@ -34,7 +34,7 @@ pub(super) fn decode(slice: &Slice, object: &DefaultDicomObject) -> Result<Pixel
     // A byte of padding makes an odd number of bytes even.
     if bytes.len() < count * sample || bytes.len() > count * sample + 1 {
         let reason = "there are not Columns x Rows values";
-        return Err(DicomError::Pixels { path: slice.path.clone(), reason });
+        return Err(DicomError::Pixels { slice: slice.source.clone(), reason });
     }
     Ok(match sample {
         1 => convert(slice, bytes[..count].iter().map(|&byte| u16::from(byte))),
@@ -43,8 +43,8 @@ pub(super) fn decode(slice: &Slice, object: &DefaultDicomObject) -> Result<Pixel
 }
 
 fn stored_bytes(slice: &Slice, object: &DefaultDicomObject) -> Result<Vec<u8>, DicomError> {
-    let damaged = |reason| DicomError::Pixels { path: slice.path.clone(), reason };
-    let codec = Codec::require(&slice.path, object.meta().transfer_syntax())?;
+    let damaged = |reason| DicomError::Pixels { slice: slice.source.clone(), reason };
+    let codec = Codec::require(&slice.source.path, object.meta().transfer_syntax())?;
     let element = object.get(Tag(0x7fe0, 0x0010)).ok_or(damaged("the attribute PixelData is missing"))?;
     match (codec, element.value()) {
         (Codec::Raw, Value::Primitive(_)) => {}

@@ -1,15 +1,17 @@
 //! Reads one series into a volume.
 
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
+use dicom_object::DefaultDicomObject;
 use rayon::prelude::*;
 
 use super::error::DicomError;
-use super::file;
 use super::pixels::{self, Pixels};
 use super::series::{Folder, Series};
 use super::slice::Slice;
 use super::stack::Stack;
+use super::{file, frames};
 use crate::regrid::{Slices, regrid};
 use crate::voxels::Observer;
 use crate::{Grid, HuStats, Loaded, ReadOptions, Volume, VolumeError};
@@ -136,17 +138,11 @@ fn decode(
     let [nx, ny] = slices[0].size;
     let mut hu: Vec<i16> = Vec::new();
     let mut total = Total::default();
+    let mut files = Files::default();
     for batch in slices.chunks(BATCH) {
-        let mut files = Vec::with_capacity(batch.len());
-        for slice in batch {
-            let bytes = file::bytes(&slice.path)?;
-            if let Some(observer) = &mut observer {
-                observer(&slice.path, &bytes);
-            }
-            files.push(bytes);
-        }
+        files.open(batch, &mut observer)?;
         let decoded: Vec<Result<Pixels, DicomError>> =
-            batch.par_iter().zip(&files).map(|(slice, bytes)| decode_slice(slice, bytes)).collect();
+            batch.par_iter().map(|slice| decode_slice(slice, files.of(slice))).collect();
         for pixels in decoded {
             let pixels = pixels?;
             total.add(&pixels);
@@ -172,9 +168,60 @@ fn decode(
     Ok(Decoded { hu, stats, dtype, rounding: total.rounding, padding: total.padding })
 }
 
-/// Decodes one slice from the bytes of its file.
-pub(super) fn decode_slice(slice: &Slice, bytes: &[u8]) -> Result<Pixels, DicomError> {
-    pixels::decode(slice, &file::parse(&slice.path, bytes, true)?)
+/// Decodes one slice of a parsed file.
+pub(super) fn decode_slice(slice: &Slice, object: &DefaultDicomObject) -> Result<Pixels, DicomError> {
+    match slice.source.frame {
+        None => pixels::decode(slice, object),
+        Some(_) => pixels::decode(slice, &frames::single(slice, object)?),
+    }
+}
+
+/// The parsed files of some slices. A file with several slices stays until no slice needs it.
+#[derive(Default)]
+struct Files {
+    open: BTreeMap<PathBuf, DefaultDicomObject>,
+    seen: BTreeSet<PathBuf>,
+}
+
+impl Files {
+    /// Opens the files of these slices and closes all others. The observer sees each file once.
+    fn open(
+        &mut self,
+        slices: &[Slice],
+        observer: &mut Option<&mut Observer<'_>>,
+    ) -> Result<(), VolumeError> {
+        let mut kept = BTreeMap::new();
+        let mut new: Vec<(&Path, Vec<u8>)> = Vec::new();
+        for slice in slices {
+            let path = &slice.source.path;
+            if let Some((path, object)) = self.open.remove_entry(path) {
+                kept.insert(path, object);
+            } else if !kept.contains_key(path) && new.iter().all(|(known, _)| known != path) {
+                let bytes = file::bytes(path)?;
+                if let Some(observer) = observer
+                    && self.seen.insert(path.clone())
+                {
+                    observer(path, &bytes);
+                }
+                new.push((path, bytes));
+            }
+        }
+        let parsed: Vec<Result<(PathBuf, DefaultDicomObject), DicomError>> = new
+            .into_par_iter()
+            .map(|(path, bytes)| Ok((path.into(), file::parse(path, &bytes, true)?)))
+            .collect();
+        for file in parsed {
+            let (path, object) = file?;
+            kept.insert(path, object);
+        }
+        self.open = kept;
+        Ok(())
+    }
+
+    /// The file of a slice that was opened.
+    fn of(&self, slice: &Slice) -> &DefaultDicomObject {
+        &self.open[&slice.source.path]
+    }
 }
 
 /// Statistics of several slices.

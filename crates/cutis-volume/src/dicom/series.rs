@@ -22,6 +22,8 @@ pub(super) struct Series {
     /// Why the series cannot be read.
     pub(super) failure: Option<DicomError>,
     files: Vec<PathBuf>,
+    /// Number of slices. A file that cannot be read counts as one.
+    count: usize,
 }
 
 impl Series {
@@ -29,7 +31,7 @@ impl Series {
     pub(super) fn line(&self) -> String {
         let number =
             self.identity.number.map_or("without number".into(), |number| format!("series {number}"));
-        let mut line = format!("  {number}: \"{}\", {} slices", self.identity.description, self.files.len());
+        let mut line = format!("  {number}: \"{}\", {} slices", self.identity.description, self.count);
         if let Some(slice) = self.slices.first() {
             line += &format!(" of {} x {} pixels", slice.size[0], slice.size[1]);
         }
@@ -37,7 +39,7 @@ impl Series {
     }
 
     pub(super) fn len(&self) -> usize {
-        self.files.len()
+        self.count
     }
 
     pub(super) fn first_file(&self) -> &Path {
@@ -56,8 +58,8 @@ pub(super) struct Folder {
     pub(super) series: Vec<Series>,
     /// Number of files of each other kind.
     pub(super) others: BTreeMap<Other, usize>,
-    /// The first file that is damaged. It may be a slice of any series.
-    pub(super) damaged: Option<VolumeError>,
+    /// The files that are damaged. Each may be a slice of any series.
+    pub(super) damaged: Vec<VolumeError>,
 }
 
 impl Folder {
@@ -77,12 +79,12 @@ impl Folder {
         files.sort();
         let found: Vec<Result<Found, VolumeError>> = files.par_iter().map(|file| slice::read(file)).collect();
         let mut folder =
-            Self { path: path.into(), series: Vec::new(), others: BTreeMap::new(), damaged: None };
+            Self { path: path.into(), series: Vec::new(), others: BTreeMap::new(), damaged: Vec::new() };
         for (file, found) in files.into_iter().zip(found) {
             match found {
-                Ok(Found::Slice { identity, slice }) => folder.add(file, identity, *slice),
+                Ok(Found::Slices { identity, slices }) => folder.add_file(&file, &identity, slices),
                 Ok(Found::Other(other)) => *folder.others.entry(other).or_default() += 1,
-                Err(error) => folder.damaged = folder.damaged.take().or(Some(error)),
+                Err(error) => folder.damaged.push(error),
             }
         }
         folder
@@ -91,7 +93,14 @@ impl Folder {
         Ok(folder)
     }
 
-    fn add(&mut self, file: PathBuf, identity: Identity, slice: Result<Slice, DicomError>) {
+    fn add_file(&mut self, file: &Path, identity: &Identity, slices: Result<Vec<Slice>, DicomError>) {
+        match slices {
+            Ok(slices) => slices.into_iter().for_each(|slice| self.add(file, identity, Ok(slice))),
+            Err(error) => self.add(file, identity, Err(error)),
+        }
+    }
+
+    fn add(&mut self, file: &Path, identity: &Identity, slice: Result<Slice, DicomError>) {
         let group = self.series.iter_mut().find(|series| {
             let alike = match (&slice, series.slices.first()) {
                 (Ok(slice), Some(first)) => slice.matches(first),
@@ -102,12 +111,20 @@ impl Folder {
         let series = match group {
             Some(series) => series,
             None => {
-                let new = Series { identity, slices: Vec::new(), failure: None, files: Vec::new() };
-                self.series.push(new);
+                self.series.push(Series {
+                    identity: identity.clone(),
+                    slices: Vec::new(),
+                    failure: None,
+                    files: Vec::new(),
+                    count: 0,
+                });
                 self.series.last_mut().expect("one was added")
             }
         };
-        series.files.push(file);
+        if series.files.last().is_none_or(|last| last != file) {
+            series.files.push(file.into());
+        }
+        series.count += 1;
         match slice {
             Ok(slice) => series.slices.push(slice),
             Err(error) => series.failure = series.failure.take().or(Some(error)),
@@ -117,8 +134,8 @@ impl Folder {
     /// The series with this number, that of the given file, or the only one.
     pub(super) fn choose(mut self, number: Option<u32>) -> Result<Series, VolumeError> {
         let path = self.path.clone();
-        if let Some(error) = self.damaged.take() {
-            return Err(error);
+        if !self.damaged.is_empty() {
+            return Err(self.damaged.swap_remove(0));
         }
         if path.is_file() {
             self.series.retain(|series| series.files.contains(&path));

@@ -1,16 +1,16 @@
 //! The header of one slice: geometry, pixel format and scaling to HU, checked.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::error::DicomError;
+use super::error::{DicomError, SliceSource};
+use super::frames;
 use super::tags::{self, Attributes, plain};
 
 /// Largest deviation of a direction from unit length, and of two from a right angle. Files have
 /// six digits or more.
 const DIRECTION_TOLERANCE: f64 = 1e-3;
-const ENHANCED: [&str; 2] = ["1.2.840.10008.5.1.4.1.1.2.1", "1.2.840.10008.5.1.4.1.1.2.2"];
 /// Prefix of the SOP classes of secondary captures: pictures of a screen, such as dose reports.
 const SECONDARY_CAPTURE: &str = "1.2.840.10008.5.1.4.1.1.7";
 
@@ -84,7 +84,7 @@ pub(super) struct PixelFormat {
 /// One slice.
 #[derive(Clone, Debug)]
 pub(super) struct Slice {
-    pub(super) path: PathBuf,
+    pub(super) source: SliceSource,
     /// Columns and rows.
     pub(super) size: [usize; 2],
     /// Distance of neighboring columns and of neighboring rows, mm.
@@ -116,7 +116,7 @@ impl Slice {
         }
         let format = format(attributes)?;
         Ok(Self {
-            path: attributes.path.into(),
+            source: attributes.source(),
             size: [columns as usize, rows as usize],
             spacing_mm: [between_columns, between_rows],
             axes: axes(attributes)?,
@@ -149,11 +149,7 @@ impl Slice {
 fn supported(attributes: &Attributes<'_>) -> Result<(), DicomError> {
     let unsupported =
         |what, remedy| Err(DicomError::Unsupported { path: attributes.path.into(), what, remedy });
-    let frames = attributes.whole(tags::FRAMES, 1..=1 << 20, "1 or more")?.unwrap_or(1);
-    if ENHANCED.contains(&attributes.text(tags::SOP_CLASS).as_str()) || frames > 1 {
-        return unsupported("an enhanced CT, with several slices in one file,", "convert it with dcm2niix");
-    }
-    if attributes.object.get(tags::MODALITY_LUT.0).is_some() {
+    if attributes.element(tags::MODALITY_LUT).is_some() {
         return unsupported(
             "a table of HU (ModalityLUTSequence)",
             "export the scan with RescaleSlope and RescaleIntercept",
@@ -222,9 +218,13 @@ fn padding(attributes: &Attributes<'_>, format: PixelFormat) -> Result<Option<[i
     Ok(Some([a.min(b), a.max(b)]))
 }
 
-/// Whether the path is a slice, another file, or a damaged one, with its series.
+/// What is in a file.
 pub(super) enum Found {
-    Slice { identity: Identity, slice: Box<Result<Slice, DicomError>> },
+    /// The slices of one series in the order of the file, or why it cannot be read.
+    Slices {
+        identity: Identity,
+        slices: Result<Vec<Slice>, DicomError>,
+    },
     Other(Other),
 }
 
@@ -237,9 +237,9 @@ pub(super) fn read(path: &Path) -> Result<Found, crate::VolumeError> {
         return Ok(Found::Other(Other::NotDicom));
     }
     let object = super::file::parse(path, &super::file::bytes(path)?, false)?;
-    let attributes = Attributes { path, object: &object };
+    let attributes = Attributes { path, frame: None, objects: vec![&object] };
     Ok(match Identity::read(&attributes) {
         Err(other) => Found::Other(other),
-        Ok(identity) => Found::Slice { identity, slice: Box::new(Slice::read(&attributes)) },
+        Ok(identity) => Found::Slices { identity, slices: frames::slices(path, &object) },
     })
 }

@@ -44,7 +44,7 @@ impl Stack {
     pub(super) fn new(mut slices: Vec<Slice>) -> Result<Self, DicomError> {
         let (first, normal) = (slices[0].position_mm, slices[0].normal());
         let along = |slice: &Slice| (slice.position_mm - first).dot(&normal);
-        slices.sort_by(|a, b| along(a).total_cmp(&along(b)).then_with(|| a.path.cmp(&b.path)));
+        slices.sort_by(|a, b| along(a).total_cmp(&along(b)).then_with(|| a.source.cmp(&b.source)));
         let (first, [row, column]) = (slices[0].position_mm, slices[0].axes);
         let offset = |slice: &Slice| slice.position_mm - first;
         let along_mm: Vec<f64> = slices.iter().map(|slice| offset(slice).dot(&normal)).collect();
@@ -65,7 +65,7 @@ impl Stack {
         let (least, most) = (sorted[0], sorted[sorted.len() - 1]);
         let same = SAME_MM.max(SAME_SHARE * usual);
         if let Some(n) = gaps.iter().position(|&gap| gap <= same) {
-            let [first, second] = [n, n + 1].map(|n| slices[n].path.clone());
+            let [first, second] = [n, n + 1].map(|n| slices[n].source.clone());
             return Err(DicomError::SamePosition { first, second, gap_mm: gaps[n] });
         }
         // Most distances are equal, and others are multiples of them: slices of an even series are
@@ -79,8 +79,8 @@ impl Stack {
             double.filter(|_| mostly_equal && even_thickness && gaps.iter().all(|&gap| whole(gap)))
         {
             return Err(DicomError::MissingSlices {
-                before: slices[n].path.clone(),
-                after: slices[n + 1].path.clone(),
+                before: slices[n].source.clone(),
+                after: slices[n + 1].source.clone(),
                 gap_mm: gaps[n],
                 usual_mm: least,
                 count: (gaps[n] / least).round() as u32 - 1,

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use dicom_object::{DefaultDicomObject, Tag};
+use dicom_object::mem::InMemElement;
+use dicom_object::{InMemDicomObject, Tag};
 
-use super::error::DicomError;
+use super::error::{DicomError, SliceSource};
 
 /// An attribute: its tag and its keyword.
 #[derive(Clone, Copy)]
@@ -40,26 +41,44 @@ attributes! {
     INTERCEPT = 0x0028 0x1052 "RescaleIntercept";
     SLOPE = 0x0028 0x1053 "RescaleSlope";
     LOSSY = 0x0028 0x2110 "LossyImageCompression";
+    PLANE_POSITION = 0x0020 0x9113 "PlanePositionSequence";
+    PLANE_ORIENTATION = 0x0020 0x9116 "PlaneOrientationSequence";
+    PIXEL_MEASURES = 0x0028 0x9110 "PixelMeasuresSequence";
+    PIXEL_VALUES = 0x0028 0x9145 "PixelValueTransformationSequence";
+    SHARED_GROUPS = 0x5200 0x9229 "SharedFunctionalGroupsSequence";
+    FRAME_GROUPS = 0x5200 0x9230 "PerFrameFunctionalGroupsSequence";
     MODALITY_LUT = 0x0028 0x3000 "ModalityLUTSequence";
 }
 
-/// The attributes of one file.
+/// The attributes of one file, or of one frame of a file.
 pub(super) struct Attributes<'a> {
     pub(super) path: &'a Path,
-    pub(super) object: &'a DefaultDicomObject,
+    /// Number of the frame from 1.
+    pub(super) frame: Option<u32>,
+    /// The data sets that may have an attribute. The first one that has it counts.
+    pub(super) objects: Vec<&'a InMemDicomObject>,
 }
 
 impl Attributes<'_> {
+    /// The element of an attribute.
+    pub(super) fn element(&self, attribute: Attribute) -> Option<&InMemElement> {
+        self.objects.iter().find_map(|object| object.get(attribute.0))
+    }
+
+    /// The file, with the frame.
+    pub(super) fn source(&self) -> SliceSource {
+        SliceSource { path: self.path.into(), frame: self.frame }
+    }
+
     /// True if the attribute is there and not empty.
     pub(super) fn has(&self, attribute: Attribute) -> bool {
-        self.object
-            .get(attribute.0)
+        self.element(attribute)
             .is_some_and(|element| !element.value().to_str().is_ok_and(|text| text.trim().is_empty()))
     }
 
     /// The text of an attribute, without padding. Empty if there is none.
     pub(super) fn text(&self, attribute: Attribute) -> String {
-        let element = self.object.get(attribute.0);
+        let element = self.element(attribute);
         let text = element.and_then(|element| Some(element.value().to_str().ok()?.into_owned()));
         text.unwrap_or_default().trim_matches(['\0', ' ']).to_owned()
     }
@@ -70,7 +89,7 @@ impl Attributes<'_> {
         attribute: Attribute,
         expected: &'static str,
     ) -> Result<Option<[f64; N]>, DicomError> {
-        let Some(element) = self.object.get(attribute.0).filter(|_| self.has(attribute)) else {
+        let Some(element) = self.element(attribute).filter(|_| self.has(attribute)) else {
             return Ok(None);
         };
         let numbers = element.value().to_multi_float64().unwrap_or_default();
@@ -86,7 +105,7 @@ impl Attributes<'_> {
         attribute: Attribute,
         expected: &'static str,
     ) -> Result<[f64; N], DicomError> {
-        let missing = || DicomError::Missing { path: self.path.into(), tag: attribute.1, expected };
+        let missing = || DicomError::Missing { slice: self.source(), tag: attribute.1, expected };
         self.numbers(attribute, expected)?.ok_or_else(missing)
     }
 
@@ -111,7 +130,7 @@ impl Attributes<'_> {
         range: std::ops::RangeInclusive<i64>,
         expected: &'static str,
     ) -> Result<i64, DicomError> {
-        let missing = || DicomError::Missing { path: self.path.into(), tag: attribute.1, expected };
+        let missing = || DicomError::Missing { slice: self.source(), tag: attribute.1, expected };
         self.whole(attribute, range, expected)?.ok_or_else(missing)
     }
 
@@ -119,7 +138,7 @@ impl Attributes<'_> {
     pub(super) fn invalid(&self, attribute: Attribute, expected: &'static str) -> DicomError {
         let value = plain(&self.text(attribute), 80);
         let value = if value.is_empty() { "empty".to_owned() } else { value };
-        DicomError::Invalid { path: self.path.into(), tag: attribute.1, value, expected }
+        DicomError::Invalid { slice: self.source(), tag: attribute.1, value, expected }
     }
 }
 

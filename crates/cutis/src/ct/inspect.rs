@@ -63,6 +63,9 @@ fn describe(mut loaded: Loaded) -> Inspection {
 pub struct FolderInspection {
     /// The series, ordered by number.
     pub series: Vec<Series>,
+    /// Files that cannot be parsed, each with the reason. No series is read as long as they are in
+    /// the folder.
+    pub damaged: Vec<String>,
     /// What else is in the folder.
     pub notes: Vec<String>,
     /// The volume, if there is one series and it can be read.
@@ -76,7 +79,7 @@ pub struct Series {
     pub number: Option<u32>,
     /// Its description.
     pub description: String,
-    /// Number of files.
+    /// Number of slices. A file that cannot be read counts as one.
     pub slices: usize,
     /// The first file by name. As a path it names the series.
     pub file: PathBuf,
@@ -88,7 +91,7 @@ pub struct Series {
     pub slice_distance_mm: Option<[f64; 2]>,
     /// Angle by which the slices are tilted, degrees.
     pub tilt_deg: Option<f64>,
-    /// Lowest and highest HU.
+    /// Lowest and highest HU of all slices that can be read.
     pub hu: Option<[f64; 2]>,
     /// True if it can be read with `volume.resample = true` only.
     pub needs_resampling: bool,
@@ -110,18 +113,20 @@ pub fn inspect_folder(path: &Path, options: &ReadOptions) -> Result<FolderInspec
             cutis_volume::read(path, options)?;
         }
         let volume = match &listing.series[..] {
+            // A run would be refused.
+            _ if !listing.damaged.is_empty() => None,
             [only] if only.problem.is_none() || (only.needs_resampling && options.resample) => {
                 Some(inspect(path, options)?)
             }
             _ => None,
         };
         let series = listing.series.into_iter().map(Series::from).collect();
-        Ok(FolderInspection { series, notes: listing.notes, volume })
+        Ok(FolderInspection { series, damaged: listing.damaged, notes: listing.notes, volume })
     }
     #[cfg(not(feature = "dicom"))]
     {
         let volume = Some(inspect(path, options)?);
-        Ok(FolderInspection { series: Vec::new(), notes: Vec::new(), volume })
+        Ok(FolderInspection { series: Vec::new(), damaged: Vec::new(), notes: Vec::new(), volume })
     }
 }
 

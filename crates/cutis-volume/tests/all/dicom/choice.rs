@@ -95,6 +95,32 @@ fn a_listing_has_every_series_and_why_one_cannot_be_read() {
 }
 
 #[test]
+fn damaged_files_are_listed_and_the_other_series_described() {
+    let mut slices = Vec::from(series("3", "1.2.3.424242.5", 1000));
+    // Pixels of a slice that end early.
+    slices.extend([Slice::at(0.0), Slice::at(2.0).pixels(&[1; 11]), Slice::at(4.0).pixels(&[1; 11])]);
+    let folder = Folder::of(&slices);
+    let listing = dicom::list(folder.0.path()).unwrap();
+    let [a, b] = &listing.series[..] else { panic!("{listing:?}") };
+    assert_eq!((a.hu, &a.problem, listing.damaged.len()), (Some([-24.0, -24.0]), &None, 0));
+    let problem = b.problem.as_ref().unwrap();
+    assert!(problem.contains("3.dcm") && problem.contains("1 more slice"), "{problem}");
+    assert_eq!((b.slices, b.hu, b.needs_resampling), (3, Some([-24.0, -13.0]), false));
+    // A file whose series is unknown.
+    let whole = fs::read(folder.path("0.dcm")).unwrap();
+    fs::write(folder.path("5.dcm"), &whole[..400]).unwrap();
+    fs::write(folder.path("6.dcm"), &whole[..300]).unwrap();
+    let listing = dicom::list(folder.0.path()).unwrap();
+    shows_no_patient(&format!("{listing:?}"));
+    let [first, second] = &listing.damaged[..] else { panic!("{listing:?}") };
+    assert!(first.contains("5.dcm") && second.contains("6.dcm"), "{listing:?}");
+    assert_eq!((listing.series.len(), listing.series[0].hu), (2, Some([-24.0, -24.0])));
+    // A run is refused by the name of the file.
+    let error = folder.read_with(&ReadOptions { series: Some(3), ..ReadOptions::default() }).unwrap_err();
+    assert!(error.to_string().contains("5.dcm"), "{error}");
+}
+
+#[test]
 fn every_byte_of_the_series_is_observed_in_the_order_of_the_slices() {
     let folder = Folder::of(&Slice::stack(&[2.0, 0.0]));
     let mut bytes: Vec<u8> = Vec::new();

@@ -59,7 +59,7 @@ fn slices_are_sorted_by_position_and_not_by_name() {
 fn two_slices_at_one_position_are_refused_by_name() {
     let error = Folder::of(&Slice::stack(&[0.0, 2.0, 4.0, 2.0])).refused();
     let DicomError::SamePosition { first, second, .. } = &error else { panic!("{error}") };
-    assert!(first.ends_with("1.dcm") && second.ends_with("3.dcm"), "{error}");
+    assert!(first.path.ends_with("1.dcm") && second.path.ends_with("3.dcm"), "{error}");
     assert!(Folder::of(&Slice::stack(&[0.0, 2.0, 4.0])).read().is_ok());
 }
 
@@ -68,7 +68,7 @@ fn missing_slices_are_refused_by_name() {
     let folder = Folder::of(&Slice::stack(&[0.0, 2.0, 4.0, 10.0, 12.0]));
     let error = folder.refused();
     let DicomError::MissingSlices { before, after, count: 2, .. } = &error else { panic!("{error}") };
-    assert!(before.ends_with("2.dcm") && after.ends_with("3.dcm"), "{error}");
+    assert!(before.path.ends_with("2.dcm") && after.path.ends_with("3.dcm"), "{error}");
     // Nothing invents the tissue of a missing slice.
     assert!(folder.read_with(&RESAMPLE).is_err());
 }

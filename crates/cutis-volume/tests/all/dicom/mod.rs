@@ -1,6 +1,7 @@
 //! CT series in DICOM files that these tests write, and in real ones.
 
 mod choice;
+mod enhanced;
 mod file;
 mod geometry;
 mod hostile;

@@ -140,8 +140,10 @@ fn what_has_no_hu_is_refused_by_name() {
             slice
         }),
         ("color", |slice| slice.number(0x0028_0002, 3)),
-        ("enhanced CT", |slice| slice.text(0x0028_0008, VR::IS, "2")),
-        ("enhanced CT", |slice| slice.text(0x0008_0016, VR::UI, "1.2.840.10008.5.1.4.1.1.2.1")),
+        ("PerFrameFunctionalGroupsSequence", |slice| slice.text(0x0028_0008, VR::IS, "2")),
+        ("PerFrameFunctionalGroupsSequence", |slice| {
+            slice.text(0x0008_0016, VR::UI, "1.2.840.10008.5.1.4.1.1.2.1")
+        }),
         ("BitsAllocated is 32", |slice| slice.number(0x0028_0100, 32)),
         ("BitsStored is 17", |slice| slice.number(0x0028_0101, 17)),
         ("HighBit is 9", |slice| slice.number(0x0028_0102, 9)),
