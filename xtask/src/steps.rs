@@ -110,7 +110,7 @@ fn summary(results: &[(&str, &str, Option<Duration>)], total: Duration) -> Strin
 }
 
 fn format(workspace: &Workspace) -> Result<()> {
-    for manifest in workspace.manifests() {
+    for manifest in workspace.manifests().into_iter().chain([workspace.libfuzzer_manifest()]) {
         execute(workspace.cargo("fmt").arg("--manifest-path").arg(manifest).args(["--all", "--check"]))?;
     }
     Ok(())

@@ -49,7 +49,13 @@ impl Workspace {
         self.root.join("tests/third-party/Cargo.toml")
     }
 
-    /// The manifests of all workspaces of the checkout.
+    /// The manifest of the targets of cargo-fuzz. They have their own workspace, which the tests
+    /// only format, because libFuzzer is C++ and needs a nightly compiler.
+    pub fn libfuzzer_manifest(&self) -> PathBuf {
+        self.root.join("tests/fuzz/libfuzzer/Cargo.toml")
+    }
+
+    /// The manifests of the workspaces of the checkout that the tests build.
     pub fn manifests(&self) -> [PathBuf; 3] {
         [self.root.join("Cargo.toml"), self.xtask_manifest(), self.third_party_manifest()]
     }

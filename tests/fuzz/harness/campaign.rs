@@ -136,22 +136,22 @@ pub fn run_input(target: &Target, input: &[u8]) -> Result<Option<String>> {
 /// The outcome of an input that is valid.
 pub(crate) const ACCEPTED: &str = "accepted";
 
-struct Tried {
+pub(crate) struct Tried {
     /// A short text for what the reader said, or what must not happen.
-    outcome: Result<String, String>,
+    pub(crate) outcome: Result<String, String>,
     time: Duration,
     memory_share: f64,
 }
 
 /// A folder for the file of the input, next to files that a hostile header may name.
-struct Desk {
+pub(crate) struct Desk {
     folder: tempfile::TempDir,
     path: PathBuf,
     watched: Sender<()>,
 }
 
 impl Desk {
-    fn new(target: &Target) -> Result<Self> {
+    pub(crate) fn new(target: &Target) -> Result<Self> {
         let folder = tempfile::Builder::new().prefix("cutis-fuzz-").tempdir()?;
         let inputs = folder.path().join("inputs");
         std::fs::create_dir(&inputs)?;
@@ -165,7 +165,7 @@ impl Desk {
         Ok(Self { folder, path, watched })
     }
 
-    fn try_input(&self, target: &Target, input: &[u8]) -> Result<Tried> {
+    pub(crate) fn try_input(&self, target: &Target, input: &[u8]) -> Result<Tried> {
         // Some file systems write a file that is replaced to the disk at once.
         let _ = std::fs::remove_file(&self.path);
         std::fs::write(&self.path, input).with_context(|| format!("{}", self.folder.path().display()))?;

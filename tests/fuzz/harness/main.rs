@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use cutis_fuzz::{Limits, TARGETS, Target, find, run, run_input};
+use cutis_fuzz::{Limits, TARGETS, Target, find, run, run_input, write_corpus};
 
 const USAGE: &str = "\
 usage: cargo xtask fuzz [OPTIONS]
@@ -13,13 +13,15 @@ usage: cargo xtask fuzz [OPTIONS]
   --seconds N    time for all readers together (20)
   --seed N       seed of the generator (1)
   --target NAME  only this reader; needed for --input
-  --input FILE   tries the bytes of a file once";
+  --input FILE   tries the bytes of a file once
+  --corpus DIR   only writes the valid inputs of every reader, as corpora of cargo-fuzz";
 
 struct Options {
     seconds: u32,
     seed: u64,
     target: Option<&'static Target>,
     input: Option<PathBuf>,
+    corpus: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -34,7 +36,7 @@ fn main() -> ExitCode {
 
 /// The options of the command line. None for help.
 fn options() -> Result<Option<Options>> {
-    let mut options = Options { seconds: 20, seed: 1, target: None, input: None };
+    let mut options = Options { seconds: 20, seed: 1, target: None, input: None, corpus: None };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         if word == "--help" {
@@ -45,6 +47,7 @@ fn options() -> Result<Option<Options>> {
         match word.as_str() {
             "--seconds" => options.seconds = value.parse().context("--seconds")?,
             "--seed" => options.seed = value.parse().context("--seed")?,
+            "--corpus" => options.corpus = Some(value.into()),
             "--input" => options.input = Some(value.into()),
             "--target" => {
                 let names: Vec<&str> = TARGETS.iter().map(|target| target.name).collect();
@@ -61,6 +64,11 @@ fn options() -> Result<Option<Options>> {
 }
 
 fn fuzz(options: &Options) -> Result<ExitCode> {
+    if let Some(folder) = &options.corpus {
+        write_corpus(folder)?;
+        say(&format!("{}: the valid inputs of {} readers", folder.display(), TARGETS.len()));
+        return Ok(ExitCode::SUCCESS);
+    }
     if let (Some(path), Some(target)) = (&options.input, options.target) {
         let input = std::fs::read(path).with_context(|| path.display().to_string())?;
         let fault = run_input(target, &input)?;

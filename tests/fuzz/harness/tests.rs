@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::campaign::ACCEPTED;
-use crate::{Campaign, Limits, TARGETS, Target, find, run, run_input};
+use crate::{Campaign, Limits, TARGETS, Target, find, require_no_fault, run, run_input, write_corpus};
 
 fn campaign(target: &Target, inputs: usize) -> Campaign {
     run(target, &Limits { inputs, time: Duration::from_secs(60), seed: 1 }).unwrap()
@@ -62,6 +62,28 @@ fn long_keys_are_quoted_in_part() {
         let target = find(target).unwrap();
         assert_eq!(run_input(target, text.as_bytes()).unwrap(), None, "{}", target.name);
     }
+}
+
+/// The manifest, the targets and their corpora name every reader, and no other.
+#[test]
+fn every_reader_is_a_target_of_cargo_fuzz() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("libfuzzer");
+    let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+    let corpora = tempfile::tempdir().unwrap();
+    write_corpus(corpora.path()).unwrap();
+    for Target { name, seeds, .. } in TARGETS {
+        assert!(manifest.contains(&format!("path = \"targets/{name}.rs\"")), "{name} is not in the manifest");
+        let text = std::fs::read_to_string(folder.join(format!("targets/{name}.rs"))).unwrap();
+        assert!(text.contains(&format!("require_no_fault(\"{name}\", input)")), "{name}: {text}");
+        assert_eq!(std::fs::read_dir(corpora.path().join(name)).unwrap().count(), seeds().len(), "{name}");
+    }
+    assert_eq!(manifest.matches("[[bin]]").count(), TARGETS.len());
+}
+
+#[test]
+#[should_panic(expected = "there is no reader other")]
+fn a_target_without_a_reader_fails() {
+    require_no_fault("other", b"");
 }
 
 /// A reader for the controls. Its inputs begin with a length.

@@ -1,0 +1,5 @@
+//! The reader `steps` under libFuzzer.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|input: &[u8]| cutis_fuzz::require_no_fault("steps", input));
