@@ -115,6 +115,26 @@ pub enum SkinError {
         /// Places of the first two.
         places: [Place; 2],
     },
+    /// The points of a path are no pairs.
+    #[error(
+        "{path}, {place}: the path has {points} points; a file of pairs needs lines, or a list with an even number of points"
+    )]
+    OddPoints {
+        /// Path of the file.
+        path: PathBuf,
+        /// Place of the path.
+        place: Place,
+        /// Number of points.
+        points: usize,
+    },
+    /// A file of one pair has more.
+    #[error("{path} has {count} pairs of points; a handle needs a file with one, such as a line")]
+    SeveralPairs {
+        /// Path of the file.
+        path: PathBuf,
+        /// Number of pairs.
+        count: usize,
+    },
     /// A stroke has fewer than two points, or all of its points are equal.
     #[error(
         "{path}, {place}: the stroke has {points} points and is {length_mm} mm long; it needs two points that differ"

@@ -23,4 +23,4 @@ pub use error::SkinError;
 pub use field::{CellData, SkinField};
 pub use normals::Normals;
 pub use skin_moves::SkinMoves;
-pub use strokes::{DrawnPath, Place, Polyline, Strokes};
+pub use strokes::{DrawnPairs, DrawnPath, Place, Polyline, Strokes};

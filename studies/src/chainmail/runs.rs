@@ -98,7 +98,7 @@ impl WholeRun {
             .scene
             .handle
             .iter()
-            .map(|handle| handle.move_mm.iter().map(|mm| mm * mm).sum::<f64>().sqrt());
+            .map(|handle| handle.displacement_mm().iter().map(|mm| mm * mm).sum::<f64>().sqrt());
         let target = target.fold(0.0, f64::max);
         let off = (self.report.max_displacement_mm - target).abs();
         let mut add = |what: &str, holds| checks.add(format!("{scene}: {what}"), holds);

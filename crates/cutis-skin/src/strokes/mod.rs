@@ -1,5 +1,6 @@
 //! Strokes: polylines on the skin that show the direction of its tension, and their files.
 
+mod drawn_pairs;
 mod drawn_path;
 mod markups;
 mod text;
@@ -13,6 +14,7 @@ use nalgebra::Point3;
 
 use crate::SkinError;
 
+pub use drawn_pairs::DrawnPairs;
 pub use drawn_path::DrawnPath;
 
 /// Strokes on the skin, from a file or from a program. Positions are RAS+ millimeters.

@@ -16,7 +16,7 @@ pub(super) struct Grasp {
 
 impl Grasp {
     pub(super) fn new(handle: &HandleSection, frame: &Frame) -> Self {
-        let center = frame.to_local(Point3::from(handle.at_mm)).map(f64::from);
+        let center = frame.to_local(Point3::from(handle.center_mm())).map(f64::from);
         Self { center, radius_m: handle.radius_mm / 1000.0 }
     }
 
@@ -42,7 +42,7 @@ pub(super) fn grabbed(
             .filter(|&v| !cut.removed[v as usize] && grasp.holds(mesh.positions[v as usize]))
             .collect();
         if vertices.is_empty() {
-            let (key, value) = (format!("handle[{n}].at_mm"), format!("{:?}", handle.at_mm));
+            let (key, value) = (format!("handle[{n}].at_mm"), format!("{:?}", handle.center_mm()));
             let why = format!("there is no tissue within radius_mm = {} of it", handle.radius_mm);
             return Err(sections.file.bad_key(&key, &value, &why));
         }

@@ -90,7 +90,7 @@ fn fine_zone(sections: &BodySections<'_>, zone: Zone, even: &Grid) -> [[f64; 2];
                     add(point, around + excision.depth_mm);
                 }
             }
-            sections.handles.iter().for_each(|handle| add(handle.at_mm, around + handle.radius_mm));
+            sections.handles.iter().for_each(|handle| add(handle.center_mm(), around + handle.radius_mm));
         }
     }
     hull

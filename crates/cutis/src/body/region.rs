@@ -41,8 +41,9 @@ pub(super) fn mesh(
 /// Whether a place in world mm lies within `around` mm of a handle's sphere, or of the cuts, which
 /// are `from_cuts` mm away.
 pub(super) fn near_action(handles: &[HandleSection], from_cuts: f64, mm: Point3<f64>, around: f64) -> bool {
-    let near =
-        |handle: &HandleSection| distance(&mm, &Point3::from(handle.at_mm)) <= handle.radius_mm + around;
+    let near = |handle: &HandleSection| {
+        distance(&mm, &Point3::from(handle.center_mm())) <= handle.radius_mm + around
+    };
     from_cuts <= around || handles.iter().any(near)
 }
 

@@ -104,7 +104,7 @@ fn sutures<'a>(scene: &'a Scene, body: &'a Body) -> impl Iterator<Item = StepRep
 
 fn handles<'a>(scene: &'a Scene, body: &'a Body) -> impl Iterator<Item = StepReport> + 'a {
     scene.handle.iter().zip(&body.grabbed).enumerate().map(|(n, (section, grabbed))| {
-        let distance = section.move_mm.iter().map(|mm| mm * mm).sum::<f64>().sqrt();
+        let distance = section.displacement_mm().iter().map(|mm| mm * mm).sum::<f64>().sqrt();
         let what = format!("move {} vertices by {distance:.1} mm", grabbed.len());
         step(format!("handle[{n}]"), [section.at_s, section.at_s + section.over_s], what)
     })

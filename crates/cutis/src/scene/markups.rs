@@ -1,21 +1,23 @@
-//! Paths of cuts that were drawn in another program, such as markups of 3D Slicer.
+//! Paths of cuts, pairs of stitches and ways of handles that were drawn in another program, such as
+//! markups of 3D Slicer.
 //!
 //! Reading a scene puts the points of the file in place of its name, so that no other code knows of
 //! such files, and a report holds the points that were cut.
 
 use std::path::{Path, PathBuf};
 
-use cutis_skin::DrawnPath;
+use cutis_skin::{DrawnPairs, DrawnPath};
 
 use super::{Override, Scene, SceneFile};
 use crate::Error;
 
-/// Reads the files that the cuts of a scene name. Relative names start from `directory`, and those
-/// of overrides from the present folder. Returns what was skipped in the files.
+/// Reads the files that cuts, sutures and handles of a scene name. Relative names start from
+/// `directory`, and those of overrides from the present folder. Returns what was skipped in the
+/// files.
 ///
 /// # Errors
 /// [`Error::SceneKey`] for a file next to points, [`Error::SceneSection`] for a file that is not
-/// one path.
+/// one path, or not pairs of points.
 pub(super) fn fill(
     scene: &mut Scene,
     file: SceneFile<'_>,
@@ -39,6 +41,23 @@ pub(super) fn fill(
         let has_points = !excision.path_mm.is_empty();
         excision.path_mm = reader.points(&key, name, has_points.then_some(why), &mut notes)?;
     }
+    for (n, suture) in scene.suture.iter_mut().enumerate() {
+        let Some(name) = suture.markups.take() else { continue };
+        let key = format!("suture[{n}].markups");
+        let why = "must be left out next to every_mm and pairs_mm: give one of the three";
+        let has_points = suture.every_mm.is_some() || !suture.pairs_mm.is_empty();
+        let drawn = reader.pairs(&key, name, has_points.then_some(why), &mut notes)?;
+        suture.pairs_mm = drawn.pairs_mm().iter().map(|pair| pair.map(Into::into)).collect();
+    }
+    for (n, handle) in scene.handle.iter_mut().enumerate() {
+        let Some(name) = handle.markups.take() else { continue };
+        let key = format!("handle[{n}].markups");
+        let why = "must be left out next to at_mm and move_mm: give the points or the file";
+        let has_points = handle.at_mm.is_some() || handle.move_mm.is_some();
+        let drawn = reader.pairs(&key, name, has_points.then_some(why), &mut notes)?;
+        let [from, to] = drawn.one().map_err(file.blame(&key))?;
+        (handle.at_mm, handle.move_mm) = (Some(from.into()), Some((to - from).into()));
+    }
     Ok(notes)
 }
 
@@ -57,6 +76,28 @@ impl Reader<'_> {
         wrong: Option<&str>,
         notes: &mut Vec<String>,
     ) -> Result<Vec<[f64; 3]>, Error> {
+        let path = self.path(key, name, wrong)?;
+        let drawn = DrawnPath::read(&path).map_err(self.file.blame(key))?;
+        notes.extend(drawn.warnings().iter().map(|line| format!("{}: {line}", path.display())));
+        Ok(drawn.points_mm().iter().map(|&point| point.into()).collect())
+    }
+
+    /// The pairs of points in a file. `wrong` says why there must be no file.
+    fn pairs(
+        &self,
+        key: &str,
+        name: PathBuf,
+        wrong: Option<&str>,
+        notes: &mut Vec<String>,
+    ) -> Result<DrawnPairs, Error> {
+        let path = self.path(key, name, wrong)?;
+        let drawn = DrawnPairs::read(&path).map_err(self.file.blame(key))?;
+        notes.extend(drawn.warnings().iter().map(|line| format!("{}: {line}", path.display())));
+        Ok(drawn)
+    }
+
+    /// The path of a file.
+    fn path(&self, key: &str, name: PathBuf, wrong: Option<&str>) -> Result<PathBuf, Error> {
         if let Some(why) = wrong {
             return Err(self.file.bad_key(key, &format!("{name:?}"), why));
         }
@@ -66,10 +107,7 @@ impl Reader<'_> {
             let given = plain(&given.key);
             named == given || named.starts_with(&format!("{given}."))
         });
-        let path = if name.is_relative() && !overridden { self.directory.join(name) } else { name };
-        let drawn = DrawnPath::read(&path).map_err(self.file.blame(key))?;
-        notes.extend(drawn.warnings().iter().map(|line| format!("{}: {line}", path.display())));
-        Ok(drawn.points_mm().iter().map(|&point| point.into()).collect())
+        Ok(if name.is_relative() && !overridden { self.directory.join(name) } else { name })
     }
 }
 
@@ -141,6 +179,63 @@ mod tests {
             message.contains("elsewhere/cut.mrk.json") && message.contains("incision[0].markups"),
             "{message}"
         );
+    }
+
+    /// Two points, in LPS, as a line of 3D Slicer.
+    const LINE: &str = r#"{"markups": [{"type": "Line", "coordinateSystem": "LPS", "controlPoints": [
+        {"position": [-30, -110, -5]}, {"position": [-25, -112, 5]}]}]}"#;
+    const CUT: &str = "[[incision]]\npath_mm = [[0, 9, 0], [9, 9, 0]]\ndepth_mm = 5\n";
+
+    #[test]
+    fn a_line_is_the_way_of_a_handle() {
+        let here = folder(LINE);
+        for scene in ["[[handle]]", "[[step]]\nkind = \"hook\""] {
+            let scene = format!("{scene}\nmarkups = \"cut.mrk.json\"\nradius_mm = 9");
+            let handle = load(here.path(), &scene, &[]).unwrap().scene.handle[0].clone();
+            assert_eq!(
+                (handle.center_mm(), handle.displacement_mm()),
+                ([30.0, 110.0, -5.0], [-5.0, 2.0, 10.0])
+            );
+            assert_eq!(handle.markups, None);
+        }
+    }
+
+    #[test]
+    fn lines_and_lists_of_points_are_stitches() {
+        let list = LINE
+            .replace("Line", "Fiducial")
+            .replace("5]}]}", "5]}, {\"position\": [1, 2, 3]}, {\"position\": [4, 5, 6]}]}");
+        for (file, count) in [(LINE.to_owned(), 1), (list, 2)] {
+            let here = folder(&file);
+            let scene = format!("{CUT}[[suture]]\nwound = 0\nmarkups = \"cut.mrk.json\"");
+            let suture = load(here.path(), &scene, &[]).unwrap().scene.suture[0].clone();
+            assert_eq!((suture.pairs_mm.len(), suture.markups), (count, None));
+            assert_eq!(suture.pairs_mm[0], [[30.0, 110.0, -5.0], [25.0, 112.0, 5.0]]);
+        }
+    }
+
+    #[test]
+    fn files_without_pairs_are_refused_with_their_key() {
+        let handle = "[[handle]]\nradius_mm = 9\n";
+        let three = LINE.replace("5]}]}", "5]}, {\"position\": [1, 2, 3]}]}");
+        let two = LINE
+            .replace("Line", "Fiducial")
+            .replace("5]}]}", "5]}, {\"position\": [1, 2, 3]}, {\"position\": [4, 5, 6]}]}");
+        let markups = "markups = \"cut.mrk.json\"\n";
+        let suture = format!("{CUT}[[suture]]\nwound = 0\n");
+        for (file, scene, words) in [
+            (LINE, format!("{handle}{markups}at_mm = [0, 0, 0]"), ["handle[0].markups", "at_mm"]),
+            (LINE, format!("{suture}{markups}every_mm = 9"), ["suture[0].markups", "every_mm"]),
+            (LINE, format!("{handle}at_mm = [0, 0, 0]"), ["handle[0].move_mm", "or markups"]),
+            (&three, format!("{handle}{markups}"), ["handle[0].markups", "3 points"]),
+            (&two, format!("{handle}{markups}"), ["handle[0].markups", "2 pairs"]),
+            (&three, format!("{suture}{markups}"), ["suture[0].markups", "even number"]),
+            (LINE, suture.clone(), ["suture[0].every_mm", "must be given"]),
+        ] {
+            let here = folder(file);
+            let message = load(here.path(), &scene, &[]).unwrap_err().to_string();
+            assert!(words.iter().all(|word| message.contains(word)), "{words:?}: {message}");
+        }
     }
 
     #[test]

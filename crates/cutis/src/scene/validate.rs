@@ -179,8 +179,12 @@ impl Scene {
 
     fn validate_handles(&self, check: &Check<'_>) -> Result<(), Error> {
         for (n, handle) in self.handle.iter().enumerate() {
-            check.point(&format!("handle[{n}].at_mm"), handle.at_mm)?;
-            check.point(&format!("handle[{n}].move_mm"), handle.move_mm)?;
+            for (name, point) in [("at_mm", handle.at_mm), ("move_mm", handle.move_mm)] {
+                let key = format!("handle[{n}].{name}");
+                let why = "is missing: give at_mm and move_mm, or markups";
+                check.require(point.is_some(), &key, "", why)?;
+                check.point(&key, point.unwrap_or_default())?;
+            }
             check.positive(&format!("handle[{n}].radius_mm"), handle.radius_mm)?;
             check.not_negative(&format!("handle[{n}].at_s"), handle.at_s)?;
             check.positive(&format!("handle[{n}].over_s"), handle.over_s)?;

@@ -88,7 +88,7 @@ fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<Stri
 
 /// Makes the names of files with the paths of cuts absolute. `home` is the folder of the scene.
 fn make_markups_absolute(document: &mut DocumentMut, home: &Path) -> Result<(), String> {
-    for list in ["incision", "excision", "step"] {
+    for list in ["incision", "excision", "suture", "handle", "step"] {
         let Some(entries) = document.get_mut(list) else { continue };
         let tables: Vec<&mut dyn TableLike> = match entries {
             Item::ArrayOfTables(list) => list.iter_mut().map(|table| table as &mut dyn TableLike).collect(),

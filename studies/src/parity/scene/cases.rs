@@ -114,7 +114,14 @@ fn abdomen(quick: bool, frames: u32) -> Result<SceneCase, Failure> {
 fn handle(frames: u32) -> Result<SceneCase, Failure> {
     let mut loaded = fixture("phantom-small", SMALL)?;
     let (at_mm, move_mm) = ([-30.0, 105.0, 0.0], [0.0, 15.0, 5.0]);
-    loaded.scene.handle.push(HandleSection { at_mm, radius_mm: 30.0, move_mm, at_s: 0.0, over_s: 0.05 });
+    loaded.scene.handle.push(HandleSection {
+        at_mm: Some(at_mm),
+        radius_mm: 30.0,
+        move_mm: Some(move_mm),
+        markups: None,
+        at_s: 0.0,
+        over_s: 0.05,
+    });
     Ok(SceneCase::new("dragged handle", loaded, frames, false))
 }
 

@@ -96,10 +96,14 @@ fn handles(input: &ModelInput<'_>) -> Result<Vec<ChainHandle>, Error> {
         let elements: Vec<u32> = real.map(|&v| body.mesh.lattice_index[v as usize]).collect();
         if let Some(other) = elements.iter().find_map(|&element| grabbed_by.insert(element, n)) {
             let why = format!("it grabs vertices that handle[{other}] grabs already");
-            return Err(file.bad_key(&format!("handle[{n}].at_mm"), &format!("{:?}", handle.at_mm), &why));
+            return Err(file.bad_key(
+                &format!("handle[{n}].at_mm"),
+                &format!("{:?}", handle.center_mm()),
+                &why,
+            ));
         }
         let origin = grid.affine.to_index(Point3::origin());
-        let steps = grid.affine.to_index(Vector3::from(handle.move_mm).into()) - origin;
+        let steps = grid.affine.to_index(Vector3::from(handle.displacement_mm()).into()) - origin;
         let reaches = |&element: &u32| {
             let rest = grid.point(element as usize);
             (0..3).all(|axis| (rest[axis] as f64 + steps[axis]).abs() <= FARTHEST_STEPS)
@@ -108,7 +112,7 @@ fn handles(input: &ModelInput<'_>) -> Result<Vec<ChainHandle>, Error> {
             let why = format!("must end within {FARTHEST_STEPS} steps of the first lattice point");
             return Err(file.bad_key(
                 &format!("handle[{n}].move_mm"),
-                &format!("{:?}", handle.move_mm),
+                &format!("{:?}", handle.displacement_mm()),
                 &why,
             ));
         }

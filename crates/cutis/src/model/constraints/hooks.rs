@@ -8,7 +8,7 @@ use crate::scene::HandleSection;
 
 /// The handle of a section, which begins to move at `at_s`.
 pub(super) fn handle(section: &HandleSection, grabbed: &[u32], at_s: f64) -> Handle {
-    let move_m = (Vector3::from(section.move_mm) / 1000.0).into();
+    let move_m = (Vector3::from(section.displacement_mm()) / 1000.0).into();
     Handle { vertices: grabbed.to_vec(), move_m, at_s, over_s: section.over_s }
 }
 

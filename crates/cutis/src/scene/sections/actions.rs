@@ -1,5 +1,7 @@
 //! The sections that hold and drag the body: fixed vertices and handles.
 
+use std::path::PathBuf;
+
 use cutis_mesh::HalfSpace;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -56,12 +58,18 @@ pub struct BoxSection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HandleSection {
-    /// Center of the sphere that is grabbed, mm.
-    pub at_mm: [f64; 3],
+    /// Center of the sphere that is grabbed, mm. Left out with `markups`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_mm: Option<[f64; 3]>,
     /// Radius of the sphere, mm.
     pub radius_mm: f64,
-    /// Displacement at the end of the movement, mm.
-    pub move_mm: [f64; 3],
+    /// Displacement at the end of the movement, mm. Left out with `markups`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub move_mm: Option<[f64; 3]>,
+    /// A file with two points in place of `at_mm` and `move_mm`: where the handle grabs and where
+    /// it moves to, as a line of 3D Slicer (`.mrk.json`). Relative to the scene file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub markups: Option<PathBuf>,
     /// Time in s at which the handle grabs the tissue, where it is then, and begins to move it. It
     /// does so when a frame begins at that time or later.
     #[serde(default)]
@@ -72,6 +80,16 @@ pub struct HandleSection {
 }
 
 impl HandleSection {
+    /// Center of the sphere, mm. A checked scene has one.
+    pub fn center_mm(&self) -> [f64; 3] {
+        self.at_mm.unwrap_or_default()
+    }
+
+    /// Displacement at the end of the movement, mm. A checked scene has one.
+    pub fn displacement_mm(&self) -> [f64; 3] {
+        self.move_mm.unwrap_or_default()
+    }
+
     fn default_over_s() -> f64 {
         1.0
     }

@@ -1,5 +1,7 @@
 //! The section that closes wounds.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,12 +17,16 @@ pub struct SutureSection {
     /// or a name.
     pub wound: WoundRef,
     /// Distance from stitch to stitch along the incision, or along the long axis of an excision,
-    /// mm. Left out with `pairs_mm`.
+    /// mm. Left out with `pairs_mm` and `markups`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every_mm: Option<f64>,
     /// Pairs of points on or near the skin that stitches join, mm, in place of `every_mm`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pairs_mm: Vec<[[f64; 3]; 2]>,
+    /// A file with the points of `pairs_mm`: lines, or a list of points of which each two are a
+    /// pair, as markups of 3D Slicer (`.mrk.json`). Relative to the scene file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub markups: Option<PathBuf>,
     /// Distance of the ends of a stitch from the edge of the wound, mm.
     #[serde(default = "SutureSection::default_bite_mm")]
     pub bite_mm: f64,
