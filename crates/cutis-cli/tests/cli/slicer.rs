@@ -80,6 +80,25 @@ fn a_series_goes_on_with_a_resumed_run_and_goes_with_another_run() {
     desk.cutis(&none).expect_error(2, &["output.series_every", "run.frames"]);
 }
 
+/// Settling computes no frames. Its series once was refused.
+#[test]
+fn a_series_has_the_states_of_rest() {
+    let desk = Desk::new();
+    let settle = ["settle", "scene.toml", "--out", "run", "--set", "output={ series_every = 2 }"];
+    desk.cutis(&settle).expect_success();
+    assert_eq!(desk.names("run/skin-series"), ["skin-000000.vtp", "skin-rest-000001.vtp"]);
+    let list = std::fs::read_to_string(desk.path("run/skin.pvd")).unwrap();
+    let [start, rest] = ["skin-000000.vtp", "skin-rest-000001.vtp"].map(|name| list.find(name).unwrap());
+    assert!(start < rest && list.matches("timestep=\"0\"").count() == 1, "{list}");
+    let skin = |name: &str| std::fs::read(desk.path(&format!("run/skin-series/{name}"))).unwrap();
+    assert_ne!(skin("skin-000000.vtp"), skin("skin-rest-000001.vtp"));
+    // Frames alone leave no state of rest behind.
+    let frames =
+        ["run", "scene.toml", "--out", "run", "--frames", "2", "--set", "output={ series_every = 2 }"];
+    desk.cutis(&frames).expect_success();
+    assert_eq!(desk.names("run/skin-series"), ["skin-000000.vtp", "skin-000002.vtp"]);
+}
+
 #[test]
 fn a_scene_names_a_path_from_its_folder() {
     let desk = Desk::new();

@@ -127,7 +127,8 @@ impl RunLoop<'_> {
             (Some(settled), ended)
         };
         if let Some(series) = &self.series {
-            series.finish(self.run.frames, self.dt_s)?;
+            let rests = settled.as_ref().map_or(0, |settled| settled.stops.len());
+            series.finish(self.run.frames, rests, self.dt_s)?;
         }
         if self.count() > 0 {
             self.time_extra_frame(simulation, &mut times);
@@ -166,6 +167,9 @@ impl RunLoop<'_> {
                 let done = n.checked_sub(1).map(|n| stops[n].done.clone()).unwrap_or_default();
                 if let Some(recorder) = &mut recorder {
                     recorder.rest([n + 1, times_s.len()], &done, simulation, &row)?;
+                }
+                if let Some(series) = &self.series {
+                    series.rest(simulation, n + 1)?;
                 }
                 settled.add(RestReport::of(&rest, ms), row, done);
                 progress.advance(before + SEARCH);

@@ -1,4 +1,4 @@
-//! The skin after some of the frames, as a time series for ParaView.
+//! The skin after some of the frames, and at rest, as a time series for ParaView.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::Error;
 use crate::body::Body;
 use crate::model::Simulation;
 
-/// Writes the skin before the first frame and after every so many frames.
+/// Writes the skin before the first frame, after every so many frames, and in each state of rest.
 pub(super) struct Series<'a> {
     folder: &'a RunFolder,
     body: &'a Body,
@@ -38,6 +38,10 @@ impl<'a> Series<'a> {
             remove_file(&self.folder.checkpoint())?;
             remove(self.folder)?;
         }
+        // A run that goes on searches the states of rest again, and may find fewer.
+        for path in paths(&self.folder.series_folder()).iter().filter(|path| is_of_series(path, REST)) {
+            remove_file(path)?;
+        }
         files::create_folder(&self.folder.series_folder())
     }
 
@@ -46,6 +50,15 @@ impl<'a> Series<'a> {
         if !self.is_due(frame, last) {
             return Ok(());
         }
+        self.write(simulation, &name(FRAME, frame))
+    }
+
+    /// Writes the skin in a state of rest. The first one has the number 1.
+    pub(super) fn rest(&self, simulation: &mut dyn Simulation, number: usize) -> Result<(), Error> {
+        self.write(simulation, &name(REST, number as u32))
+    }
+
+    fn write(&self, simulation: &mut dyn Simulation, name: &str) -> Result<(), Error> {
         let vertices: Vec<u32> = (0..self.body.mesh.positions.len() as u32).collect();
         let (now, _) = self.body.whole_skin(&simulation.positions_of(&vertices)?);
         let moved = |(rest, now): (&Point3<f32>, &Point3<f32>)| ((now - rest) * 1000.0).into();
@@ -54,18 +67,22 @@ impl<'a> Series<'a> {
         let cells = Cells::Triangles(&self.triangles);
         let frame_of = &self.body.mesh.frame;
         let piece = Piece { frame: frame_of, positions: &now, cells, data: &data, cell_data: &[] };
-        let path = self.folder.series_folder().join(name(frame));
+        let path = self.folder.series_folder().join(name);
         Ok(vtk::write_vtp(&path, Space::default(), &piece)?)
     }
 
-    /// Writes the list of the files. `dt_s` is the duration of a frame.
-    pub(super) fn finish(&self, last: u32, dt_s: f64) -> Result<(), Error> {
+    /// Writes the list of the files. `dt_s` is the duration of a frame. States of rest have no
+    /// time: each one is listed a frame after the state before it.
+    pub(super) fn finish(&self, last: u32, rests: usize, dt_s: f64) -> Result<(), Error> {
         let folder = self.folder.series_folder();
-        let relative = |frame: u32| format!("{FOLDER}/{}", name(frame));
-        let written =
-            (0..=last).filter(|&frame| self.is_due(frame, last) && folder.join(name(frame)).exists());
-        let list: Vec<(f64, String)> =
-            written.map(|frame| (f64::from(frame) * dt_s, relative(frame))).collect();
+        let frames = (0..=last).filter(|&frame| self.is_due(frame, last)).map(|frame| (frame, FRAME, frame));
+        let rests = (1..=rests as u32).map(|number| (last + number, REST, number));
+        let list: Vec<(f64, String)> = frames
+            .chain(rests)
+            .map(|(at, kind, number)| (f64::from(at) * dt_s, name(kind, number)))
+            .filter(|(_, name)| folder.join(name).exists())
+            .map(|(time_s, name)| (time_s, format!("{FOLDER}/{name}")))
+            .collect();
         Ok(write_pvd(&self.folder.series(), &list)?)
     }
 
@@ -77,29 +94,37 @@ impl<'a> Series<'a> {
 /// The folder with the files of a series.
 const FOLDER: &str = "skin-series";
 
-fn name(frame: u32) -> String {
-    format!("skin-{frame:06}.vtp")
+/// Beginnings of the names of frames and of states of rest.
+const FRAME: &str = "skin-";
+const REST: &str = "skin-rest-";
+
+fn name(kind: &str, number: u32) -> String {
+    format!("{kind}{number:06}.vtp")
 }
 
 /// Whether a file of the folder is one of a series.
-fn is_of_series(path: &Path) -> bool {
+fn is_of_series(path: &Path, kind: &str) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let number = name.strip_prefix("skin-").and_then(|rest| rest.strip_suffix(".vtp"));
+    let number = name.strip_prefix(kind).and_then(|rest| rest.strip_suffix(".vtp"));
     number.is_some_and(|number| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 /// Removes the files of a series, and their folder if nothing else is in it.
 pub(super) fn remove(folder: &RunFolder) -> Result<(), Error> {
     let inside = folder.series_folder();
-    let paths: Vec<PathBuf> = fs::read_dir(&inside)
-        .map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())).collect())
-        .unwrap_or_default();
-    for path in paths.into_iter().filter(|path| is_of_series(path)).chain([folder.series()]) {
+    let of_series = |path: &PathBuf| [FRAME, REST].iter().any(|kind| is_of_series(path, kind));
+    for path in paths(&inside).into_iter().filter(of_series).chain([folder.series()]) {
         remove_file(&path)?;
     }
     // A folder with files of the user stays.
     let _ = fs::remove_dir(inside);
     Ok(())
+}
+
+/// The files of a folder. None if it does not exist.
+fn paths(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder);
+    entries.map(|entries| entries.filter_map(|entry| Some(entry.ok()?.path())).collect()).unwrap_or_default()
 }
 
 /// Removes a file if it exists.
@@ -123,7 +148,7 @@ mod tests {
         remove(&folder).unwrap();
         let inside = folder.series_folder();
         fs::create_dir(&inside).unwrap();
-        for file in ["skin-000010.vtp", "skin-mine.vtp", "notes.txt"] {
+        for file in ["skin-000010.vtp", "skin-rest-000001.vtp", "skin-rest-mine.vtp", "notes.txt"] {
             fs::write(inside.join(file), "").unwrap();
         }
         fs::write(folder.series(), "").unwrap();
@@ -131,7 +156,7 @@ mod tests {
         let mut left: Vec<_> =
             fs::read_dir(&inside).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         left.sort();
-        assert_eq!(left, ["notes.txt", "skin-mine.vtp"]);
+        assert_eq!(left, ["notes.txt", "skin-rest-mine.vtp"]);
         assert!(!folder.series().exists());
     }
 }

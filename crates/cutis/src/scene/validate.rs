@@ -217,7 +217,8 @@ impl Scene {
         let error = self.run.error;
         check.require(error > 0.0 && error <= 1.0, "run.error", error, "must be above 0 and at most 1")?;
         let every = self.output.series_every;
-        let why = "needs frames: run.frames is 0, and a state of rest has no time";
-        check.require(every == 0 || self.run.frames > 0, "output.series_every", every, why)
+        let why = "needs frames, or a state of rest: run.frames is 0, and run.until is not \"rest\"";
+        let moves = self.run.frames > 0 || self.run.until == RunEnd::Rest;
+        check.require(every == 0 || moves, "output.series_every", every, why)
     }
 }

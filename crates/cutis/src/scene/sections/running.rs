@@ -115,8 +115,8 @@ pub struct OutputSection {
     #[serde(default)]
     pub surface: bool,
     /// `skin.pvd` and the folder `skin-series`: the skin before the first frame, after every so
-    /// many frames and after the last one, as a time series for ParaView; 0 writes none. A state of
-    /// rest has no time and is not part of it.
+    /// many frames, after the last one and in each state of rest, as a time series for ParaView; 0
+    /// writes none. A state of rest has no time: the list gives it that of a frame more.
     #[serde(default)]
     pub series_every: u32,
     /// `skin.ply`: the deformed skin without data, LPS, mm.
