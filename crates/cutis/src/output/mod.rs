@@ -10,6 +10,7 @@ pub mod rest_report;
 mod shown;
 mod skin_lines;
 mod slices;
+mod small_picture;
 pub mod step_report;
 pub(crate) mod surface;
 pub mod suture_report;

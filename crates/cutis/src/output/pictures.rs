@@ -1,6 +1,8 @@
 //! The pictures of a run: the skin before and after, a slice across the wound, and the lines of
 //! tension on the skin.
 
+use std::path::PathBuf;
+
 use cutis_render::{
     Contour, Image, LineField, Plane, Rgb, Side, SliceView, View, bare_sides, draw_annotations, draw_lines,
     side_by_side, skin_depth, slice,
@@ -12,6 +14,7 @@ use super::DeformedBody;
 use super::html::Figure;
 use super::skin_lines::SkinLines;
 use super::slices::{self, SlicePair};
+use super::small_picture::smaller;
 use super::warp::BodyWarp;
 use super::wound_place::{WoundPlace, position};
 use crate::backend::Stages;
@@ -110,32 +113,34 @@ pub(super) fn draw(
     let depth_after = depth.as_ref().map(|(_, deformed)| deformed);
     let skin_after = stages.raymarch(after, &View { depth: depth_after, ..view })?;
     let mut figures = vec![
-        Figure {
-            path: RunFolder::before,
-            caption: "Before the first frame",
-            wide: false,
-            png: skin_before.to_png()?,
-        },
-        Figure { path: RunFolder::after, caption: "After", wide: false, png: skin_after.to_png()? },
-        Figure {
-            path: RunFolder::slice,
-            caption: "Slice across the middle, with the skin of the model at rest (blue) and deformed (orange)",
-            wide: true,
-            png: slices.to_png()?,
-        },
+        figure(RunFolder::before, "Before the first frame", false, &skin_before)?,
+        figure(RunFolder::after, "After", false, &skin_after)?,
+        figure(
+            RunFolder::slice,
+            "Slice across the middle, with the skin of the model at rest (blue) and deformed (orange)",
+            true,
+            &slices,
+        )?,
     ];
     if body.membrane.as_ref().is_some_and(Membrane::has_lines) {
         let mut picture = skin;
         add_lines(&mut picture, body, scene, &before, &view)?;
-        figures.push(Figure {
-            path: RunFolder::tension,
-            caption: "Lines of tension in the scan: the skin is tightest along them. They are faint where the \
-                      direction counts little",
-            wide: false,
-            png: picture.to_png()?,
-        });
+        let caption = "Lines of tension in the scan: the skin is tightest along them. They are faint where the \
+                       direction counts little";
+        figures.push(figure(RunFolder::tension, caption, false, &picture)?);
     }
     Ok(Pictures { figures, slices: slices_of_planes })
+}
+
+/// A picture of the run folder and of the report.
+fn figure(
+    path: fn(&RunFolder) -> PathBuf,
+    caption: &'static str,
+    wide: bool,
+    image: &Image,
+) -> Result<Figure, Error> {
+    let png = image.to_png()?;
+    Ok(Figure { path, caption, wide, small: smaller(image, &png)?, png })
 }
 
 /// Draws the lines of tension of a membrane on a picture of the body at rest.

@@ -34,6 +34,8 @@ pub(crate) struct Figure {
     pub(crate) wide: bool,
     /// The picture as a PNG file.
     pub(crate) png: Vec<u8>,
+    /// A smaller one for the page, if the picture is large.
+    pub(crate) small: Option<Vec<u8>>,
 }
 
 /// What the page shows in addition to the report.

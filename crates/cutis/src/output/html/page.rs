@@ -154,9 +154,9 @@ fn pictures(figures: &[Figure]) -> String {
         return String::new();
     }
     let mut out = String::from("<h2>Pictures</h2><div class=\"pair\">");
-    for Figure { caption, wide, png, .. } in figures {
+    for Figure { caption, wide, png, small, .. } in figures {
         let class = if *wide { "wide" } else { "half" };
-        let (image, caption) = (image(png, caption), escape(caption));
+        let (image, caption) = (image(small.as_ref().unwrap_or(png), caption), escape(caption));
         let _ = write!(out, "<figure class=\"{class}\">{image}<figcaption>{caption}</figcaption></figure>");
     }
     out + "</div>"
