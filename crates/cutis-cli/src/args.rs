@@ -239,7 +239,19 @@ pub(crate) enum Command {
 #[derive(Debug, Subcommand)]
 pub(crate) enum SceneCommand {
     /// A commented scene
-    New,
+    ///
+    /// With a volume the scene names it, cuts the skin in the middle of its front, and fixes what
+    /// lies behind. Change the cut to your own.
+    New {
+        /// Volume file, or a folder with a DICOM series
+        volume: Option<PathBuf>,
+        /// Number of the DICOM series, if the folder has several
+        #[arg(long, value_name = "NUMBER", requires = "volume")]
+        series: Option<u32>,
+        /// Resample tilted or unevenly spaced slices to a regular grid with perpendicular axes
+        #[arg(long, requires = "volume")]
+        resample: bool,
+    },
     /// JSON schema of a scene
     Schema,
     /// Every key, its values and defaults, as Markdown

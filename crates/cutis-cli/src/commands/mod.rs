@@ -7,6 +7,7 @@ mod simulate;
 mod sweep;
 mod tune;
 
+use cutis::volume::ReadOptions;
 use cutis::{Error, report::Report, scene};
 
 use crate::args::{Command, SceneCommand};
@@ -51,7 +52,11 @@ pub(crate) fn run(command: Command) -> Result<u8, Error> {
         }
         Command::Scene { what } => {
             match what {
-                SceneCommand::New => print(scene::template().trim_end()),
+                SceneCommand::New { volume: None, .. } => print(scene::template().trim_end()),
+                SceneCommand::New { volume: Some(path), series, resample } => {
+                    let options = ReadOptions { series, resample };
+                    print(scene::template_for(&path, &options)?.trim_end());
+                }
                 SceneCommand::Schema => print(&pretty(&scene::schema())),
                 SceneCommand::Reference => print(scene::reference().trim_end()),
                 SceneCommand::StudySchema => print(&pretty(&cutis::sweep::Study::json_schema())),

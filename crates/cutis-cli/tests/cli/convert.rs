@@ -26,6 +26,23 @@ fn every_format_holds_the_same_volume() {
     assert!(!desk.path("a.png").exists() && !desk.path("b.nrrd").exists());
 }
 
+/// From a volume to a wound without a number from the user.
+#[test]
+fn a_new_scene_of_a_volume_has_a_cut_that_opens() {
+    let desk = Desk::new();
+    desk.cutis(&["phantom", "--size", "64,64,48", "--out", "small.nii.gz"]).expect_success();
+    let scene = desk.cutis(&["scene", "new", "small.nii.gz"]).expect_success().stdout;
+    desk.put("first.toml", scene);
+    let report = call(
+        &desk,
+        &["settle", "first.toml", "--set", "lattice.spacing_mm=8", "--set", "output={}", "--json"],
+    );
+    assert!(report["wound"]["mid_mm"].as_f64().unwrap() > 1.0, "{}", report["wound"]);
+    desk.cutis(&["scene", "new", "missing.nii"]).expect_error(2, &["missing.nii"]);
+    let plain = desk.cutis(&["scene", "new"]).expect_success().stdout;
+    assert!(plain.contains("path = \"ct.nii.gz\""), "{plain}");
+}
+
 #[cfg(feature = "dicom")]
 #[test]
 fn a_folder_lists_its_series() {

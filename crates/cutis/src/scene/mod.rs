@@ -9,6 +9,7 @@
 
 mod choice;
 mod demo;
+mod first_scene;
 mod load;
 mod markups;
 pub(crate) mod nearest;
@@ -21,6 +22,7 @@ mod validate_cuts;
 
 pub(crate) use choice::OneOr;
 pub use demo::demo;
+pub use first_scene::template_for;
 pub(crate) use load::SceneFile;
 pub use load::{LoadedScene, Override, schema, template};
 pub use reference::reference;

@@ -1,0 +1,188 @@
+//! A scene to start from, for a volume: with a first cut at the front of the body.
+
+use std::path::Path;
+
+use cutis_volume::{ReadOptions, Volume};
+use nalgebra::Point3;
+
+use super::template;
+use crate::Error;
+
+/// Values below are air, as in the template.
+const AIR_HU: f32 = -449.0;
+/// Distance of the samples that look for tissue, mm.
+const STEP_MM: f64 = 1.0;
+/// Thickness of tissue that is not a sheet or a tube in front of the body, mm.
+const THICK_MM: f64 = 8.0;
+/// Half of the length of the cut, mm, and its largest share of the width of the body.
+const HALF_MM: (f64, f64) = (30.0, 0.15);
+/// Share of the depth of the body, from the front, behind which everything is fixed.
+const FREE_SHARE: f64 = 0.6;
+
+/// The commented scene of [`template`] for a volume. Its cut crosses the middle of the front of the
+/// body, and what lies behind is fixed, as on a table. Both are a beginning, to be changed.
+///
+/// # Errors
+/// [`Error::Volume`] if the volume cannot be read, and [`Error::Request`] if there is no tissue in
+/// its middle.
+pub fn template_for(path: &Path, options: &ReadOptions) -> Result<String, Error> {
+    let loaded = cutis_volume::read(path, options)?;
+    let site = Site::find(&loaded.volume).ok_or_else(|| Error::Request {
+        what: "VOLUME".into(),
+        why: format!(
+            "{} has no tissue at the front of its middle slice, above {AIR_HU} HU and {THICK_MM} mm thick: \
+             `cutis inspect` shows its HU; without VOLUME the command prints a scene to fill in",
+            path.display()
+        ),
+    })?;
+    let mut volume = format!("path = {}", toml::Value::String(path.to_string_lossy().into_owned()));
+    if let Some(number) = options.series {
+        volume += &format!("\nseries = {number}");
+    }
+    if options.resample {
+        volume += "\nresample = true";
+    }
+    // Adding zero removes the sign of a rounded -0.
+    let point = |mm: [f64; 3]| format!("{:?}", mm.map(|mm| (mm * 10.0).round() / 10.0 + 0.0));
+    let lines = [
+        ("path = ", volume),
+        ("from_mm = ", format!("from_mm = {}", point(site.from_mm))),
+        ("to_mm = ", format!("to_mm = {}", point(site.to_mm))),
+        (
+            "# planes = ",
+            format!("planes = [{{ point_mm = {}, normal = [0.0, -1.0, 0.0] }}]", point(site.behind_mm)),
+        ),
+    ];
+    let changed = |line: &str| match lines.iter().find(|(start, _)| line.starts_with(start)) {
+        Some((_, new)) => format!("{new}\n"),
+        None => format!("{line}\n"),
+    };
+    Ok(template().lines().map(changed).collect())
+}
+
+/// Where a first cut is possible, world mm.
+#[derive(Debug, PartialEq)]
+struct Site {
+    from_mm: [f64; 3],
+    to_mm: [f64; 3],
+    behind_mm: [f64; 3],
+}
+
+impl Site {
+    /// Looks at the slice in the middle of the volume, from the front.
+    fn find(volume: &Volume) -> Option<Self> {
+        let (low, high) = bounds(volume);
+        let z = (low.z + high.z) / 2.0;
+        let columns = samples(low.x, high.x);
+        let front = |x: f64| front(volume, x, z, [low.y, high.y]);
+        let with_tissue: Vec<(f64, f64)> = columns.filter_map(|x| Some((x, front(x)?))).collect();
+        let (first, last) = (with_tissue.first()?.0, with_tissue.last()?.0);
+        // The middle of the widest part without a gap: an arm next to the body does not count.
+        let gap = |pair: &[(f64, f64)]| pair[1].0 - pair[0].0 > 1.5 * STEP_MM;
+        let ends: Vec<usize> = (1..with_tissue.len()).filter(|&n| gap(&with_tissue[n - 1..=n])).collect();
+        let starts = [0].into_iter().chain(ends.iter().copied());
+        let stops = ends.iter().copied().chain([with_tissue.len()]);
+        let widest = starts.zip(stops).max_by_key(|(start, stop)| stop - start)?;
+        let part = &with_tissue[widest.0..widest.1];
+        let (left, right) = (part.first().map_or(first, |c| c.0), part.last().map_or(last, |c| c.0));
+        let middle = (left + right) / 2.0;
+        let half = HALF_MM.0.min(HALF_MM.1 * (right - left));
+        let point = |x: f64| Some([x, front(x)?, z]);
+        let back = samples(low.y, high.y).find(|&y| is_tissue(volume, [middle, y, z]))?;
+        let y = front(middle)?;
+        Some(Self {
+            from_mm: point(middle - half)?,
+            to_mm: point(middle + half)?,
+            behind_mm: [middle, y - FREE_SHARE * (y - back), z],
+        })
+    }
+}
+
+/// The first y from the front at which thick tissue begins.
+fn front(volume: &Volume, x: f64, z: f64, [low, high]: [f64; 2]) -> Option<f64> {
+    let needed = (THICK_MM / STEP_MM) as usize;
+    let mut run = 0;
+    let found = samples(low, high).rev().find(|&y| {
+        run = if is_tissue(volume, [x, y, z]) { run + 1 } else { 0 };
+        run == needed
+    })?;
+    Some(found + (needed - 1) as f64 * STEP_MM)
+}
+
+fn is_tissue(volume: &Volume, mm: [f64; 3]) -> bool {
+    let index = volume.grid().affine.to_index(mm.into());
+    let shape = volume.grid().shape;
+    let inside = (0..3).all(|axis| (0.0..=(shape[axis] - 1) as f64).contains(&index[axis]));
+    inside && volume.trilinear(index) > AIR_HU
+}
+
+/// Values from `low` to `high`.
+fn samples(low: f64, high: f64) -> impl DoubleEndedIterator<Item = f64> {
+    (0..=((high - low) / STEP_MM) as usize).map(move |n| low + n as f64 * STEP_MM)
+}
+
+/// Lowest and highest coordinates of the voxel centers, world mm.
+fn bounds(volume: &Volume) -> (Point3<f64>, Point3<f64>) {
+    let shape = volume.grid().shape;
+    let corner = |n: usize| -> Point3<f64> {
+        volume.grid().mm([0, 1, 2].map(|axis| if n >> axis & 1 == 1 { shape[axis] - 1 } else { 0 }))
+    };
+    let start = corner(0);
+    (1..8).map(corner).fold((start, start), |(low, high), at| (low.inf(&at), high.sup(&at)))
+}
+
+#[cfg(test)]
+mod tests {
+    use cutis_volume::{Affine, Grid};
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::Scene;
+
+    /// A block of tissue from x = 10 to 90, y = 20 to 60, and an arm from x = 110 to 120, in a
+    /// volume whose axes run to the left and to the back.
+    fn block() -> Volume {
+        let affine = Affine::from_rows([
+            [-2.0, 0.0, 0.0, 140.0],
+            [0.0, -2.0, 0.0, 100.0],
+            [0.0, 0.0, 2.0, -20.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
+        let grid = Grid { shape: [71, 51, 21], affine: affine.unwrap() };
+        let hu = |n: usize| {
+            let [x, y, _] = grid.mm(grid.point(n)).into();
+            let body = (10.0..=90.0).contains(&x) || (110.0..=120.0).contains(&x);
+            // A sheet in front of the body.
+            let inside = (20.0..=60.0).contains(&y) || (80.0..=82.0).contains(&y);
+            if body && inside { 40 } else { -1000 }
+        };
+        Volume::new(grid, (0..grid.len()).map(hu).collect(), 1.0, 0.0).unwrap()
+    }
+
+    #[test]
+    fn the_cut_crosses_the_front_of_the_widest_part() {
+        let site = Site::find(&block()).unwrap();
+        let expected = [[38.0, 60.5, 0.0], [62.0, 60.5, 0.0]];
+        for (found, expected) in [site.from_mm, site.to_mm].into_iter().zip(expected) {
+            let distance = (Vector3::from(found) - Vector3::from(expected)).norm();
+            assert!(distance <= 2.0, "{found:?} is not {expected:?}");
+        }
+        assert!((site.behind_mm[1] - (60.5 - 0.6 * 41.0)).abs() < 2.0, "{site:?}");
+        let air = Volume::new(*block().grid(), vec![-1000; block().grid().len()], 1.0, 0.0).unwrap();
+        assert_eq!(Site::find(&air), None);
+    }
+
+    #[test]
+    fn the_scene_of_a_volume_is_valid_and_names_it() {
+        let here = tempfile::tempdir().unwrap();
+        let path = here.path().join("a \"b\".nii.gz");
+        cutis_volume::write(&path, &block()).unwrap();
+        let text = template_for(&path, &ReadOptions { resample: true, ..ReadOptions::default() }).unwrap();
+        let loaded = Scene::parse(&text, Path::new("scene.toml"), here.path(), &[]).unwrap();
+        assert_eq!(loaded.scene.volume.path.as_deref(), Some(&*path));
+        assert!(loaded.scene.volume.resample && loaded.scene.fixed.planes.len() == 1);
+        assert_ne!(text, template());
+        let missing = template_for(&here.path().join("none.nii"), &ReadOptions::default());
+        assert!(matches!(missing, Err(Error::Volume(_))), "{missing:?}");
+    }
+}
