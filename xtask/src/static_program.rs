@@ -32,14 +32,15 @@ pub fn run(workspace: &Workspace) -> Result<()> {
     command.args(["--release", "--package", "cutis-cli", "--no-default-features", "--features", FEATURES]);
     execute(command.args(["--target", &target]))?;
     let built = folder.join(&target).join("release/cutis");
-    let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
-    if needs_loader(&bytes)? {
-        bail!("{} is not static: it names a dynamic loader", built.display());
-    }
-    try_in_empty_root(workspace, &built, &folder.join("empty-root"))?;
     let program = folder.join("static/cutis");
     fs::create_dir_all(folder.join("static")).context("static")?;
-    fs::copy(&built, &program).with_context(|| program.display().to_string())?;
+    // The tables for debuggers are five times as long as the program.
+    execute(workspace.command("strip").args(["--strip-debug", "-o"]).arg(&program).arg(&built))?;
+    let bytes = fs::read(&program).with_context(|| program.display().to_string())?;
+    if needs_loader(&bytes)? {
+        bail!("{} is not static: it names a dynamic loader", program.display());
+    }
+    try_in_empty_root(workspace, &program, &folder.join("empty-root"))?;
     println!("{} is static, {} bytes", program.display(), bytes.len());
     Ok(())
 }
@@ -58,6 +59,7 @@ fn require(workspace: &Workspace, target: &str) -> Result<()> {
         bail!("the standard library for {target} is missing; install it with `rustup target add {target}`");
     }
     require_program(workspace, "cc", "apt-get install -y gcc libc6-dev")?;
+    require_program(workspace, "strip", "apt-get install -y binutils")?;
     require_program(workspace, "unshare", "apt-get install -y util-linux")
 }
 
