@@ -1,12 +1,13 @@
 //! `cargo xtask publish --dry-run`: packs every publishable crate, compiles each from its package,
-//! and installs the program from its package.
+//! and installs the program from its package. The step `publish` of the tests leaves out the
+//! installation, which builds all dependencies once more.
 //!
 //! `cargo publish --dry-run` can compile packages too. But it unpacks them into cargo's home folder
 //! and reuses the packages of an earlier run, because name and version are the same. So this module
 //! unpacks them into the target folder and compiles them there.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
@@ -29,8 +30,22 @@ impl Package {
     }
 }
 
-/// Packs and compiles. Outside CI the checkout may have changes that are not committed.
+/// Packs and compiles every crate, and installs the program from its package.
 pub fn dry_run(workspace: &Workspace) -> Result<()> {
+    pack(workspace)?;
+    let packages = publishable(&workspace.metadata(&workspace.root.join("Cargo.toml"), Scope::Members)?)?;
+    let program = packages.iter().find(|package| package.name == PROGRAM).context("no program is packed")?;
+    let folder = unpacked(workspace)?.join(program.folder());
+    installed::try_package(workspace, &folder, &program.version)
+}
+
+/// Folder of the unpacked packages.
+fn unpacked(workspace: &Workspace) -> Result<PathBuf> {
+    Ok(workspace.target_dir()?.join("unpacked-packages"))
+}
+
+/// Packs and compiles every crate. Outside CI the checkout may have changes that are not committed.
+pub fn pack(workspace: &Workspace) -> Result<()> {
     let target = workspace.target_dir()?;
     let root = workspace.root.join("Cargo.toml");
     let packages = publishable(&workspace.metadata(&root, Scope::Members)?)?;
@@ -42,7 +57,7 @@ pub fn dry_run(workspace: &Workspace) -> Result<()> {
     }
     execute(&mut command)?;
 
-    let folder = target.join("unpacked-packages");
+    let folder = unpacked(workspace)?;
     unpack(workspace, &packages, &target.join("package"), &folder)?;
     let manifest = folder.join("Cargo.toml");
     let root_manifest = fs::read_to_string(&root).context("Cargo.toml")?;
@@ -55,8 +70,7 @@ pub fn dry_run(workspace: &Workspace) -> Result<()> {
         execute(command.env("CARGO_TARGET_DIR", &target))?;
     }
     println!("{} crates compile from their packages", packages.len());
-    let program = packages.iter().find(|package| package.name == PROGRAM).context("no program is packed")?;
-    installed::try_package(workspace, &folder.join(program.folder()), &program.version)
+    Ok(())
 }
 
 /// The members of the workspace without `publish = false`.

@@ -33,7 +33,7 @@ const STEPS: &[Step] = &[
     Step { name: "documentation", quick: false, run: documentation },
     Step { name: "book", quick: false, run: book::run },
     Step { name: "python", quick: false, run: python::run },
-    Step { name: "publish", quick: false, run: publish::dry_run },
+    Step { name: "publish", quick: false, run: publish::pack },
 ];
 
 /// Which steps to run.
@@ -204,9 +204,10 @@ fn instructions(workspace: &Workspace) -> Result<()> {
     execute(workspace.command(workspace.study("debug")?).arg("instructions"))
 }
 
-/// Changed inputs for every reader, for a bounded time.
+/// Changed inputs for every reader, for a bounded time, with the program that the step `tests` has
+/// built.
 fn fuzz_briefly(workspace: &Workspace) -> Result<()> {
-    execute(&mut fuzz_command(workspace, &["--seconds", "20"])?)
+    execute(workspace.command(workspace.fuzz()?).args(["--seconds", "20"]))
 }
 
 /// The program that tries changed inputs. It is built with checks of integer overflow, and with the
