@@ -130,6 +130,7 @@ impl Choice for WrongGradient {
 impl<C: Constraint<N>, A: Choice, const N: usize> Constraint<N> for Altered<C, A> {
     const NAME: &'static str = C::NAME;
     const WGSL: &'static str = C::WGSL;
+    const UNIT_GRADIENTS: bool = C::UNIT_GRADIENTS;
     type Params<T: Real> = C::Params<T>;
     type Material = C::Material;
 

@@ -103,7 +103,8 @@ impl<T: Copy + Debug + Send + Sync + PartialEq + Zero, const K: usize> Params<T>
 ///   it out in both languages, or pass the terms through `exact` (a scalar) or `exact3` (a vector).
 ///   These functions return their argument and no optimizer can see through them.
 /// - If the type implements [`inverse_reach_squared`](Constraint::inverse_reach_squared), `eval`
-///   sets the private variable of that name.
+///   sets the private variable of that name. With
+///   [`UNIT_GRADIENTS`](Constraint::UNIT_GRADIENTS), `eval` sets `unit_gradients = true`.
 ///
 /// The test battery in the crate `cutis-conformance` compares the two languages.
 ///
@@ -143,6 +144,9 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     const NAME: &'static str;
     /// `struct Params` and `fn eval` in WGSL: the twin of [`eval`](Self::eval).
     const WGSL: &'static str;
+    /// True if every gradient has the length 1 or, where it is undefined, 0. False by default. A
+    /// projection then takes `Σ w|∇C|²` as `Σ w`, which is exact and saves time.
+    const UNIT_GRADIENTS: bool = false;
     /// The scalars of one constraint, `[T; K]`.
     type Params<T: Real>: Params<T>;
     /// Material values that the caller chooses when a constraint is built from its rest shape, such

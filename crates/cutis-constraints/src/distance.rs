@@ -34,6 +34,7 @@ impl Default for DistanceMaterial {
 impl Constraint<2> for Distance {
     const NAME: &'static str = "distance";
     const WGSL: &'static str = cutis_shaders::constraints::DISTANCE;
+    const UNIT_GRADIENTS: bool = true;
     type Params<T: Real> = [T; 1];
     type Material = DistanceMaterial;
 

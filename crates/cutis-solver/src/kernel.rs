@@ -98,7 +98,7 @@ pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
     let eval = C::eval(x, params);
     let mut weighted_square: T = convert(0.0);
     for i in 0..N {
-        let part = w[i] * eval.grad[i].dot(&eval.grad[i]);
+        let part = if C::UNIT_GRADIENTS { w[i] } else { w[i] * eval.grad[i].dot(&eval.grad[i]) };
         weighted_square = if i == 0 { part } else { weighted_square + part };
     }
     if !C::is_in_reach(eval.c, params).all()

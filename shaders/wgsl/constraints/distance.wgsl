@@ -9,5 +9,6 @@ fn eval(x: array<vec3f, N>, p: Params) -> Eval {
     let apart = length > 0.0;
     let inverse = select(0.0, 1.0 / select(1.0, length, apart), apart);
     let direction = d * inverse;
+    unit_gradients = true;
     return Eval(length - p.rest_length, array<vec3f, N>(direction, -direction));
 }

@@ -9,6 +9,9 @@ struct Eval {
 // means no limit.
 var<private> inverse_reach_squared: f32;
 
+// True if every gradient has the length 1 or 0. An `eval` may set it.
+var<private> unit_gradients: bool;
+
 // Always zero, but compilers cannot know it: entry points set it to 1 if there are no constraints.
 var<private> hidden_zero: u32;
 

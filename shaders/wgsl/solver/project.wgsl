@@ -26,7 +26,8 @@ fn project(@builtin(global_invocation_id) id: vec3u) {
     }
     var weighted_square = 0.0;
     for (var i = 0u; i < N; i++) {
-        weighted_square = weighted_square + w[i] * dot(found.grad[i], found.grad[i]);
+        let square = select(dot(found.grad[i], found.grad[i]), 1.0, unit_gradients);
+        weighted_square = weighted_square + w[i] * square;
     }
     var lightest = 0.0;
     for (var i = 0u; i < N; i++) {

@@ -3,7 +3,7 @@
 use cutis_constraints::{Constraint, Eval};
 use nalgebra::Vector3;
 
-use crate::alteration::Alteration;
+use crate::alteration::{Alteration, FACTOR};
 use crate::measure::{largest, length};
 use crate::{Case, Report, Subject};
 
@@ -14,6 +14,8 @@ const STEP: f64 = 1e-4;
 
 /// The gradient agrees with central finite differences of fourth order in `f64` to 1e-6 of its own
 /// length.
+///
+/// Gradients with [`Constraint::UNIT_GRADIENTS`] have the length 1.
 ///
 /// For a constraint with [`direction_only`](Subject::direction_only), only the directions are
 /// compared. Controls: each gradient off by 1e-3, and swapped neighbors, must be noticed.
@@ -33,7 +35,20 @@ pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
     for alteration in alterations.filter(|_| N > 1 || !subject.direction_only) {
         report.control(alteration, error(&|eval| alteration.apply(eval)), 100.0 * BOUND);
     }
+    if C::UNIT_GRADIENTS {
+        unit_gradients::<C, N>(&cases, &mut report);
+    }
     report
+}
+
+/// Every gradient has the length that [`Constraint::UNIT_GRADIENTS`] promises. Control: lengths off by
+/// 1e-3.
+fn unit_gradients<C: Constraint<N>, const N: usize>(cases: &[Case<N>], report: &mut Report) {
+    let lengths = cases.iter().flat_map(|case| case.eval::<C, f64>().grad.map(|g| g.norm()));
+    let lengths: Vec<f64> = lengths.filter(|&length| length != 0.0).collect();
+    let error = |factor: f64| lengths.iter().map(|length| (length * factor - 1.0).abs()).fold(0.0, largest);
+    report.at_most("lengths of unit gradients, minus 1", error(1.0), BOUND);
+    report.control("lengths × 1.001", error(FACTOR), 100.0 * BOUND);
 }
 
 /// Returns the central differences of the value in every coordinate.
