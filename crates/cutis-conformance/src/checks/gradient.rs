@@ -41,8 +41,8 @@ pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
     report
 }
 
-/// Every gradient has the length that [`Constraint::UNIT_GRADIENTS`] promises. Control: lengths off by
-/// 1e-3.
+/// Every gradient has the length that [`Constraint::UNIT_GRADIENTS`] promises. Control: lengths off
+/// by 1e-3.
 fn unit_gradients<C: Constraint<N>, const N: usize>(cases: &[Case<N>], report: &mut Report) {
     let lengths = cases.iter().flat_map(|case| case.eval::<C, f64>().grad.map(|g| g.norm()));
     let lengths: Vec<f64> = lengths.filter(|&length| length != 0.0).collect();

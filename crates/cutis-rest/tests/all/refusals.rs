@@ -43,8 +43,8 @@ fn options_out_of_range_are_refused() {
     }
 }
 
-/// A block that nothing holds falls for ever, which is seen when it is far away. A spring of 1 m that
-/// hangs comes to rest.
+/// A block that nothing holds falls for ever, which is seen when it is far away. A spring of 1 m
+/// that hangs comes to rest.
 #[test]
 fn a_body_that_falls_is_an_error() {
     let falling = Make { held: false, ..Make::default() };
