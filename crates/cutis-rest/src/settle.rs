@@ -23,7 +23,7 @@ const FIRST_SHIFT: f64 = 1e-4;
 const LEAST_SHIFT: f64 = 1e-7;
 const MOST_SHIFT: f64 = 1e6;
 /// Displacement of a vertex from the start, over the diagonal of the body, beyond which no state of
-/// rest is expected: something is not held.
+/// rest is expected: the body is not held.
 const FAR: f64 = 4.0;
 /// The levels are built again if a step needs this many times the cycles of the step for which they
 /// were built.
@@ -209,8 +209,8 @@ impl<'a> Search<'a> {
     /// Makes a step.
     ///
     /// # Errors
-    /// [`RestError::NotAtRest`] if the allowed steps are made, no step lowers the energy, or a
-    /// vertex moves farther than four times the diagonal of the body.
+    /// [`RestError::NotAtRest`] if the allowed steps are made, no step lowers the energy, or the
+    /// body is farther from its start than four times its diagonal.
     pub fn step(&mut self) -> Result<&Step, RestError> {
         let force = self.force();
         let failed = RestError::NotAtRest { steps: self.steps.len(), force, tolerance: self.options.force };
@@ -221,7 +221,8 @@ impl<'a> Search<'a> {
         let Moved { state, length, change, slope, rises, .. } = moved;
         let moved_m = (dot(&solution.x, &solution.x) / solution.x.len() as f64).sqrt() * length;
         let (way, farthest) = self.way(&state);
-        if farthest > FAR * 2.0 * self.reach {
+        // A body that starts as a point has a larger diagonal now.
+        if farthest > FAR * 2.0 * self.reach && farthest > FAR * diagonal(&state.x) {
             return Err(failed);
         }
         let mut step =
