@@ -52,14 +52,14 @@ struct Case {
 }
 
 const CASES: [Case; 4] = [
-    Case { name: "edges-pbd", formulation: Formulation::Pbd, edges: true, tets: false, most: [122.3, 51.5] },
+    Case { name: "edges-pbd", formulation: Formulation::Pbd, edges: true, tets: false, most: [119.9, 50.3] },
     Case { name: "tets-pbd", formulation: Formulation::Pbd, edges: false, tets: true, most: [236.9, 94.0] },
     Case {
         name: "edges-xpbd",
         formulation: Formulation::Xpbd,
         edges: true,
         tets: false,
-        most: [138.3, 58.2],
+        most: [136.7, 58.2],
     },
     Case {
         name: "vertices-vbd",
@@ -70,7 +70,9 @@ const CASES: [Case; 4] = [
     },
 ];
 
-/// Counts all cases and compares them with their limits. The scalar reference must exceed them.
+/// Counts all cases and compares them with their limits. The loop with fewer lanes must exceed a
+/// limit. Edges in four lanes take as many instructions as scalars, because the lanes of every
+/// x86-64 processor have no instruction to select: their limit only finds a longer loop.
 ///
 /// # Errors
 /// Valgrind is missing or failed, or the output cannot be written.
@@ -85,6 +87,7 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     for case in &CASES {
         let scalar = case.count(1)?;
         let mut row = vec![case.name.to_owned(), format!("{scalar:.1}")];
+        let mut fewer = case.tets.then_some((1, scalar));
         for (lanes, most) in [4, 8].into_iter().zip(case.most) {
             if level(lanes).is_none() {
                 row.push("this processor has none".to_owned());
@@ -97,7 +100,11 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
                 format!("{name}, {lanes} lanes: {count:.1} instructions, at most {most}"),
                 count <= most,
             );
-            checks.control(format!("{name}, scalar: {scalar:.1} instructions"), scalar > most);
+            if let Some((lanes, count)) = fewer {
+                let what = format!("{name}, {lanes} lanes: {count:.1} instructions, more than {most}");
+                checks.control(what, count > most);
+            }
+            fewer = Some((lanes, count));
         }
         table.add(row);
     }
