@@ -191,6 +191,8 @@ fn a_body_that_falls_is_an_error() {
         ("fixed", "{}"),
         ("solver.gravity_m_s2", "[0, 0, -9.81]"),
         ("incision", "[]"),
+        // Small, because the search makes all its steps.
+        ("lattice.spacing_mm", "20"),
         REST,
     ];
     let temporary = tempfile::tempdir().unwrap();

@@ -22,9 +22,6 @@ const SHORT: f64 = 0.1;
 const FIRST_SHIFT: f64 = 1e-4;
 const LEAST_SHIFT: f64 = 1e-7;
 const MOST_SHIFT: f64 = 1e6;
-/// Displacement of a vertex from the start, over the diagonal of the body, beyond which no state of
-/// rest is expected: the body is not held.
-const FAR: f64 = 4.0;
 /// The levels are built again if a step needs this many times the cycles of the step for which they
 /// were built.
 const STALE: f64 = 3.0;
@@ -209,22 +206,17 @@ impl<'a> Search<'a> {
     /// Makes a step.
     ///
     /// # Errors
-    /// [`RestError::NotAtRest`] if the allowed steps are made, no step lowers the energy, or the
-    /// body is farther from its start than four times its diagonal.
+    /// [`RestError::NotAtRest`] if the allowed steps are made, or no step lowers the energy.
     pub fn step(&mut self) -> Result<&Step, RestError> {
         let force = self.force();
         let failed = RestError::NotAtRest { steps: self.steps.len(), force, tolerance: self.options.force };
         if self.steps.len() >= self.options.most_steps {
             return Err(failed);
         }
-        let Trial { solution, exact, moved } = self.try_step().ok_or_else(|| failed.clone())?;
+        let Trial { solution, exact, moved } = self.try_step().ok_or(failed)?;
         let Moved { state, length, change, slope, rises, .. } = moved;
         let moved_m = (dot(&solution.x, &solution.x) / solution.x.len() as f64).sqrt() * length;
-        let (way, farthest) = self.way(&state);
-        // A body that starts as a point has a larger diagonal now.
-        if farthest > FAR * 2.0 * self.reach && farthest > FAR * diagonal(&state.x) {
-            return Err(failed);
-        }
+        let way = self.way(&state);
         let mut step =
             Step { force: self.force(), moved_m, cycles: solution.cycles, length, error: f64::INFINITY };
         // A shift shortens steps, so that they do not tell the distance.
@@ -346,14 +338,11 @@ impl<'a> Search<'a> {
         solution
     }
 
-    /// Displacement from the start to a state in m: the root of the mean square, and that of the
-    /// farthest vertex.
-    fn way(&self, state: &State) -> (f64, f64) {
+    /// Displacement from the start to a state in m, as a root of the mean square.
+    fn way(&self, state: &State) -> f64 {
         let square = |&v: &u32| (state.x[v as usize] - self.start[v as usize]).norm_squared();
         let free = &self.body.free;
-        let (sum, most) =
-            free.iter().map(square).fold((0.0, 0.0), |(sum, most), x| (sum + x, f64::max(most, x)));
-        ((sum / free.len() as f64).sqrt(), most.sqrt())
+        (free.iter().map(square).sum::<f64>() / free.len() as f64).sqrt()
     }
 
     /// Estimate of the distance from rest after a step, relative to the displacement `way` from the
