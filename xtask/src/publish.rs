@@ -32,20 +32,19 @@ impl Package {
 
 /// Packs and compiles every crate, and installs the program from its package.
 pub fn dry_run(workspace: &Workspace) -> Result<()> {
-    pack(workspace)?;
-    let packages = publishable(&workspace.metadata(&workspace.root.join("Cargo.toml"), Scope::Members)?)?;
+    let (folder, packages) = packed(workspace)?;
     let program = packages.iter().find(|package| package.name == PROGRAM).context("no program is packed")?;
-    let folder = unpacked(workspace)?.join(program.folder());
-    installed::try_package(workspace, &folder, &program.version)
+    installed::try_package(workspace, &folder.join(program.folder()), &program.version)
 }
 
-/// Folder of the unpacked packages.
-fn unpacked(workspace: &Workspace) -> Result<PathBuf> {
-    Ok(workspace.target_dir()?.join("unpacked-packages"))
-}
-
-/// Packs and compiles every crate. Outside CI the checkout may have changes that are not committed.
+/// Packs and compiles every crate.
 pub fn pack(workspace: &Workspace) -> Result<()> {
+    packed(workspace).map(|_| ())
+}
+
+/// Packs and compiles every crate. Returns the packages and the folder where they are unpacked.
+/// Outside CI the checkout may have changes that are not committed.
+fn packed(workspace: &Workspace) -> Result<(PathBuf, Vec<Package>)> {
     let target = workspace.target_dir()?;
     let root = workspace.root.join("Cargo.toml");
     let packages = publishable(&workspace.metadata(&root, Scope::Members)?)?;
@@ -57,7 +56,7 @@ pub fn pack(workspace: &Workspace) -> Result<()> {
     }
     execute(&mut command)?;
 
-    let folder = unpacked(workspace)?;
+    let folder = target.join("unpacked-packages");
     unpack(workspace, &packages, &target.join("package"), &folder)?;
     let manifest = folder.join("Cargo.toml");
     let root_manifest = fs::read_to_string(&root).context("Cargo.toml")?;
@@ -70,7 +69,7 @@ pub fn pack(workspace: &Workspace) -> Result<()> {
         execute(command.env("CARGO_TARGET_DIR", &target))?;
     }
     println!("{} crates compile from their packages", packages.len());
-    Ok(())
+    Ok((folder, packages))
 }
 
 /// The members of the workspace without `publish = false`.

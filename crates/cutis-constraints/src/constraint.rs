@@ -144,8 +144,9 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     const NAME: &'static str;
     /// `struct Params` and `fn eval` in WGSL: the twin of [`eval`](Self::eval).
     const WGSL: &'static str;
-    /// True if every gradient has the length 1 or, where it is undefined, 0. False by default. A
-    /// projection then takes `Σ w|∇C|²` as `Σ w`, which is exact and saves time.
+    /// True if all gradients have the length 1 or, where they are undefined, all are 0, so that
+    /// nothing moves. False by default. A projection then takes `Σ w|∇C|²` as `Σ w`, which saves
+    /// time.
     const UNIT_GRADIENTS: bool = false;
     /// The scalars of one constraint, `[T; K]`.
     type Params<T: Real>: Params<T>;
