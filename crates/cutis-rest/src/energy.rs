@@ -1,5 +1,7 @@
 //! The energy of a body at one placement of its vertices, and the forces.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
@@ -11,11 +13,15 @@ use crate::constraints::Evaluation;
 pub(crate) const PART: usize = 4096;
 
 /// The values of all constraints, and the forces.
+#[derive(Default)]
 pub(crate) struct State {
     /// Positions of all vertices.
     pub x: Vec<Point3<f64>>,
     /// For each part of the free vertices, `C` of the constraints that it owns, kind by kind.
-    values: Vec<Vec<f64>>,
+    values: Vec<Arc<[f64]>>,
+    /// For each part, the squares of the forces, of their sizes and of their rounding, and the
+    /// energy of the rounding.
+    sums: Vec<[f64; 4]>,
     /// `−∇U` at each free vertex, in N.
     pub forces: Vec<Vector3<f64>>,
     /// Norm of the forces in N.
@@ -43,6 +49,9 @@ pub(crate) struct Scratch {
     pub ahead: Vec<Vector3<f64>>,
     /// Second derivatives, see [`Scratch::differentiate`].
     pub curvature: Vec<Matrix3<f64>>,
+    /// For each pair of vertices of a constraint, the place of its block in the row where it was
+    /// found last. In a lattice the next constraint has it at the same place.
+    pub slots: Vec<usize>,
 }
 
 impl Evaluation {
@@ -55,19 +64,41 @@ impl Evaluation {
 impl Body {
     /// Evaluates all constraints.
     pub(crate) fn at(&self, x: Vec<Point3<f64>>) -> State {
-        let mut forces = self.weights.clone();
-        let parts = forces.par_chunks_mut(PART).enumerate();
-        let parts = parts
-            .map_init(Evaluation::default, |scratch, (part, forces)| self.part_at(&x, scratch, part, forces));
-        let (values, sums): (Vec<Vec<f64>>, Vec<[f64; 4]>) = parts.unzip();
-        let sum = |n: usize| sums.iter().map(|sums| sums[n]).sum::<f64>();
-        let (norm, scale, floor) = (sum(0).sqrt(), sum(1).sqrt(), f64::EPSILON * sum(2).sqrt());
-        State { x, values, forces, norm, scale, floor, noise: f64::EPSILON * sum(3) }
+        let parts = self.free.len().div_ceil(PART);
+        let (values, sums) = (vec![Arc::default(); parts], vec![[0.0; 4]; parts]);
+        let all = vec![true; parts];
+        self.evaluated(State { x, values, sums, forces: self.weights.clone(), ..State::default() }, &all)
+    }
+
+    /// Moves the free vertices at some places from `state` to their positions in `x`. Only the
+    /// parts with a constraint at one of them are evaluated.
+    pub(crate) fn with_moved(&self, state: &State, x: Vec<Point3<f64>>, places: &[u32]) -> State {
+        let mut touched = vec![false; state.values.len()];
+        for &neighbor in places.iter().flat_map(|&place| self.pattern.row(place as usize)) {
+            touched[neighbor as usize / PART] = true;
+        }
+        let State { values, sums, forces, .. } = state;
+        let (values, sums, forces) = (values.clone(), sums.clone(), forces.clone());
+        self.evaluated(State { x, values, sums, forces, ..State::default() }, &touched)
+    }
+
+    /// Evaluates the constraints of the touched parts.
+    fn evaluated(&self, mut state: State, touched: &[bool]) -> State {
+        let State { x, values, sums, forces, .. } = &mut state;
+        let parts = forces.par_chunks_mut(PART).zip(values.par_iter_mut().zip(sums.par_iter_mut()));
+        let parts = parts.enumerate().filter(|(part, _)| touched[*part]);
+        parts.for_each_init(Evaluation::default, |scratch, (part, (forces, (values, sums)))| {
+            forces.copy_from_slice(&self.weights[part * PART..][..forces.len()]);
+            let (of_part, of_forces) = self.part_at(x, scratch, part, forces);
+            (*values, *sums) = (of_part.into(), of_forces);
+        });
+        let sum = |n: usize| state.sums.iter().map(|sums| sums[n]).sum::<f64>();
+        let (norm, scale, floor, noise) = (sum(0).sqrt(), sum(1).sqrt(), sum(2).sqrt(), sum(3));
+        State { norm, scale, floor: f64::EPSILON * floor, noise: f64::EPSILON * noise, ..state }
     }
 
     /// Adds the forces on a part of the free vertices. Returns `C` of the constraints that it owns,
-    /// the squares of the forces, of their sizes and of their rounding, and the energy of the
-    /// rounding.
+    /// and the sums of the part, see [`State`].
     fn part_at(
         &self,
         x: &[Point3<f64>],
@@ -113,7 +144,7 @@ impl Body {
     /// The energy at `to` minus that at `from`, constraint by constraint, so that it is as accurate
     /// as its own size.
     pub(crate) fn difference(&self, from: &State, to: &State) -> f64 {
-        let part = |(part, (from, to)): (usize, (&Vec<f64>, &Vec<f64>))| -> f64 {
+        let part = |(part, (from, to)): (usize, (&Arc<[f64]>, &Arc<[f64]>))| -> f64 {
             let (mut sum, mut start) = (0.0, 0);
             for elements in &self.kinds {
                 let owned = elements.owned(part);

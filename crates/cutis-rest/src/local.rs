@@ -23,11 +23,19 @@ const MOST: f64 = 0.05;
 /// When the vertices are at rest.
 const OPTIONS: Options = Options { error: 0.1, force: 1e-6, most_steps: 40, most_cycles: 100 };
 
+/// A placement after local relaxation.
+pub(crate) struct Relaxed {
+    /// Positions of all vertices.
+    pub x: Vec<Point3<f64>>,
+    /// Places of the vertices that may have moved.
+    pub places: Vec<u32>,
+}
+
 impl Body {
     /// Brings the vertices nearer to rest that moved much farther than the others in a step, from
-    /// positions `x` of all vertices. Returns the new positions. `None` if there are none or too
-    /// many, or if a force on them is not finite.
-    pub(crate) fn relaxed(&self, x: &[Point3<f64>], step: &[Vector3<f64>]) -> Option<Vec<Point3<f64>>> {
+    /// positions `x` of all vertices. Returns the new positions, and the places of the vertices that
+    /// may have moved. `None` if there are none or too many, or if a force on them is not finite.
+    pub(crate) fn relaxed(&self, x: &[Point3<f64>], step: &[Vector3<f64>]) -> Option<Relaxed> {
         let chosen = self.far(step);
         if chosen.is_empty() || chosen.len() as f64 > MOST * self.free.len() as f64 {
             return None;
@@ -35,7 +43,7 @@ impl Body {
         let part = self.part(&chosen, x);
         let mut search = Search::new(&part, &OPTIONS).ok()?;
         while !search.is_at_rest() && search.step().is_ok() {}
-        Some(search.state.x)
+        Some(Relaxed { x: search.state.x, places: chosen })
     }
 
     /// Places of the vertices that moved far, and of their neighbors, ascending.
@@ -103,6 +111,7 @@ mod tests {
     use cutis_test_kit::Kuhn;
 
     use super::*;
+    use crate::energy::State;
 
     /// A block of springs whose bottom is held.
     fn block() -> System<f64> {
@@ -153,13 +162,32 @@ mod tests {
             body.difference(&whole, &body.at(body.start.clone())),
         ];
         assert!((of_part / of_whole - 1.0).abs() < 1e-9 && of_part < 0.0, "{of_part} and {of_whole} J");
-        let found = body.relaxed(&x, &step).unwrap();
+        let found = body.relaxed(&x, &step).unwrap().x;
         let farthest = |from: &[Point3<f64>]| {
             from.iter().zip(&body.start).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
         };
         assert!(farthest(&found) < 0.2 * farthest(&x), "{:e} m", farthest(&found));
         let moved = |v: &usize| found[*v] != x[*v];
         assert!((0..x.len()).filter(moved).all(|v| part.place[v] != FIXED));
+    }
+
+    /// Evaluating only the parts that are touched gives the bits of evaluating all of them.
+    #[test]
+    fn few_vertices_that_move_change_few_parts() {
+        let body = Body::of(&block(), [0.0; 3]).unwrap();
+        assert!(body.free.len() > PART);
+        let before = body.at(body.start.clone());
+        for place in [0, PART - 1, body.free.len() - 1] {
+            let mut x = body.start.clone();
+            x[body.free[place] as usize].y += 0.003;
+            let whole = body.at(x.clone());
+            let found = body.with_moved(&before, x, &[place as u32]);
+            assert!(found.forces == whole.forces && found.forces != before.forces, "{place}");
+            let numbers = |state: &State| [state.norm, state.scale, state.floor, state.noise];
+            assert_eq!(numbers(&found), numbers(&whole), "{place}");
+            assert_eq!(body.difference(&before, &found), body.difference(&before, &whole), "{place}");
+            assert!(body.difference(&before, &found) > 0.0, "{place}");
+        }
     }
 
     /// Nothing is relaxed if all vertices move alike.

@@ -156,6 +156,9 @@ impl Body {
         to.clear();
         to.resize(starts[rows.end] - start, [[0.0; 3]; 3]);
         for elements in &self.kinds {
+            let arity = elements.kind.arity();
+            scratch.slots.clear();
+            scratch.slots.resize(arity * arity, 0);
             for &k in elements.of_part(rows.start / PART) {
                 let k = k as usize;
                 let vertices = elements.vertices(k);
@@ -181,8 +184,12 @@ impl Body {
                         if column == FIXED {
                             continue;
                         }
-                        let smaller = columns.iter().map(|&c| u32::from(c < column));
-                        let block = &mut to[smaller.sum::<u32>() as usize];
+                        let hint = &mut scratch.slots[own * vertices.len() + b];
+                        if columns.get(*hint) != Some(&column) {
+                            let smaller = columns.iter().map(|&c| u32::from(c < column));
+                            *hint = smaller.sum::<u32>() as usize;
+                        }
+                        let block = &mut to[*hint];
                         add_outer(block, &left, &scratch.own.gradients[b]);
                         if counts {
                             add(block, c * stiffness, &scratch.curvature[b]);
@@ -218,7 +225,7 @@ impl Scratch {
     /// Forward differences of the gradients over the position of one vertex, after
     /// [`evaluate`](Self::evaluate): `∂²C/∂x_own∂x_b` for each vertex `b`.
     fn differentiate(&mut self, kind: &dyn Constraints, k: usize, own: usize) {
-        let Self { own: Evaluation { places, gradients, .. }, ahead, curvature } = self;
+        let Self { own: Evaluation { places, gradients, .. }, ahead, curvature, .. } = self;
         curvature.clear();
         curvature.resize(places.len(), Matrix3::zeros());
         let first = places[0];

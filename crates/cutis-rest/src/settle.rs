@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::advance::{Moved, Pending};
 use crate::conjugate::{self, Solution};
 use crate::energy::State;
+use crate::local::Relaxed;
 use crate::matrix::{Curvature, Matrix};
 use crate::multigrid::Multigrid;
 use crate::{Body, Options, Rest, RestError, Step};
@@ -250,8 +251,8 @@ impl<'a> Search<'a> {
 
     /// Brings the vertices to rest that moved much farther than the others in a step.
     fn relax(&mut self, step: &[Vector3<f64>]) {
-        let Some(x) = self.body.relaxed(&self.state.x, step) else { return };
-        let relaxed = self.body.at(x);
+        let Some(Relaxed { x, places }) = self.body.relaxed(&self.state.x, step) else { return };
+        let relaxed = self.body.with_moved(&self.state, x, &places);
         let change = self.body.difference(&self.state, &relaxed);
         if change < 0.0 && relaxed.is_finite() {
             self.energy_change_j += change;
