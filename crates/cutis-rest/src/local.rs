@@ -33,8 +33,8 @@ pub(crate) struct Relaxed {
 
 impl Body {
     /// Brings the vertices nearer to rest that moved much farther than the others in a step, from
-    /// positions `x` of all vertices. Returns the new positions, and the places of the vertices that
-    /// may have moved. `None` if there are none or too many, or if a force on them is not finite.
+    /// positions `x` of all vertices. `None` if there are none or too many, or if a force on them
+    /// is not finite.
     pub(crate) fn relaxed(&self, x: &[Point3<f64>], step: &[Vector3<f64>]) -> Option<Relaxed> {
         let chosen = self.far(step);
         if chosen.is_empty() || chosen.len() as f64 > MOST * self.free.len() as f64 {
