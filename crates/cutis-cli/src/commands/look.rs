@@ -165,6 +165,12 @@ pub(crate) fn render(volume: &VolumeArgs, out: &Path, look: &Look) -> Result<(),
     let [level_hu, window_hu] =
         numbers("--window", &look.window, '/', "level/width in HU, for example 40/400")?;
     let slice_at = look.slice.as_deref().map(plane).transpose()?;
+    if out.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
+        return Err(Error::Request {
+            what: format!("--out {}", out.display()),
+            why: "must end in .png, the only format of pictures".into(),
+        });
+    }
     let terminal = Terminal::new();
     terminal.begin("read the CT", 0);
     let volume = cutis::volume::read(&volume.path, &volume.options())?.volume;
@@ -172,6 +178,7 @@ pub(crate) fn render(volume: &VolumeArgs, out: &Path, look: &Look) -> Result<(),
     terminal.begin("draw", 0);
     let image = match slice_at {
         Some((plane, at_mm)) => {
+            require_inside(&volume, plane, at_mm)?;
             let (window_hu, level_hu) = (window_hu as f32, level_hu as f32);
             let long_side = Some(look.pixels);
             slice(
@@ -188,6 +195,30 @@ pub(crate) fn render(volume: &VolumeArgs, out: &Path, look: &Look) -> Result<(),
     terminal.end();
     print(&out.display().to_string());
     Ok(())
+}
+
+/// Refuses a plane that does not meet the scan.
+fn require_inside(volume: &Volume, plane: Plane, at_mm: f64) -> Result<(), Error> {
+    let (name, axis) = match plane {
+        Plane::Sagittal => ("sagittal", 0),
+        Plane::Coronal => ("coronal", 1),
+        Plane::Axial => ("axial", 2),
+    };
+    let grid = volume.grid();
+    let corner = |n: usize| {
+        let index = std::array::from_fn(|axis| if n >> axis & 1 == 1 { grid.shape[axis] - 1 } else { 0 });
+        grid.mm(index)[axis]
+    };
+    let (low, high) = (0..8)
+        .map(corner)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mm| (low.min(mm), high.max(mm)));
+    if (low..=high).contains(&at_mm) {
+        return Ok(());
+    }
+    Err(Error::Request {
+        what: format!("--slice {name}@{at_mm}"),
+        why: format!("the scan has nothing there; it goes from {low:.1} to {high:.1} mm"),
+    })
 }
 
 /// Parses a slice such as `axial@120`.

@@ -55,6 +55,8 @@ fn bad_input_ends_with_two_and_a_message_that_names_it() {
     desk.put("typo.toml", crate::SCENE.replace("depth_mm", "depht_mm"));
     desk.put("type.toml", crate::SCENE.replace("rest_area_scale = 0.8", "rest_area_scale = \"tight\""));
     desk.put("syntax.toml", "[volume\n");
+    desk.put("lost.toml", "[volume]\npath = 'missing.nii.gz'\n[lattice]\n");
+    desk.put("empty.toml", "");
     desk.put("text.nii", "this is no volume");
     desk.cutis(&["phantom", "--size", "16,16,12", "--out", "good.nii"]).expect_success();
     let bytes = std::fs::read(desk.path("good.nii")).unwrap();
@@ -63,7 +65,7 @@ fn bad_input_ends_with_two_and_a_message_that_names_it() {
     let bytes = std::fs::read(desk.path("good.nii.gz")).unwrap();
     desk.put("half.nii.gz", &bytes[..bytes.len() / 2]);
     desk.put("hostile.nii", hostile_header());
-    let cases: [(&str, &[&str]); 23] = [
+    let cases: [(&str, &[&str]); 30] = [
         ("run missing.toml", &["missing.toml", "read"]),
         ("run typo.toml", &["typo.toml", "incision[0].depht_mm", "depth_mm"]),
         ("run type.toml", &["type.toml", "constraints.stc.rest_area_scale", "tight"]),
@@ -80,6 +82,14 @@ fn bad_input_ends_with_two_and_a_message_that_names_it() {
         ("check scene.toml --set volume.path=a.nii", &["scene.toml", "volume", "exactly one"]),
         ("check scene.toml --set volume={path='half.nii'}", &["half.nii", "truncated"]),
         ("check scene.toml --lattice 0.0001", &["scene.toml", "lattice", "at most"]),
+        ("check lost.toml", &["lost.toml", "volume.path", "missing.nii.gz"]),
+        ("check empty.toml", &["empty.toml", "key `volume`", "is missing"]),
+        ("check scene.toml --set stpe=1", &["scene.toml", "unknown key", "the nearest one is `step`"]),
+        ("check scene.toml --set run.frames=1.5", &["run.frames", "1.5", "expected a whole number"]),
+        (
+            "check scene.toml --set incision.0.depth_mm=2000",
+            &["scene.toml", "incision[0].depth_mm", "2000", "the diagonal of the scan"],
+        ),
         ("inspect missing.nii.gz", &["missing.nii.gz", "No such file"]),
         ("inspect scene.toml", &["scene.toml", "not a NIfTI file"]),
         ("inspect text.nii", &["text.nii"]),
@@ -89,12 +99,14 @@ fn bad_input_ends_with_two_and_a_message_that_names_it() {
         ("skin hostile.nii", &["hostile.nii", "truncated"]),
         ("skin good.nii --out skin.obj", &["skin.obj", ".vtu"]),
         ("render good.nii --out a.png --slice axial", &["--slice axial", "axial@MM"]),
+        ("render good.nii --out a.png --slice axial@9999", &["--slice axial@9999", "it goes from"]),
+        ("render good.nii --out a.jpg", &["--out a.jpg", ".png"]),
         ("phantom --size 8,0,8 --out a.nii", &["[8, 0, 8]"]),
     ];
     for (call, words) in cases {
         desk.cutis(&call.split(' ').collect::<Vec<_>>()).expect_error(2, words);
     }
-    for file in ["skin.obj", "a.png", "a.nii"] {
+    for file in ["skin.obj", "a.png", "a.jpg", "a.nii"] {
         assert!(!desk.path(file).exists(), "{file}");
     }
 }

@@ -3,7 +3,7 @@
 use cutis_mesh::sever::Severed;
 use cutis_mesh::{Cut, Excision, Incision, Lattice, Piece, Pocket, Skin, Slit, TetMesh, Tissue, TissueMask};
 use cutis_skin::{BodySkin, SkinMoves};
-use cutis_volume::{TableKind, Volume};
+use cutis_volume::{Grid, TableKind, Volume};
 use nalgebra::Point3;
 
 use super::cut_error::cut_error;
@@ -28,8 +28,10 @@ impl Body {
         }
         let lattice = lattice(sections, volume)?;
         memory::check_points(sections, lattice.grid().len())?;
+        refuse_deep_cuts(sections, volume.grid())?;
         let hu = lattice.sample(volume)?;
         let air = air(&hu, tissue.air_below_hu);
+        memory::check_tissue(sections, air.iter().filter(|air| !**air).count())?;
         let largest_component = tissue.keep == Keep::Largest;
         let found = Tissue { air: &air, cut_away: &tissue.cut_planes, largest_component };
         let mut warnings = Vec::new();
@@ -116,6 +118,22 @@ impl Body {
             warnings,
         })
     }
+}
+
+/// Refuses cuts that are deeper than the scan is large.
+fn refuse_deep_cuts(sections: &BodySections<'_>, scan: &Grid) -> Result<(), Error> {
+    let last = scan.shape.map(|count| count - 1);
+    let most_mm = (scan.mm(last) - scan.mm([0; 3])).norm();
+    let incisions = sections.incisions.iter().map(|cut| cut.depth_mm).enumerate();
+    let excisions = sections.excisions.iter().map(|cut| cut.depth_mm).enumerate();
+    let cuts = incisions.map(|cut| ("incision", cut)).chain(excisions.map(|cut| ("excision", cut)));
+    for (list, (n, depth_mm)) in cuts {
+        if depth_mm > most_mm {
+            let why = format!("must be at most {most_mm:.0}, the diagonal of the scan in mm");
+            return Err(sections.file.bad_key(&format!("{list}[{n}].depth_mm"), &depth_mm.to_string(), &why));
+        }
+    }
+    Ok(())
 }
 
 /// The tissue of the body and, if the scene needs it, the skin of the body.

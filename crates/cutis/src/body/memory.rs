@@ -15,6 +15,9 @@ use crate::scene::{LatticeSection, Scene};
 /// the phantom, for 0.2 to 5.9 million points.
 const BYTES_PER_POINT: u64 = 13;
 
+/// Tetrahedra per point of tissue of a lattice that is split into five per cell.
+const TETS_PER_POINT: u64 = 5;
+
 /// Peak of the memory per tetrahedron of a scene, bytes. `cutis check` of the phantom took 33 with
 /// ChainMail, 79 with XPBD and 176 to 190 with vertex block descent, a membrane and materials, for
 /// 3.5 to 10.7 million tetrahedra, besides the lattice points.
@@ -29,6 +32,20 @@ pub(super) fn bytes_per_tet(scene: &Scene) -> u64 {
 /// Refuses a lattice of `points` points whose body cannot be found in the memory of this machine.
 pub(super) fn check_points(sections: &BodySections<'_>, points: usize) -> Result<(), Error> {
     refuse_above(available(), sections, points as u64 * BYTES_PER_POINT, &format!("{points} lattice points"))
+}
+
+/// Refuses a lattice with `points` points in tissue whose body is certainly too large, before the
+/// body is built. Pieces besides the largest one may be left out, so that only twice the memory is
+/// refused here. A scene with a region or a graded lattice is judged later.
+pub(super) fn check_tissue(sections: &BodySections<'_>, points: usize) -> Result<(), Error> {
+    let LatticeSection { region, grading, .. } = sections.lattice;
+    if region.is_some() || grading.is_some() {
+        return Ok(());
+    }
+    let tets = TETS_PER_POINT.saturating_mul(points as u64);
+    let needed = tets.saturating_mul(sections.bytes_per_tet);
+    let available = available().filter(|&available| needed / 2 > available);
+    refuse_above(available, sections, needed, &format!("about {tets} tetrahedra"))
 }
 
 /// Refuses a body of `tets` tetrahedra that cannot be simulated in the memory of this machine.
@@ -141,5 +158,21 @@ mod tests {
         }
         assert!(text.contains(&format!("use {:.2} or more", 2.0 * spacing)), "{text}");
         assert!(error.is_bad_input());
+    }
+
+    /// Far too much tissue is refused before the body is built, unless a region leaves most of it
+    /// out.
+    #[test]
+    fn far_too_much_tissue_is_refused_early() {
+        let mut loaded = crate::demo(&[]).unwrap();
+        let most = 1 << 50;
+        check_tissue(&BodySections::of(&loaded), most).unwrap();
+        loaded.scene.lattice.region = None;
+        let sections = BodySections::of(&loaded);
+        check_tissue(&sections, 1000).unwrap();
+        if available().is_some() {
+            let text = check_tissue(&sections, most).unwrap_err().to_string();
+            assert!(text.contains("tetrahedra take about") && text.contains("lattice.spacing_mm"), "{text}");
+        }
     }
 }

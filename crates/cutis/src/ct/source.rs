@@ -59,7 +59,8 @@ fn read(loaded: &LoadedScene) -> Result<Source, Error> {
     match (&section.path, &section.phantom) {
         (Some(path), _) => {
             let mut hash = Sha256::new();
-            let read = cutis_volume::read_observed(path, &section.options(), |_, bytes| hash.update(bytes))?;
+            let read = cutis_volume::read_observed(path, &section.options(), |_, bytes| hash.update(bytes))
+                .map_err(loaded.file().blame("volume.path"))?;
             let sha256 = files::hex(&hash.finalize());
             let input = Input { path: path.display().to_string(), sha256: sha256.clone() };
             let inputs = vec![scene_input, input];

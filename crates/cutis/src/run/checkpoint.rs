@@ -87,12 +87,14 @@ impl Checkpoint {
     pub(crate) fn read(path: &Path, fingerprint: &[u8; 32], vertices: usize) -> Result<Self, Error> {
         let fail = |why: String| Error::Checkpoint { path: path.into(), why };
         if !path.exists() {
-            return Err(fail("there is none; a run with run.checkpoint_every above 0 writes it".into()));
+            return Err(fail(
+                "there is no such file; a run with run.checkpoint_every above 0 writes it".into(),
+            ));
         }
         let bytes = files::read(path)?;
         let saved = Self::parse(path, &bytes)?;
         if bytes[8..40] != fingerprint[..] {
-            return Err(fail("scene, volume or program version differ from those that wrote it".into()));
+            return Err(fail("scene, volume or program version differ from those that wrote it; give the same --set as for the run".into()));
         }
         match saved.positions.len() == vertices {
             true => Ok(saved),

@@ -41,6 +41,8 @@ pub(super) fn report(
     let mut late = crossed_lips(loaded, body, &wounds);
     let border_mm = body.picked_region.and(border_displacement_mm);
     late.extend(narrow_region(border_mm, max_displacement_mm));
+    let wanted = loaded.scene.run.error;
+    late.extend(settling.as_ref().and_then(|rest| inexact_rest(rest.error, wanted)));
     warn(&mut plan, &late, clock.progress);
     let report = Report {
         schema: SCHEMA.into(),
@@ -90,10 +92,24 @@ pub(super) fn report(
 /// Displacement at the border of a region that was picked, over the largest one, above which it is
 /// reported. The error of the opening is about this share (`docs/results/region.md`).
 const NARROW: f64 = 0.05;
+/// Displacement below which nothing has moved, mm. Rounding alone moves tissue by less.
+const STILL_MM: f64 = 1e-3;
+
+/// Note about a state of rest that is less exact than the scene wants.
+fn inexact_rest(error: f64, wanted: f64) -> Option<String> {
+    (error > wanted).then(|| {
+        format!(
+            "the state of rest has an estimated error of {:.2} %, more than run.error = {} %: the search ended \
+             because the forces cancel to single precision",
+            100.0 * error,
+            100.0 * wanted
+        )
+    })
+}
 
 /// Warning about a region that the program picked and that holds the wounds back.
 fn narrow_region(border_mm: Option<f64>, most_mm: f64) -> Option<String> {
-    let border_mm = border_mm.filter(|&mm| mm > NARROW * most_mm)?;
+    let border_mm = border_mm.filter(|&mm| mm > NARROW * most_mm && most_mm > STILL_MM)?;
     Some(format!(
         "tissue at the border of the picked region moved by {border_mm:.2} mm, and the largest displacement is \
          {most_mm:.2} mm: the region holds the wounds back. Set lattice.region to a larger zone or to \"whole\""
@@ -183,14 +199,23 @@ fn crossed_lips(loaded: &LoadedScene, body: &Body, wounds: &[Wound]) -> Vec<Stri
 
 #[cfg(test)]
 mod tests {
-    use super::narrow_region;
+    use super::{inexact_rest, narrow_region};
 
     #[test]
     fn a_region_whose_border_moves_is_reported() {
         assert_eq!(narrow_region(None, 10.0), None);
         assert_eq!(narrow_region(Some(0.49), 10.0), None);
         assert_eq!(narrow_region(Some(0.0), 0.0), None);
+        // Where nothing moves, the displacements are those of rounding.
+        assert_eq!(narrow_region(Some(1e-6), 2e-6), None);
         let warning = narrow_region(Some(0.51), 10.0).unwrap();
         assert!(warning.contains("0.51 mm") && warning.contains("lattice.region"), "{warning}");
+    }
+
+    #[test]
+    fn a_rest_that_is_less_exact_than_wanted_is_reported() {
+        assert_eq!(inexact_rest(0.001, 0.001), None);
+        let note = inexact_rest(0.0032, 0.001).unwrap();
+        assert!(note.contains("0.32 %") && note.contains("run.error = 0.1 %"), "{note}");
     }
 }

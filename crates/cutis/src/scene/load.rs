@@ -151,17 +151,20 @@ impl Scene {
             why,
         })?;
         let mut scene: Scene = serde_path_to_error::deserialize(value.clone()).map_err(|e| {
-            let key = e.path().to_string();
-            let found = lookup(&value, &key).map(|v| shorten(&v.to_string())).unwrap_or_default();
-            Error::SceneKey {
-                file: file.into(),
-                key: shorten(&steps.name(&key)),
-                value: found,
-                why: nearest::with_suggestion(&first_chars(
-                    &e.inner().to_string().trim().replace('\n', " "),
-                    MAX_REASON,
-                )),
+            let (key, message) = (e.path().to_string(), e.inner().to_string().trim().replace('\n', " "));
+            let file = file.into();
+            if let Some(missing) = missing_key(&key, &message) {
+                let (value, why) = (String::new(), "is missing".into());
+                return Error::SceneKey { file, key: shorten(&steps.name(&missing)), value, why };
             }
+            let found = lookup(&value, &key).map(|v| shorten(&v.to_string())).unwrap_or_default();
+            // Steps are read before the rest of the scene.
+            let message = match key.contains('.') {
+                true => message,
+                false => message.replace("expected one of `model`", "expected one of `step`, `model`"),
+            };
+            let why = nearest::plain(&nearest::with_suggestion(&first_chars(&message, MAX_REASON)));
+            Error::SceneKey { file, key: shorten(&steps.name(&key)), value: found, why }
         })?;
         crate::model::fill_defaults(&mut scene);
         super::pick_region::fill(&mut scene);
@@ -182,6 +185,12 @@ impl Scene {
         }
         Ok(LoadedScene { scene, file: file.into(), text: text.into(), steps, notes })
     }
+}
+
+/// The key that a message of serde about the section `at` misses.
+fn missing_key(at: &str, message: &str) -> Option<String> {
+    let missing = message.strip_prefix("missing field `")?.split('`').next()?;
+    Some(if at == "." { missing.to_owned() } else { format!("{at}.{missing}") })
 }
 
 /// Sets the value of a dotted key and creates missing tables. Entries of lists are addressed by

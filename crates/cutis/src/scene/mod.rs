@@ -95,7 +95,8 @@ pub struct Scene {
     /// How long to run.
     #[serde(default)]
     pub run: RunSection,
-    /// The files to write. Left out: everything but the tissue mesh.
+    /// The files to write. Without the section: the deformed CT, the skin, the pictures and the
+    /// report.
     #[serde(default)]
     pub output: OutputSection,
 }

@@ -16,6 +16,32 @@ pub(crate) fn with_suggestion(message: &str) -> String {
     near.map_or_else(|| message.to_owned(), |near| format!("{message}; the nearest one is `{near}`"))
 }
 
+/// A message of serde in the words of people who do not know Rust.
+pub(crate) fn plain(message: &str) -> String {
+    const WORDS: [(&str, &str); 11] = [
+        ("expected u32", "expected a whole number from 0 to 4294967295"),
+        ("expected u64", "expected a whole number, 0 or more"),
+        ("expected usize", "expected a whole number, 0 or more"),
+        ("expected f32", "expected a number"),
+        ("expected f64", "expected a number"),
+        ("expected a boolean", "expected true or false"),
+        ("expected a sequence", "expected a list"),
+        ("expected a map", "expected a section"),
+        ("unknown variant", "unknown name"),
+        ("unknown field", "unknown key"),
+        ("missing field", "missing key"),
+    ];
+    let plain = WORDS.iter().fold(message.to_owned(), |text, (rust, plain)| text.replace(rust, plain));
+    // The names of structs mean nothing to a user.
+    match plain.split_once("expected struct ") {
+        Some((before, after)) => {
+            let rest = after.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_');
+            format!("{before}expected a section{rest}")
+        }
+        None => plain,
+    }
+}
+
 /// Number of letters to insert, remove or replace.
 fn distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(100).collect(), b.chars().take(100).collect());
@@ -53,5 +79,17 @@ mod tests {
         let message = "unknown field `spliit`, expected one of `spacing_mm`, `split`";
         assert!(with_suggestion(message).ends_with("`split`; the nearest one is `split`"));
         assert_eq!(with_suggestion("invalid type: `spliit`"), "invalid type: `spliit`");
+    }
+
+    #[test]
+    fn messages_have_no_words_of_rust() {
+        for (message, expected) in [
+            ("invalid type: string \"x\", expected f64", "invalid type: string \"x\", expected a number"),
+            ("expected struct OutputSection", "expected a section"),
+            ("expected struct A with 3 elements", "expected a section with 3 elements"),
+            ("missing field `volume`", "missing key `volume`"),
+        ] {
+            assert_eq!(plain(message), expected);
+        }
     }
 }

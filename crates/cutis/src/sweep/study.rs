@@ -173,7 +173,7 @@ impl StudySection {
             .map(toml::Value::Table)
             .map_err(|e| Error::StudyFile { file: file.into(), why: format!("not valid TOML: {e}") })?;
         serde_path_to_error::deserialize(value).map_err(|e| {
-            let why = nearest::with_suggestion(e.inner().to_string().trim());
+            let why = nearest::plain(&nearest::with_suggestion(e.inner().to_string().trim()));
             bad_key(file, &e.path().to_string(), "", &why)
         })
     }

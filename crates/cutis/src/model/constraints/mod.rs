@@ -93,6 +93,7 @@ impl Model for ConstraintModel {
             _ => 0,
         };
         let mut warnings = scene_warnings(scene);
+        warnings.extend((motionless == 0).then(|| NOTHING_FIXED.to_owned()));
         warnings.extend(self.warnings.iter().cloned());
         warnings.extend(unfinished_handles(scene));
         warnings.extend(unfinished_sutures(scene));
@@ -146,7 +147,7 @@ impl Model for ConstraintModel {
 fn left_out(scene: &Scene) -> Vec<String> {
     let absent = kinds::KINDS.iter().filter(|row| (row.section)(&scene.constraints).is_none());
     let mut lines: Vec<String> = absent
-        .map(|row| format!("{}: no {} constraints are stored or projected", row.key, row.facts.element))
+        .map(|row| format!("{}: left out, with one constraint per {}", row.key, row.facts.element))
         .collect();
     if scene.materials.is_none() {
         lines.push("materials: each kind has one modulus for all elements".to_owned());
@@ -159,6 +160,10 @@ fn left_out(scene: &Scene) -> Vec<String> {
     }
     lines
 }
+
+/// Warning about a body that nothing holds.
+const NOTHING_FIXED: &str = "no vertex is fixed: nothing holds the body in its place, and a search for its state of \
+                             rest may not end (section `fixed`)";
 
 /// Warnings about parts of the scene that do not have the effect that they seem to have.
 fn scene_warnings(scene: &Scene) -> Vec<String> {

@@ -17,7 +17,7 @@ use crate::scene::choice::OneOr;
 pub struct VolumeSection {
     /// A NIfTI file (`.nii`, `.nii.gz`, `.hdr`), an NRRD file (`.nrrd`, `.nhdr`), a MetaImage
     /// (`.mha`, `.mhd`), or a DICOM series: its folder, or one of its files. Relative to the scene
-    /// file.
+    /// file, and in `--set` to the present folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
     /// Number of the DICOM series to read, if the folder has several. `cutis inspect FOLDER` lists

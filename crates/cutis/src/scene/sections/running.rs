@@ -16,6 +16,8 @@ pub struct SolverSection {
     pub adapter: Option<String>,
     /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent. `vbd` has
     /// the materials of `xpbd`, and its state of rest is an equilibrium for any number of substeps.
+    /// `cutis scene new` writes `vbd`. `xpbd` needs many substeps for stiff skin: with too few, a
+    /// wound opens too far.
     pub formulation: Formulation,
     /// Duration of a frame, s.
     pub dt_s: f64,
