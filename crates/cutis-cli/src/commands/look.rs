@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cutis::mesh::{SkinMode, SkinReport, Split};
 use cutis::render::{Focus, Plane, Side, SliceView, View, raymarch, slice};
-use cutis::volume::{phantom::Phantom, sample::LatticeSize};
+use cutis::volume::{Volume, phantom::Phantom, sample::LatticeSize};
 use cutis::{Error, FolderInspection, Inspection, Progress, Series, SkinRequest};
 
 use super::pretty;
