@@ -161,7 +161,7 @@ fn contact_comes_with_sutures() {
     };
     let acts = |plan: &cutis::Plan| {
         let stored = plan.memory.iter().any(|part| part.part == "contact");
-        let left_out = plan.left_out.iter().any(|line| line.starts_with("contact: no lip"));
+        let left_out = plan.left_out.iter().any(|line| line.starts_with("contact: left out"));
         assert!(stored == (plan.sizes.lip_pairs > 0) && left_out != stored, "{:?}", plan.left_out);
         stored
     };

@@ -59,7 +59,7 @@ fn invalid_materials_are_refused() {
         ),
         (list(&["from_hu = -1024, shortest = 1, longest = 1, shear = -1"]), "[0].shear", &["-1", "0 to 16"]),
         (list(&[&format!("{first}, k_steps = nan")]), "[0].k_steps", &["NaN", "0 to 4096"]),
-        (list(&["from_hu = -1024, shortest = 1, longest = 1"]), "[0]", &["shear"]),
+        (list(&["from_hu = -1024, shortest = 1, longest = 1"]), "[0].shear", &["is missing"]),
         (list(&[&first, &format!("from_hu = 0, {soft}, k = 0.1")]), "[1].k", &["`k`", "k_steps"]),
         (
             list(&["from_hu = -1024, shortest = [1, 1], longest = 1, shear = 0"]),

@@ -162,7 +162,7 @@ fn a_slice_has_the_requested_window_and_position() {
     let soft = gray(&desk, "--slice axial@0 --window 40/400");
     let narrow = gray(&desk, "--slice axial@0 --window 400/40");
     assert!(soft > 0.15 && narrow < 0.05, "{soft} and {narrow} of the pixels are gray");
-    assert!(gray(&desk, "--slice sagittal@195") < 0.02, "beside the body there is air");
+    assert!(gray(&desk, "--slice sagittal@195") < 0.02, "next to the body there is air");
     let whole = gray(&desk, "--slice coronal@0");
     let close = gray(&desk, "--slice coronal@0 --focus 0,0,0 --zoom 60");
     assert!(close > whole + 0.1, "a close-up shows the inside: {whole} and {close}");
