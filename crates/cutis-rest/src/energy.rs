@@ -144,7 +144,8 @@ impl Body {
     /// The energy at `to` minus that at `from`, constraint by constraint, so that it is as accurate
     /// as its own size.
     pub(crate) fn difference(&self, from: &State, to: &State) -> f64 {
-        let part = |(part, (from, to)): (usize, (&Arc<[f64]>, &Arc<[f64]>))| -> f64 {
+        let part = |part: usize| -> f64 {
+            let (from, to) = (&from.values[part], &to.values[part]);
             let (mut sum, mut start) = (0.0, 0);
             for elements in &self.kinds {
                 let owned = elements.owned(part);
@@ -154,8 +155,7 @@ impl Body {
             }
             sum
         };
-        let parts = from.values.par_iter().zip(&to.values).enumerate();
-        let parts: Vec<f64> = parts.map(part).collect();
+        let parts: Vec<f64> = (0..from.values.len()).into_par_iter().map(part).collect();
         let work = |(weight, &v): (&Vector3<f64>, &u32)| weight.dot(&(to.x[v as usize] - from.x[v as usize]));
         parts.iter().sum::<f64>() - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
     }
