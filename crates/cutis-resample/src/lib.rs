@@ -57,6 +57,7 @@ mod inverted;
 mod labels;
 mod lanes;
 mod partial_volume;
+mod prepared;
 mod raster;
 mod report;
 mod resampler;
@@ -69,6 +70,7 @@ mod spans;
 mod tet_map;
 mod tile;
 mod tiling;
+mod wall_means;
 mod warp;
 
 pub use displacement::{Coverage, Displacement, Slab};

@@ -1,6 +1,6 @@
 //! Tetrahedra over the voxel grid. [`GROUP`] tets are prepared at once, in loops that vectorize.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use crate::lanes::{less, more};
 
@@ -132,6 +132,12 @@ impl Rasters {
                 self.by_k[corner][n] = -z[n] * per_column;
             }
         }
+        self.surround(corners, tolerance);
+    }
+
+    /// Finds only the boxes around the tets.
+    #[inline(always)]
+    pub fn surround(&mut self, [a, b, c, d]: &Corners, tolerance: f64) {
         for axis in 0..3 {
             let (a, b, c, d) = (&a[axis], &b[axis], &c[axis], &d[axis]);
             for n in 0..GROUP {
@@ -211,11 +217,6 @@ impl RestMaps {
         let (linear, offset) = self.map(lane);
         [0, 1, 2].map(|row| dot(linear[row], index) + offset[row])
     }
-}
-
-/// A group that has the same tet in all places.
-pub fn in_all_lanes(corners: &[Point3<f64>; 4]) -> Corners {
-    corners.map(|corner| [0, 1, 2].map(|axis| [corner[axis]; GROUP]))
 }
 
 impl TetRaster<'_> {
