@@ -75,7 +75,7 @@ REPORT_KEYS = {
     "stages": (),
     "frames": ("count", "ms_mean", "ms_min"),
     "wound": ("initial_mm", "final_mm", "mid_mm"),
-    "resample": ("covered_voxels", "folds"),
+    "resample": ("moved_voxels", "folds"),
     "residuals": (),
     "left_out": (),
     "warnings": (),

@@ -1,5 +1,7 @@
 //! Lists of the tets that touch each tile.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::tiling::{TileBox, Tiling};
@@ -7,17 +9,19 @@ use crate::tiling::{TileBox, Tiling};
 /// Number of tets in a chunk that is sorted independently.
 const CHUNK: usize = 1 << 16;
 
-/// The number of no tile.
-const NONE: u32 = u32::MAX;
-
-/// For each tile the tets that touch it, in ascending order. A counting sort of chunks with fixed
-/// sizes runs in parallel, so that the result does not depend on the number of threads.
+/// For each tile the tets that touch it, in ascending order.
+///
+/// Most tets touch one tile, which is also that of the tets next to them. So the lists hold runs of
+/// tets. A counting sort of chunks with fixed sizes runs in parallel, so that the result does not
+/// depend on the number of threads.
 pub struct Buckets {
     chunks: Vec<Chunk>,
 }
 
 struct Chunk {
-    order: Vec<u32>,
+    /// First tet and end of each run, sorted by tile.
+    runs: Vec<[u32; 2]>,
+    /// The first run of each tile, and the end.
     offsets: Vec<u32>,
 }
 
@@ -27,20 +31,17 @@ impl Buckets {
     pub fn new(count: usize, tiling: &Tiling, tiles_of: impl Fn(usize) -> Option<TileBox> + Sync) -> Self {
         let tiles = tiling.len();
         let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().filter_map(|chunk| {
-            let tets = chunk * CHUNK..count.min((chunk + 1) * CHUNK);
-            let mut offsets = vec![0_u32; tiles + 1];
-            // Most tets touch one tile, which the second pass need not find again.
-            let mut only = vec![NONE; tets.len()];
-            let mut several = Vec::new();
-            for (only, tet) in only.iter_mut().zip(tets.clone()) {
+            let mut found: Vec<(TileBox, [u32; 2])> = Vec::new();
+            for tet in chunk * CHUNK..count.min((chunk + 1) * CHUNK) {
                 let Some(touched) = tiles_of(tet) else { continue };
-                if let Some(tile) = tiling.only(&touched) {
-                    *only = tile as u32;
-                    offsets[tile + 1] += 1;
-                } else {
-                    tiling.each(&touched, |tile| offsets[tile + 1] += 1);
-                    several.push((tet, touched));
+                match found.last_mut() {
+                    Some((tiles, run)) if *tiles == touched && run[1] as usize == tet => run[1] += 1,
+                    _ => found.push((touched, [tet as u32, tet as u32 + 1])),
                 }
+            }
+            let mut offsets = vec![0_u32; tiles + 1];
+            for (touched, _) in &found {
+                tiling.each(touched, |tile| offsets[tile + 1] += 1);
             }
             for tile in 0..tiles {
                 offsets[tile + 1] += offsets[tile];
@@ -49,21 +50,14 @@ impl Buckets {
                 return None;
             }
             let mut next = offsets.clone();
-            let mut order = vec![0; offsets[tiles] as usize];
-            let mut several = several.into_iter().peekable();
-            for (&only, tet) in only.iter().zip(tets) {
-                let mut put = |tile: usize| {
-                    let slot = &mut next[tile];
-                    order[*slot as usize] = tet as u32;
-                    *slot += 1;
-                };
-                if only != NONE {
-                    put(only as usize);
-                } else if let Some((_, touched)) = several.next_if(|(of, _)| *of == tet) {
-                    tiling.each(&touched, put);
-                }
+            let mut runs = vec![[0; 2]; offsets[tiles] as usize];
+            for (touched, run) in &found {
+                tiling.each(touched, |tile| {
+                    runs[next[tile] as usize] = *run;
+                    next[tile] += 1;
+                });
             }
-            Some(Chunk { order, offsets })
+            Some(Chunk { runs, offsets })
         });
         Self { chunks: chunks.collect() }
     }
@@ -73,11 +67,11 @@ impl Buckets {
         self.chunks.iter().any(|chunk| chunk.offsets[tile] < chunk.offsets[tile + 1])
     }
 
-    /// The tets of a tile in ascending order.
-    pub fn tile(&self, tile: usize) -> impl Iterator<Item = u32> + '_ {
+    /// The tets of a tile in ascending order, as runs.
+    pub fn tile(&self, tile: usize) -> impl Iterator<Item = Range<u32>> + '_ {
         self.chunks.iter().flat_map(move |chunk| {
-            let range = chunk.offsets[tile] as usize..chunk.offsets[tile + 1] as usize;
-            chunk.order[range].iter().copied()
+            let runs = chunk.offsets[tile] as usize..chunk.offsets[tile + 1] as usize;
+            chunk.runs[runs].iter().map(|&[first, end]| first..end)
         })
     }
 }
@@ -99,12 +93,12 @@ mod tests {
             }
             let [low, high] = [slices.start, slices.end - 1].map(|tile| (TILE[2] * tile) as f64 + 7.0);
             let corners = [[1.0, 1.0, low], [2.0, 2.0, high]].map(|corner| tiling.near(corner, 0.0));
-            Some(TilesNear::around(&corners, &[0, 0, 1, 1]))
+            Some(TilesNear::around([0, 0, 1, 1].map(|n| corners[n])))
         });
         for tile in 0..7 {
             let expected: Vec<u32> =
                 (0..count).filter(|&tet| range(tet).contains(&tile)).map(|tet| tet as u32).collect();
-            assert!(buckets.tile(tile).eq(expected), "tile {tile}");
+            assert!(buckets.tile(tile).flatten().eq(expected), "tile {tile}");
         }
     }
 }

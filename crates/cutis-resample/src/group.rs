@@ -50,6 +50,20 @@ impl Group {
         self.faces.fill(&self.rasters, &self.spans, tolerance);
     }
 
+    /// Finds only the boxes of the tets with these vertices at these places.
+    #[inline(always)]
+    pub fn surround(
+        &mut self,
+        places: &[Point3<f64>],
+        tets: &[[u32; 4]; GROUP],
+        region: &[Range<usize>; 3],
+        tolerance: f64,
+    ) {
+        gather(places, tets, &mut self.corners);
+        self.rasters.surround(&self.corners, tolerance);
+        self.spans.fill(&self.rasters, region);
+    }
+
     /// Finds the maps of the tets to these places at rest.
     #[inline(always)]
     pub fn map_to(&mut self, rest: &[Point3<f64>], tets: &[[u32; 4]; GROUP]) {

@@ -41,7 +41,7 @@
 //! };
 //! let (warped, report) = resample(&volume, &warp, &|_done, _total| {})?;
 //! assert_eq!(warped.voxels()[1], volume.voxels()[0]);
-//! assert_eq!((report.covered_voxels, report.folds), (10, 0));
+//! assert_eq!((report.moved_voxels, report.folds), (10, 0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
@@ -56,6 +56,7 @@ mod group;
 mod inverted;
 mod labels;
 mod lanes;
+mod motion;
 mod partial_volume;
 mod prepared;
 mod raster;

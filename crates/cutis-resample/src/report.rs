@@ -7,13 +7,11 @@ use serde::Serialize;
 /// Counts of voxels and tets in one resampling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ResampleReport {
-    /// Voxels whose center is in a deformed tet.
-    pub covered_voxels: usize,
-    /// Covered voxels whose tet moved.
+    /// Voxels whose center is in a deformed tet that moved, and that this tet owns.
     pub moved_voxels: usize,
     /// Voxels of the rest shape that no deformed tet covers. They became air.
     pub vacated_voxels: usize,
-    /// Voxels whose center is strictly inside two or more deformed body tets.
+    /// Voxels whose center is strictly inside two or more deformed body tets, of which one moved.
     pub folds: usize,
     /// Tets of the whole mesh whose volume changed its sign or vanished.
     pub inverted_tets: usize,
@@ -24,7 +22,6 @@ impl Add for ResampleReport {
 
     fn add(self, other: Self) -> Self {
         Self {
-            covered_voxels: self.covered_voxels + other.covered_voxels,
             moved_voxels: self.moved_voxels + other.moved_voxels,
             vacated_voxels: self.vacated_voxels + other.vacated_voxels,
             folds: self.folds + other.folds,

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::buckets::Buckets;
 use crate::group::Group;
 use crate::inverted::inverted_tets;
+use crate::motion::Motion;
 use crate::report::ResampleReport;
 use crate::sample::Sampler;
 use crate::space::IndexSpace;
@@ -57,7 +58,7 @@ pub struct Resampler<'a> {
     tiling: Tiling,
     /// Continuous voxel indices of the vertices at rest.
     rest: Vec<Point3<f64>>,
-    /// Tets at rest.
+    /// The tets that touch each tile at rest.
     still: Buckets,
     /// Margin around the tets of `still`, in voxels.
     margin: f64,
@@ -154,14 +155,14 @@ impl<'a> Resampler<'a> {
             self.removed = buckets(&tiling, warp.removed, &self.rest, self.margin);
         }
         let places = space.indices(deformed);
-        let is_moved = warp.moved_tets();
-        let any_moved = is_moved.par_iter().any(|&moved| moved);
-        let near = if any_moved { tiles_near(&tiling, &places, space.tolerance) } else { Vec::new() };
-        let moved = Buckets::new(warp.tets.len(), &tiling, |tet| {
-            is_moved[tet].then(|| TilesNear::around(&near, &warp.tets[tet]))
+        let Motion { is_moved, strays } = Motion::new(&warp, &tiling, |vertex| {
+            let at_rest = tiling.near(self.rest[vertex].coords.into(), self.margin);
+            (at_rest, tiling.near(places[vertex].coords.into(), space.tolerance))
         });
-        let left = |tile| any_moved && self.still.tile(tile).any(|tet| is_moved[tet as usize]);
-        let touched = (0..tiling.len()).into_par_iter().map(|tile| moved.any(tile) || left(tile)).collect();
+        let any_moved = is_moved.par_iter().any(|&moved| moved);
+        let moves = |run: Range<u32>| is_moved[run.start as usize..run.end as usize].contains(&true);
+        let is_touched = |tile| any_moved && (strays.any(tile) || self.still.tile(tile).any(moves));
+        let touched = (0..tiling.len()).into_par_iter().map(is_touched).collect();
         let all = self.tolerance != Some(space.tolerance);
         let before = std::mem::replace(&mut self.touched, touched);
         let is_stale = |tile: usize| all || before[tile] || self.touched[tile];
@@ -191,20 +192,14 @@ impl<'a> Resampler<'a> {
                     source.copy(&region, &mut block.slices);
                     continue;
                 }
-                scratch.list(&source, &self.still, &moved, &self.removed, number);
-                // Without motion the tets are only counted.
-                let is_input = scratch.left.is_empty() && !moved.any(number);
-                if is_input {
+                scratch.list(&source, &self.still, &strays, &self.removed, number);
+                if scratch.left.is_empty() && !strays.any(number) {
                     source.copy(&region, &mut block.slices);
-                }
-                if scratch.tets.is_empty() && is_input {
                     block.reports[i] = ResampleReport::default();
                     continue;
                 }
-                f32::in_lanes(level, TileTask { scratch, source: &source, region, is_input });
-                if !is_input {
-                    scratch.tile.finish(grid.shape[0], &mut block.slices);
-                }
+                f32::in_lanes(level, TileTask { scratch, source: &source, region });
+                scratch.tile.finish(grid.shape[0], &mut block.slices);
                 block.reports[i] = scratch.tile.report();
             }
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
@@ -233,7 +228,9 @@ impl<'a> Resampler<'a> {
 /// The tets of each tile, with a margin around them.
 fn buckets(tiling: &Tiling, tets: &[[u32; 4]], places: &[Point3<f64>], margin: f64) -> Buckets {
     let near = if tets.is_empty() { Vec::new() } else { tiles_near(tiling, places, margin) };
-    Buckets::new(tets.len(), tiling, |tet| Some(TilesNear::around(&near, &tets[tet])))
+    Buckets::new(tets.len(), tiling, |tet| {
+        Some(TilesNear::around(tets[tet].map(|corner| near[corner as usize])))
+    })
 }
 
 /// The tiles around each of some places, with a margin.
@@ -278,9 +275,9 @@ fn blocks<'a>(tiling: &Tiling, values: &'a mut [i16], reports: &'a mut [Resample
 struct Scratch {
     tile: Tile,
     group: Group,
-    /// The tets that touch the tile now, in ascending order.
+    /// The tets that may touch the tile now, in ascending order.
     tets: Vec<u32>,
-    /// The tets that it holds at rest and that moved or were removed.
+    /// The tets that touch it at rest and that moved or were removed.
     left: Vec<[u32; 4]>,
 }
 
@@ -294,25 +291,26 @@ impl Scratch {
         &mut self,
         source: &Source<'_>,
         still: &Buckets,
-        moved: &Buckets,
+        strays: &Buckets,
         removed: &Buckets,
         tile: usize,
     ) {
         self.tets.clear();
         self.left.clear();
-        for tet in still.tile(tile) {
-            if source.moved[tet as usize] {
-                self.left.push(source.warp.tets[tet as usize]);
-            } else {
-                self.tets.push(tet);
-            }
+        for run in still.tile(tile) {
+            self.tets.extend(run.clone());
+            let all = run.start as usize..run.end as usize;
+            let moved = source.warp.tets[all.clone()].iter().zip(&source.moved[all]);
+            self.left.extend(moved.filter(|(_, moved)| **moved).map(|(tet, _)| tet));
         }
-        self.left.extend(removed.tile(tile).map(|tet| source.warp.removed[tet as usize]));
-        let unmoved = self.tets.len();
-        self.tets.extend(moved.tile(tile));
-        if unmoved > 0 && unmoved < self.tets.len() {
-            // Two ascending runs, which the stable sort merges.
+        for run in removed.tile(tile) {
+            self.left.extend(&source.warp.removed[run.start as usize..run.end as usize]);
+        }
+        if strays.any(tile) {
+            strays.tile(tile).for_each(|run| self.tets.extend(run));
+            // Two ascending runs, which the stable sort merges. A tet may be in both.
             self.tets.sort();
+            self.tets.dedup();
         }
     }
 }
@@ -322,21 +320,17 @@ struct TileTask<'a> {
     scratch: &'a mut Scratch,
     source: &'a Source<'a>,
     region: [Range<usize>; 3],
-    /// Whether the values of the tile are those of the input, and not needed.
-    is_input: bool,
 }
 
 impl LaneTask<f32> for TileTask<'_> {
     #[inline(always)]
     fn run<L: Lanes<f32>>(self) {
-        let Self { scratch: Scratch { tile, group, tets, left }, source, region, is_input } = self;
+        let Self { scratch: Scratch { tile, group, tets, left }, source, region } = self;
         tile.start(region);
-        if !is_input {
-            tile.read(source);
-        }
+        tile.read(source);
         tile.deform(source, group, tets);
         if !left.is_empty() && tile.find_open() {
-            left.retain(|&tet| tile.may_leave(source, tet));
+            tile.keep_open(source, group, left);
             tile.vacate(source, group, left);
         }
     }
@@ -398,7 +392,7 @@ mod tests {
             assert!(!inside || some.needed[tile], "voxel {n}");
         }
         assert!(needed > 0 && kept > 1000, "{needed} voxels needed, {kept} left as they were");
-        assert!(report.covered_voxels < whole.1.covered_voxels && report.covered_voxels > 0);
+        assert!(report.moved_voxels < whole.1.moved_voxels && report.moved_voxels > 0);
     }
 
     #[test]

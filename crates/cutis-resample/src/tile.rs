@@ -6,7 +6,6 @@ use nalgebra::Point3;
 
 use crate::clear_rows::ClearRows;
 use crate::group::Group;
-use crate::lanes::{floor, integer, less, more};
 use crate::raster::{Corners, GROUP, TetRaster};
 use crate::report::ResampleReport;
 use crate::rows::{HeldColumns, ROWS, Rows};
@@ -46,7 +45,6 @@ impl Source<'_> {
 
 /// One bit per column of a row of a tile.
 #[derive(Clone, Copy, Default)]
-#[repr(align(32))]
 struct Line {
     /// Voxels that a tet holds.
     inside: u64,
@@ -56,6 +54,8 @@ struct Line {
     once: u64,
     /// Voxels that two or more body tets hold strictly.
     twice: u64,
+    /// Voxels that a body tet that moved holds strictly.
+    by_moved: u64,
 }
 
 /// The same for what is rare.
@@ -216,6 +216,7 @@ impl Tile {
         if in_body {
             line.twice |= line.once & held.strict;
             line.once |= held.strict;
+            line.by_moved |= if moved { held.strict } else { 0 };
         }
         let own = held.inside & !line.inside;
         line.inside |= own;
@@ -266,7 +267,7 @@ impl Tile {
         [columns.start + column, rows.start + row % TILE[1], slices.start + row / TILE[1]]
     }
 
-    /// Finds the rows with voxels that no deformed tet covers, for [`Tile::may_leave`]. Returns
+    /// Finds the rows with voxels that no deformed tet covers, for [`Tile::keep_open`]. Returns
     /// whether there are any.
     pub fn find_open(&mut self) -> bool {
         let [columns, rows, slices] = self.region.clone().map(|range| range.len());
@@ -322,35 +323,40 @@ impl Tile {
         }
     }
 
-    /// Whether the box around a tet at rest has voxels that no deformed tet covers.
+    /// Keeps the tets whose boxes at rest have voxels that no deformed tet covers.
     #[inline(always)]
-    pub fn may_leave(&self, source: &Source<'_>, vertices: [u32; 4]) -> bool {
-        let mut spans = [(0, 0); 3];
-        let [a, b, c, d] = vertices;
-        let (a, b) = (&source.rest[a as usize], &source.rest[b as usize]);
-        let (c, d) = (&source.rest[c as usize], &source.rest[d as usize]);
-        for axis in 0..3 {
-            let (a, b, c, d) = (a[axis], b[axis], c[axis], d[axis]);
-            let region = &self.region[axis];
-            let low = more(less(less(a, b), less(c, d)) - source.tolerance, region.start as f64);
-            let high = less(more(more(a, b), more(c, d)) + source.tolerance, region.end as f64 - 1.0);
-            if low > high {
-                return false;
+    pub fn keep_open(&self, source: &Source<'_>, group: &mut Group, tets: &mut Vec<[u32; 4]>) {
+        let mut kept = 0;
+        for first in (0..tets.len()).step_by(GROUP) {
+            let mut vertices = [[0; 4]; GROUP];
+            let count = GROUP.min(tets.len() - first);
+            vertices[..count].copy_from_slice(&tets[first..][..count]);
+            group.surround(source.rest, &vertices, &self.region, source.tolerance);
+            for (n, &tet) in vertices[..count].iter().enumerate() {
+                if group.spans.of(n).is_some_and(|spans| self.is_open(spans)) {
+                    tets[kept] = tet;
+                    kept += 1;
+                }
             }
-            spans[axis] = (integer(floor(low)) as usize, integer(floor(high)) as usize + 1);
         }
-        let [columns, rows, slices] = spans;
+        tets.truncate(kept);
+    }
+
+    /// Whether a box has voxels that no deformed tet covers.
+    #[inline(always)]
+    fn is_open(&self, [columns, rows, slices]: [(usize, usize); 3]) -> bool {
         let bits = (u64::MAX >> (64 - (columns.1 - columns.0))) << (columns.0 - self.region[0].start);
         let (first_row, first_slice) = (self.region[1].start, self.region[2].start);
         let all = (u32::MAX >> (TILE[1] - (rows.1 - rows.0))) << (rows.0 - first_row);
-        let mut open = 0;
         for k in slices.0 - first_slice..slices.1 - first_slice {
             for j in columns_of(u64::from(self.open[k] & all)) {
                 let row = k * TILE[1] + j;
-                open |= bits & !(self.lines[row].inside | self.margins[row].near);
+                if bits & !(self.lines[row].inside | self.margins[row].near) != 0 {
+                    return true;
+                }
             }
         }
-        open != 0
+        false
     }
 
     /// The counts of this tile.
@@ -358,10 +364,9 @@ impl Tile {
         let mut report = ResampleReport::default();
         let count = |bits: u64| bits.count_ones() as usize;
         for (line, margin) in self.lines.iter().zip(&self.margins) {
-            report.covered_voxels += count(line.inside | margin.near);
             report.moved_voxels += count(line.moved);
             report.vacated_voxels += count(margin.vacated);
-            report.folds += count(line.twice);
+            report.folds += count(line.twice & line.by_moved);
         }
         report
     }

@@ -32,16 +32,21 @@ pub struct TilesNear([i32; 8]);
 impl TilesNear {
     /// The tiles of the box around the corners of a tet.
     #[inline(always)]
-    pub fn around(points: &[Self], tet: &[u32; 4]) -> TileBox {
-        let mut most = points[tet[0] as usize].0;
-        for &corner in &tet[1..] {
-            let corner = &points[corner as usize].0;
+    pub fn around(corners: [Self; 4]) -> TileBox {
+        let [Self(mut most), others @ ..] = corners;
+        for corner in others {
             for n in 0..8 {
-                most[n] = most[n].max(corner[n]);
+                most[n] = most[n].max(corner.0[n]);
             }
         }
         let [x, y, z, end_x, end_y, end_z, ..] = most;
         TileBox { first: [-x, -y, -z], end: [end_x + 1, end_y + 1, end_z + 1] }
+    }
+
+    /// Whether all of these tiles are among those around another point.
+    #[inline(always)]
+    pub fn is_within(&self, other: &Self) -> bool {
+        self.0.iter().zip(&other.0).all(|(own, other)| own <= other)
     }
 }
 
@@ -90,13 +95,6 @@ impl Tiling {
         TilesNear(tiles)
     }
 
-    /// The number of the tile of a box that has one tile.
-    #[inline(always)]
-    pub fn only(&self, tiles: &TileBox) -> Option<usize> {
-        let is_one = (0..3).all(|axis| tiles.end[axis] == tiles.first[axis] + 1);
-        is_one.then(|| self.number(tiles.first.map(|tile| tile as usize)))
-    }
-
     /// Calls `visit` with the number of each tile of a box.
     #[inline(always)]
     pub fn each(&self, tiles: &TileBox, mut visit: impl FnMut(usize)) {
@@ -140,7 +138,7 @@ mod tests {
         let touched = |low, high| {
             let mut found = Vec::new();
             let corners = [low, high].map(|corner| tiling.near(corner, 0.0));
-            tiling.each(&TilesNear::around(&corners, &[0, 1, 1, 0]), |tile| found.push(tile));
+            tiling.each(&TilesNear::around([0, 1, 1, 0].map(|n| corners[n])), |tile| found.push(tile));
             found
         };
         assert_eq!(touched([-3.0, 2.0, 2.0], [x - 0.1, y + 8.0, 2.0]), [0]);

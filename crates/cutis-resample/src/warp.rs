@@ -36,16 +36,6 @@ impl Warp<'_> {
         self.tets[tet].iter().any(|&v| self.rest[v as usize] != self.deformed[v as usize])
     }
 
-    /// For each tet whether a corner has moved by any amount.
-    pub(crate) fn moved_tets(&self) -> Vec<bool> {
-        let vertices: Vec<bool> =
-            self.rest.par_iter().zip(self.deformed).map(|(rest, deformed)| rest != deformed).collect();
-        let moved = |&[a, b, c, d]: &[u32; 4]| {
-            vertices[a as usize] | vertices[b as usize] | vertices[c as usize] | vertices[d as usize]
-        };
-        self.tets.par_iter().map(moved).collect()
-    }
-
     pub(crate) fn validate(&self) -> Result<(), ResampleError> {
         let vertices = self.rest.len();
         if vertices != self.deformed.len() {

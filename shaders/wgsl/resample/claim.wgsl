@@ -18,5 +18,8 @@ fn take(t: u32, tet: Tet, height: vec4f, voxel: u32) {
         if (atomicOr(&marks[voxel / 32u], bit) & bit) != 0u {
             atomicOr(&marks[plane() + voxel / 32u], bit);
         }
+        if has_moved(tets[t]) {
+            atomicOr(&marks[2u * plane() + voxel / 32u], bit);
+        }
     }
 }

@@ -10,7 +10,7 @@ fn clear(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) grou
     for (var voxel = id.x; voxel < slab.voxels; voxel += threads) {
         owners[voxel] = 0xffffffffu;
     }
-    for (var word = id.x; word < 3u * ((slab.voxels + 31u) / 32u); word += threads) {
+    for (var word = id.x; word < 4u * ((slab.voxels + 31u) / 32u); word += threads) {
         marks[word] = 0u;
     }
     for (var list = id.x; list < slab.lists; list += threads) {

@@ -16,8 +16,8 @@
 const NONE: u32 = 0xffffffffu;
 const NEAR: u32 = 0x80000000u;
 
-// Numbers of covered, moved, vacated and folded voxels.
-var<workgroup> counted: array<atomic<u32>, 4>;
+// Numbers of moved, vacated and folded voxels.
+var<workgroup> counted: array<atomic<u32>, 3>;
 
 fn mark(plane: u32, voxel: u32) -> u32 {
     return (marks[plane * ((slab.voxels + 31u) / 32u) + voxel / 32u] >> (voxel & 31u)) & 1u;
@@ -89,7 +89,6 @@ fn gather(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    var covered = 0u;
     var moved = 0u;
     var vacated = 0u;
     var folds = 0u;
@@ -115,7 +114,7 @@ fn gather(
                 if chunk.first != 0u {
                     continue;
                 }
-                let gone = mark(2u, voxel);
+                let gone = mark(3u, voxel);
                 value = select(voxel_at(input.x, input.y, input.z), grid.air, gone != 0u);
                 vacated += gone;
             } else {
@@ -123,12 +122,8 @@ fn gather(
                     continue;
                 }
                 let corners = tets[t];
-                covered += 1u;
-                folds += mark(1u, voxel);
-                if max(
-                    max(places[corners.x].w, places[corners.y].w),
-                    max(places[corners.z].w, places[corners.w].w),
-                ) > 0.0 {
+                folds += mark(1u, voxel) & mark(2u, voxel);
+                if has_moved(corners) {
                     moved += 1u;
                     value = trilinear(rest_place(corners, point, (owner & NEAR) == 0u));
                 } else {
@@ -140,12 +135,11 @@ fn gather(
         }
         values[pair] = word;
     }
-    atomicAdd(&counted[0], covered);
-    atomicAdd(&counted[1], moved);
-    atomicAdd(&counted[2], vacated);
-    atomicAdd(&counted[3], folds);
+    atomicAdd(&counted[0], moved);
+    atomicAdd(&counted[1], vacated);
+    atomicAdd(&counted[2], folds);
     workgroupBarrier();
-    if lane < 4u {
+    if lane < 3u {
         atomicAdd(&counters[slab.counts + lane], atomicLoad(&counted[lane]));
     }
 }

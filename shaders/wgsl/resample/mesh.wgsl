@@ -11,3 +11,11 @@ fn corners_of(vertices: vec4u) -> Corners {
         places[vertices.w].xyz,
     );
 }
+
+// True if a corner of the tet with these vertices has moved.
+fn has_moved(vertices: vec4u) -> bool {
+    return max(
+        max(places[vertices.x].w, places[vertices.y].w),
+        max(places[vertices.z].w, places[vertices.w].w),
+    ) > 0.0;
+}

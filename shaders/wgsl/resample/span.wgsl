@@ -56,14 +56,8 @@ fn widen(list: u32, span: u32) {
 fn span(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     for (var t = id.x; t < chunk.count; t += groups.x * 64u) {
         let vertices = tets[t];
-        let moved = vec4f(
-            places[vertices.x].w,
-            places[vertices.y].w,
-            places[vertices.z].w,
-            places[vertices.w].w,
-        );
         var left = 0u;
-        if any(moved > vec4f(0.0)) {
+        if has_moved(vertices) {
             left = span_of(rest_corners_of(vertices));
             if is_inverted(vertices) {
                 atomicAdd(&counters[0], 1u);

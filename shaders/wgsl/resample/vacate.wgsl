@@ -4,5 +4,5 @@ fn span_of(t: u32) -> u32 {
 }
 
 fn take(_t: u32, _tet: Tet, _height: vec4f, voxel: u32) {
-    atomicOr(&marks[2u * plane() + voxel / 32u], 1u << (voxel & 31u));
+    atomicOr(&marks[3u * plane() + voxel / 32u], 1u << (voxel & 31u));
 }

@@ -5,8 +5,8 @@
 // The source joined to this declares `take` and `span_of`, the slices of a tet.
 @group(0) @binding(0) var<uniform> grid: Grid;
 @group(0) @binding(1) var<uniform> slab: Slab;
-// Three bits per voxel, in planes of 32 voxels per word: strictly inside a tet of the body, inside
-// two of them, and left by the body.
+// Four bits per voxel, in planes of 32 voxels per word: strictly inside a tet of the body, inside
+// two of them, inside one that moved, and left by the body.
 @group(0) @binding(2) var<storage, read_write> marks: array<atomic<u32>>;
 // The lengths of the lists, then the present list: indices of tets in their chunk.
 @group(0) @binding(3) var<storage, read_write> large: array<atomic<u32>>;

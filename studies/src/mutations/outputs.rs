@@ -105,10 +105,10 @@ pub const OUTPUTS: &[Mutation] = &[
     ),
     mutation(
         Outputs,
-        "page: covered and vacated voxels are exchanged",
+        "page: moved and vacated voxels are exchanged",
         "crates/cutis/src/output/html/tables.rs",
-        "r.covered_voxels, r.vacated_voxels, r.folds",
-        "r.vacated_voxels, r.covered_voxels, r.folds",
+        "r.moved_voxels, r.vacated_voxels, r.folds",
+        "r.vacated_voxels, r.moved_voxels, r.folds",
     ),
     mutation(
         Outputs,
@@ -259,10 +259,10 @@ pub const OUTPUTS: &[Mutation] = &[
     ),
     mutation(
         Outputs,
-        "report: vacated voxels are counted as covered",
+        "report: vacated voxels are counted as moved",
         "crates/cutis/src/output/warp.rs",
-        "covered_voxels: report.covered_voxels as u64",
-        "covered_voxels: report.vacated_voxels as u64",
+        "moved_voxels: report.moved_voxels as u64",
+        "moved_voxels: report.vacated_voxels as u64",
     ),
     mutation(
         Outputs,

@@ -77,7 +77,7 @@ fn another_volume_can_be_resampled_with_the_checkpoint() {
     assert!(run.bytes("again.nii.gz") == run.bytes("deformed.nii.gz"));
     let chainmail = run.report.resample.as_ref().unwrap();
     assert_eq!(
-        (found.covered_voxels, found.vacated_voxels),
-        (chainmail.covered_voxels, chainmail.vacated_voxels)
+        (found.moved_voxels, found.vacated_voxels),
+        (chainmail.moved_voxels, chainmail.vacated_voxels)
     );
 }

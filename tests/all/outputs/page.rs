@@ -117,9 +117,9 @@ fn the_paragraph_on_the_ct_has_the_counts_in_order() {
     let paragraph = between(html(), "<h2>Resampled CT</h2><p>", "</p>");
     let count = |before: &str, after: &str| number(between(paragraph, before, after));
     let run = finished();
-    let covered = number(paragraph.split_once(" voxels inside the deformed body").unwrap().0);
-    assert_eq!(covered, run.number("/resample/covered_voxels"));
-    assert_eq!(count("body, ", " left as air"), run.number("/resample/vacated_voxels"));
+    let moved = number(paragraph.split_once(" voxels of the body moved").unwrap().0);
+    assert_eq!(moved, run.number("/resample/moved_voxels"));
+    assert_eq!(count("moved, ", " left as air"), run.number("/resample/vacated_voxels"));
     assert_eq!(count("air, ", " folds"), run.number("/resample/folds"));
 }
 

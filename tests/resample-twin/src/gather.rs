@@ -70,15 +70,15 @@ pub fn gather(mesh: &Mesh<'_>, slab: &Range<u32>, tets: &[[u32; 4]], volume: &Vo
         let [i, j, k]: [i32; 3] = std::array::from_fn(|n| point[n] as i32 + grid.center[n]);
         let owner = state.owners[voxel];
         let value = if owner == SlabState::NONE {
-            let gone = is_marked(state, 2, voxel);
-            state.counts[2] += u32::from(gone);
+            let gone = is_marked(state, 3, voxel);
+            state.counts[1] += u32::from(gone);
             if gone { grid.air } else { voxel_at(volume, i, j, k) }
         } else {
             let corners = tets[(owner & !SlabState::NEAR) as usize];
-            state.counts[0] += 1;
-            state.counts[3] += u32::from(is_marked(state, 1, voxel));
+            let is_fold = is_marked(state, 1, voxel) && is_marked(state, 2, voxel);
+            state.counts[2] += u32::from(is_fold);
             if mesh.has_moved(corners) {
-                state.counts[1] += 1;
+                state.counts[0] += 1;
                 trilinear(rest_place(mesh, corners, point, owner & SlabState::NEAR == 0), volume, grid)
             } else {
                 voxel_at(volume, i, j, k)

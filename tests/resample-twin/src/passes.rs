@@ -128,6 +128,7 @@ pub fn claim(
         if !touches_slab(span[0], slab) {
             continue;
         }
+        let has_moved = mesh.has_moved(corners);
         walk_rows(mesh.now(corners), mesh.grid, slab, |tet, height, voxel| {
             let holds = (0..4).all(|c| height[c] >= -tet.rounding[c]);
             let key = t as u32 | if holds { 0 } else { SlabState::NEAR };
@@ -136,6 +137,9 @@ pub fn claim(
                 let first_to_hold = mark(state, 0, voxel);
                 if !first_to_hold {
                     mark(state, 1, voxel);
+                }
+                if has_moved {
+                    mark(state, 2, voxel);
                 }
             }
         });
@@ -153,7 +157,7 @@ pub fn vacate(
     for (&corners, span) in tets.iter().zip(spans) {
         if touches_slab(span[1], slab) {
             walk_rows(mesh.at_rest(corners), mesh.grid, slab, |_, _, voxel| {
-                mark(state, 2, voxel);
+                mark(state, 3, voxel);
             });
         }
     }

@@ -225,7 +225,7 @@ pub(crate) fn resample(scene: &Path, change: &Change, request: ResampleRequest) 
     if report.folds > 0 {
         terminal.note(&format!("{} voxels are covered twice by the deformed body (folds)", report.folds));
     }
-    print(&format!("{}: {} voxels inside the deformed body", request.out.display(), report.covered_voxels));
+    print(&format!("{}: {} voxels of the body moved", request.out.display(), report.moved_voxels));
     Ok(())
 }
 

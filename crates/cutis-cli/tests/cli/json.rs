@@ -141,7 +141,7 @@ const REPORT_KEYS: [&str; 32] = [
     "wound.initial_mm",
     "wound.final_mm",
     "wound.mid_mm",
-    "resample.covered_voxels",
+    "resample.moved_voxels",
     "resample.folds",
     "residuals[]",
 ];

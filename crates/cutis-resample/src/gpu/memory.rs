@@ -15,8 +15,8 @@ const OWNER_BYTES: u64 = 128 << 20;
 /// A list of large tets has room for one of this many tets of a chunk, and for at least one. A
 /// large tet without room on the list is visited by a single thread.
 const TETS_PER_PLACE: usize = 8;
-/// Number of counters per slab: covered, moved, vacated and folded voxels.
-pub const COUNTS: usize = 4;
+/// Number of counters per slab: moved, vacated and folded voxels.
+pub const COUNTS: usize = 3;
 
 /// The reach of a chunk without tets.
 pub const NO_REACH: [u32; 2] = [u32::MAX, 0];

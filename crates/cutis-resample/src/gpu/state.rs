@@ -8,18 +8,19 @@ pub struct SlabState {
     /// Key of the tet that owns each voxel: its number, plus [`SlabState::NEAR`] if it only comes
     /// near the center. [`SlabState::NONE`] for no owner.
     pub owners: Vec<u32>,
-    /// Three planes with one bit per voxel, 32 voxels per word. The bits mean: held strictly by a
-    /// body tet, held strictly by two, covered at rest by a tet that moved or was removed.
+    /// Four planes with one bit per voxel, 32 voxels per word. The bits mean: held strictly by a
+    /// body tet, held strictly by two, held strictly by a body tet that moved, covered at rest by a
+    /// tet that moved or was removed.
     pub marks: Vec<u32>,
     /// Stored values.
     pub values: Vec<i16>,
-    /// Covered, moved, vacated and folded voxels.
-    pub counts: [u32; 4],
+    /// Moved, vacated and folded voxels.
+    pub counts: [u32; 3],
 }
 
 /// Number of words of `marks` for a number of voxels.
 pub fn mark_words(voxels: usize) -> usize {
-    3 * voxels.div_ceil(32)
+    4 * voxels.div_ceil(32)
 }
 
 impl SlabState {
@@ -35,7 +36,7 @@ impl SlabState {
             owners: vec![Self::NONE; voxels],
             marks: vec![0; mark_words(voxels)],
             values: vec![0; voxels],
-            counts: [0; 4],
+            counts: [0; 3],
         }
     }
 
@@ -46,7 +47,7 @@ impl SlabState {
 }
 
 /// A report with the numbers in `counts`.
-pub fn report(counts: &[u32; 4]) -> ResampleReport {
-    let [covered_voxels, moved_voxels, vacated_voxels, folds] = counts.map(|count| count as usize);
-    ResampleReport { covered_voxels, moved_voxels, vacated_voxels, folds, inverted_tets: 0 }
+pub fn report(counts: &[u32; 3]) -> ResampleReport {
+    let [moved_voxels, vacated_voxels, folds] = counts.map(|count| count as usize);
+    ResampleReport { moved_voxels, vacated_voxels, folds, inverted_tets: 0 }
 }

@@ -45,19 +45,17 @@ pub(super) fn write_field(
     let mut writer = VectorWriter::create(path, grid)?;
     let mut coverage: Vec<u8> = Vec::new();
     coverage.try_reserve_exact(grid.len()).map_err(|_| VolumeError::Shape { shape: grid.shape })?;
+    let mut moved_voxels = 0;
     field.for_each::<ResampleError>(
         &|done, total| progress.advance_of(done as u64, total as u64),
         |slab| {
+            moved_voxels += slab.vectors_mm.iter().filter(|&&vector| vector != [0.0; 3]).count() as u64;
             coverage.extend(slab.coverage.iter().map(|&of| of as u8));
             Ok(writer.push(&slab.vectors_mm)?)
         },
     )?;
     writer.finish()?;
-    let count = |of: Coverage| coverage.iter().filter(|&&value| value == of as u8).count() as u64;
-    let report = Resample {
-        covered_voxels: count(Coverage::Inside),
-        folds: 0,
-        vacated_voxels: count(Coverage::Vacated),
-    };
+    let vacated = coverage.iter().filter(|&&value| value == Coverage::Vacated as u8);
+    let report = Resample { moved_voxels, folds: 0, vacated_voxels: vacated.count() as u64 };
     Ok(WrittenField { report, coverage: LabelMap::new(*grid, coverage)? })
 }

@@ -331,8 +331,8 @@ pub struct Wound {
 /// The resampled CT.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Resample {
-    /// Voxels inside the deformed body.
-    pub covered_voxels: u64,
+    /// Voxels of the deformed body that moved.
+    pub moved_voxels: u64,
     /// Voxels inside two or more deformed tetrahedra: the body overlaps itself there.
     pub folds: u64,
     /// Voxels that became air because the body moved away or an incision removed it.

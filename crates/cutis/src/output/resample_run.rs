@@ -125,7 +125,7 @@ fn warped<const N: usize>(
     let advance = |done: usize, total: usize| progress.advance_of(done as u64, total as u64);
     let (warped, counts) = resample_labels(labels.grid(), values, [0; N], &warp.warp(), &advance)?;
     let report = Resample {
-        covered_voxels: counts.covered_voxels as u64,
+        moved_voxels: counts.moved_voxels as u64,
         folds: 0,
         vacated_voxels: counts.vacated_voxels as u64,
     };

@@ -158,7 +158,7 @@ impl BodyWarp {
 /// The counts for the report.
 fn counts(report: ResampleReport) -> Resample {
     Resample {
-        covered_voxels: report.covered_voxels as u64,
+        moved_voxels: report.moved_voxels as u64,
         folds: report.folds as u64,
         vacated_voxels: report.vacated_voxels as u64,
     }

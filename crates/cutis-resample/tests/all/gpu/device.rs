@@ -91,7 +91,6 @@ fn a_tet_with_a_position_that_is_not_finite_holds_no_voxel() {
         for broken in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let report = run(&mut resampler, broken);
             assert!(report.vacated_voxels > 0 && report.moved_voxels == 0, "{report:?}");
-            assert_eq!(report.covered_voxels + report.vacated_voxels, whole.covered_voxels);
         }
     });
 }

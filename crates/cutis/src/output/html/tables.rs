@@ -61,8 +61,8 @@ pub(super) fn tables(report: &Report) -> String {
     if let Some(r) = &report.resample {
         let _ = write!(
             out,
-            "<h2>Resampled CT</h2><p>{} voxels inside the deformed body, {} left as air, {} folds.</p>",
-            r.covered_voxels, r.vacated_voxels, r.folds
+            "<h2>Resampled CT</h2><p>{} voxels of the body moved, {} left as air, {} folds.</p>",
+            r.moved_voxels, r.vacated_voxels, r.folds
         );
     }
     // A wide table scrolls by itself. No text of a user holds these tags.
