@@ -7,6 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 use clap::Parser;
+use cutis::report::fixed;
 use serde_json::Value;
 
 use crate::kit::{
@@ -180,13 +181,14 @@ impl Row for Job {
 
     fn cells(&self) -> Vec<String> {
         let figure = |pointer: &str| self.with.figure(pointer);
+        let millimeters = |pointer: &str| fixed(figure(pointer), 2);
         let stages = self.with.report["stages"].as_array().into_iter().flatten();
         let total_ms: f64 = stages.filter_map(|stage| stage["ms"].as_f64()).sum();
         vec![
             self.name.into(),
             figure("/sizes/vertices").to_string(),
             figure("/sizes/tets").to_string(),
-            format!("{:.2} → {:.2}", figure("/wound/initial_mm"), figure("/wound/final_mm")),
+            format!("{} → {}", millimeters("/wound/initial_mm"), millimeters("/wound/final_mm")),
             format!("**{:.2}**", self.with.growth_mm()),
             format!("{:.2} %", 100.0 * self.with.change()),
             format!("{:.2}", self.without.growth_mm()),

@@ -51,8 +51,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "frames.csv: mean and middle of the opening are exchanged",
         "crates/cutis/src/run/frames.rs",
-        "gape.mean_mm, gape.mid_mm);",
-        "gape.mid_mm, gape.mean_mm);",
+        "fixed(gape.mean_mm, 4), fixed(gape.mid_mm, 4)",
+        "fixed(gape.mid_mm, 4), fixed(gape.mean_mm, 4)",
     ),
     mutation(
         Outputs,

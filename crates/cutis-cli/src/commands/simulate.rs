@@ -96,9 +96,7 @@ fn summary(report: &Report, out: &Path) -> String {
     lines.extend(report.rest.iter().map(|rest| rest.summary()));
     lines.extend(report.tension_summary());
     lines.extend(report.model_summary());
-    lines.extend(report.wounds.iter().map(|w| {
-        format!("wound: {:.2} mm -> {:.2} mm ({:.2} mm in the middle)", w.initial_mm, w.final_mm, w.mid_mm)
-    }));
+    lines.extend(report.wounds.iter().map(|wound| wound.summary()));
     lines.extend(report.sutures.iter().map(|suture| suture.summary()));
     lines.extend(report.handles.iter().map(|handle| handle.summary()));
     lines.push(format!("run folder: {}", out.display()));

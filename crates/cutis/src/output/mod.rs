@@ -3,6 +3,7 @@
 
 mod displacement;
 pub(crate) mod html;
+mod number;
 mod pictures;
 pub mod report;
 mod resample_run;

@@ -6,6 +6,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use crate::output::number::fixed;
+
 use crate::model::ScanTension;
 use crate::model::constraints::coloring::Coloring;
 use crate::model::constraints::kinds::report_name;
@@ -335,6 +337,15 @@ pub struct Resample {
     pub moved_voxels: u64,
     /// Voxels inside two or more deformed tetrahedra: the body overlaps itself there.
     pub folds: u64,
+impl Wound {
+    /// One line for people.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let [initial, last, mid] = [self.initial_mm, self.final_mm, self.mid_mm].map(|mm| fixed(mm, 2));
+        format!("wound: {initial} mm -> {last} mm ({mid} mm in the middle)")
+    }
+}
+
     /// Voxels that became air because the body moved away or an incision removed it.
     pub vacated_voxels: u64,
 }

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::number::fixed;
+
 /// How a state of rest was found (`run.until = "rest"`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RestReport {
@@ -63,7 +65,8 @@ impl StopReport {
         let done =
             if self.done.is_empty() { "before".into() } else { format!("after {}", self.done.join(", ")) };
         let list = |values: &[f64], unit: &str| {
-            let values: Vec<String> = values.iter().map(|value| format!("{value:.2} {unit}")).collect();
+            let values: Vec<String> =
+                values.iter().map(|&value| format!("{} {unit}", fixed(value, 2))).collect();
             values.join(", ")
         };
         let parts = [

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use cutis_mesh::WoundGape;
 
-use crate::output::report::Frames;
+use crate::output::report::{Frames, fixed};
 
 /// One line of `frames.csv`.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ pub(crate) fn frames_csv(rows: &[FrameRow]) -> String {
         };
         let _ = write!(out, "{},{},{ms}", row.frame, row.time_s);
         for gape in &row.gapes {
-            let _ = write!(out, ",{:.4},{:.4}", gape.mean_mm, gape.mid_mm);
+            let _ = write!(out, ",{},{}", fixed(gape.mean_mm, 4), fixed(gape.mid_mm, 4));
         }
         for [sum, largest] in &row.sutures {
             let _ = write!(out, ",{sum:.5},{largest:.5}");

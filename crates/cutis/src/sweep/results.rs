@@ -1,11 +1,25 @@
 //! The figures of a report that the table of a sweep has.
 
-use crate::report::Report;
+use crate::report::{Report, fixed};
 
 /// A figure: column, value, and whether it depends on the machine.
 pub(super) struct Figure {
     pub(super) column: String,
     pub(super) value: f64,
+}
+
+/// Decimals of a length in mm. Positions are less exact than that.
+const DECIMALS_OF_MM: usize = 6;
+
+impl Figure {
+    /// The value as a cell of the table.
+    pub(super) fn text(&self) -> String {
+        if !self.column.ends_with("_mm") {
+            return self.value.to_string();
+        }
+        let text = fixed(self.value, DECIMALS_OF_MM);
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    }
 }
 
 /// Columns that depend on the machine and its load. They are the last ones of the table.

@@ -77,7 +77,7 @@ impl Table {
             row.extend([state.name(), exit, error]);
             let value = |column: &String| {
                 let figure = found.iter().find(|figure| figure.column == *column);
-                figure.map(|figure| figure.value.to_string()).unwrap_or_default()
+                figure.map(Figure::text).unwrap_or_default()
             };
             row.extend(figures.iter().map(value));
             row.push(backend.clone());

@@ -34,6 +34,11 @@ function times(a, b) {
   return out;
 }
 
+// A number with a fixed count of decimals. One that rounds to zero has no sign.
+function fixed(value, decimals) {
+  return value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "");
+}
+
 // One, two or five times a power of ten that is at most a value above zero.
 function roundBelow(value) {
   const decade = 10 ** Math.floor(Math.log10(value));

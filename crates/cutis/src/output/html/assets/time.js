@@ -70,7 +70,7 @@ class Player {
     const { quantities } = this.data;
     const text = ({ title, name, unit }, n) => {
       const what = title.startsWith("Opening") ? `opening, ${name}` : `force, ${name}`;
-      return `${what}: ${values[n].toFixed(2)} ${unit}`;
+      return `${what}: ${fixed(values[n], 2)} ${unit}`;
     };
     return quantities.slice(0, 8).map(text).join(" · ");
   }
