@@ -70,7 +70,10 @@ fn the_report_states_the_error() {
     assert!(rest.error > 0.0 && rest.error <= 1e-3 && !rest.steps.is_empty(), "{rest:?}");
     assert_eq!(rest.steps.last().unwrap().error, Some(rest.error));
     let html = String::from_utf8(run.bytes("report.html")).unwrap();
-    assert!(html.contains("At rest, with an estimated") && html.contains("Search for the state of rest"));
+    assert!(
+        html.contains("The body is <b>at rest</b>, with an estimated error of")
+            && html.contains("Search for the state of rest")
+    );
     assert!(Run::of(&small(&[("run.frames", "2")])).report.rest.is_none());
 }
 

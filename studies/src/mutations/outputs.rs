@@ -58,8 +58,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "page: start and end of the opening are exchanged",
         "crates/cutis/src/output/html/summary.rs",
-        "from <b>{initial_mm:.2} mm</b> to <b>{final_mm:.2} mm</b>",
-        "from <b>{final_mm:.2} mm</b> to <b>{initial_mm:.2} mm</b>",
+        "[initial_mm, final_mm, mid_mm].map",
+        "[final_mm, initial_mm, mid_mm].map",
     ),
     mutation(
         Outputs,
@@ -93,8 +93,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "page: the opening in the middle is the mean",
         "crates/cutis/src/output/html/summary.rs",
-        "lips; {mid_mm:.2}",
-        "lips; {final_mm:.2}",
+        "[initial_mm, final_mm, mid_mm].map",
+        "[initial_mm, final_mm, final_mm].map",
     ),
     mutation(
         Outputs,
@@ -114,8 +114,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "page: root mean square and largest error are exchanged",
         "crates/cutis/src/output/html/tables.rs",
-        "            r.rms,\n            r.max\n",
-        "            r.max,\n            r.rms\n",
+        "[r.rms, r.max].map",
+        "[r.max, r.rms].map",
     ),
     mutation(
         Outputs,
@@ -345,8 +345,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "page: times of stages in the wrong unit",
         "crates/cutis/src/output/html/tables.rs",
-        "            stage.ms,",
-        "            stage.ms / 1e3,",
+        "fixed(stage.ms, 1)",
+        "fixed(stage.ms / 1e3, 1)",
     ),
     mutation(
         Outputs,

@@ -18,10 +18,31 @@ fn html() -> &'static str {
 }
 
 #[test]
-fn sentences_say_how_far_each_wound_opened() {
-    let sentences: Vec<&str> = html().split("<p>The wound opened from ").skip(1).collect();
-    assert_eq!(sentences.len(), 2);
-    for (n, sentence) in sentences.iter().enumerate() {
+fn the_heading_names_the_ct_and_the_scene_and_says_what_a_run_is_not() {
+    let header = between(html(), "<header>", "</header>");
+    assert!(header.starts_with("<h1>ct.nii.gz, scene body.toml</h1>"), "{header}");
+    let run = finished();
+    let seconds = number(between(header, " in ", " s. Finished"));
+    let ms: f64 = run.report["stages"].as_array().unwrap().iter().map(|s| s["ms"].as_f64().unwrap()).sum();
+    assert!(
+        seconds * 1e3 > ms - 51.0 && (seconds * 1e3 - run.number("/total_ms")).abs() < 51.0,
+        "{seconds} s"
+    );
+    let date = run.report["finished_at"].as_str().unwrap();
+    assert!(
+        header.contains(&format!("Finished at {} {} UTC.", &date[..10], &date[11..19])),
+        "{header}, {date}"
+    );
+    assert!(header.contains("<b>This is not a medical device.</b>"), "{header}");
+}
+
+#[test]
+fn the_first_paragraph_says_how_far_each_wound_opened() {
+    let first = between(html(), "</header>", "</p>").strip_prefix("<p class=\"result\">").unwrap();
+    let sentences: Vec<&str> = first.split(" opened from ").collect();
+    assert_eq!(sentences.len(), 3);
+    for (n, sentence) in sentences[1..].iter().enumerate() {
+        assert!(sentences[n].ends_with(&format!("Wound {} (incision[{n}])", n + 1)), "{first}");
         let (initial, rest) = sentence.strip_prefix("<b>").unwrap().split_once(" mm</b> to <b>").unwrap();
         let (last, rest) = rest.split_once(" mm</b> (mean distance of the lips; ").unwrap();
         let mid = rest.split_once(" mm in the middle)").unwrap().0;
@@ -31,11 +52,29 @@ fn sentences_say_how_far_each_wound_opened() {
         }
         assert!(number(last) > number(initial) + 0.5, "{sentence}");
     }
+    // A run with frames says how much it still moves.
+    assert!(first.contains(&format!("the state after {FRAMES} frames")), "{first}");
+    let change = (0..2).map(|wound| {
+        let mean = column(finished(), &format!("gape_{wound}_mean_mm"));
+        (mean[FRAMES] - mean[FRAMES - 1]).abs()
+    });
+    let shown = number(between(first, "in the last frame the opening changed by ", " mm"));
+    let expected = change.fold(0.0, f64::max);
+    assert!((shown - expected).abs() < 2e-4 && shown > 0.0, "{shown} mm, not {expected}");
+    let most = number(between(first, "largest displacement of tissue is ", " mm"));
+    assert!((most - finished().number("/max_displacement_mm")).abs() < 0.0051, "{most} mm");
 }
 
+/// Counts, times and memory come after the result and the pictures.
 #[test]
-fn the_first_sentence_has_the_counts_and_the_time() {
-    let first = between(html(), "<h1>Cutis run</h1><p>", "</p>");
+fn how_it_was_computed_comes_last_with_the_counts_and_the_time() {
+    let place = |text: &str| html().find(text).unwrap_or_else(|| panic!("no {text}"));
+    let order =
+        ["class=\"result\"", "id=\"view-title\"", "<h2>Pictures</h2>", "<h2>How it was computed</h2>"];
+    assert!(order.map(place).is_sorted());
+    let (early, late) = html().split_once("<h2>How it was computed</h2>").unwrap();
+    assert!(!early.contains(" vertices, ") && !early.contains("<h3>"), "counts before the result");
+    let first = between(late, "<p>", "</p>");
     let run = finished();
     for (key, unit) in [
         ("vertices", " vertices"),
@@ -54,7 +93,7 @@ fn the_first_sentence_has_the_counts_and_the_time() {
 
 /// Cells of the rows of a table under its heading.
 fn table(heading: &str) -> Vec<Vec<String>> {
-    let table = between(html(), &format!("<h2>{heading}</h2><div class=\"scroll\"><table>"), "</table>");
+    let table = between(html(), &format!("<h3>{heading}</h3><div class=\"scroll\"><table>"), "</table>");
     let row = |row: &str| {
         let cells = row.split("<td").skip(1);
         cells.map(|cell| between(cell, ">", "</td>").to_owned()).collect::<Vec<_>>()
@@ -70,11 +109,11 @@ fn tables_hold_the_figures_of_the_report() {
     assert_eq!(rows.len(), stages.len());
     for (row, stage) in rows.iter().zip(stages) {
         assert_eq!((row[0].as_str(), row[2].as_str()), (stage["name"].as_str().unwrap(), "cpu"));
-        let ms = number(row[1].strip_suffix(" ms").unwrap());
+        let ms = number(&row[1]);
         assert!((ms - stage["ms"].as_f64().unwrap()).abs() < 0.051, "{row:?}");
         let bytes = stage.get("peak_bytes").and_then(|bytes| bytes.as_f64());
         assert_eq!(bytes.is_some(), cfg!(target_os = "linux"));
-        let shown = row[3].strip_prefix("peak ").and_then(|cell| cell.strip_suffix(" MB")).map(number);
+        let shown = row.get(3).map(|cell| number(cell));
         assert!(
             shown.zip(bytes).is_none_or(|(mb, bytes)| bytes > 5e6 && (mb - bytes / 1e6).abs() < 0.51),
             "{row:?}"
@@ -90,8 +129,8 @@ fn tables_hold_the_figures_of_the_report() {
         assert_eq!(row[0], kind);
         assert_eq!(number(&row[1]), report["colors"][kind].as_f64().unwrap(), "{kind}: colors");
         for (cell, key) in [(&row[2], "rms"), (&row[3], "max")] {
-            let expected = residual[key].as_f64().unwrap();
-            assert!((number(cell) - expected).abs() <= 1e-3 * expected, "{kind}, {key}: {cell}");
+            let expected = 100.0 * residual[key].as_f64().unwrap();
+            assert!((number(cell) - expected).abs() <= 1e-3 * expected, "{kind}, {key}: {cell} %");
         }
     }
 
@@ -101,20 +140,42 @@ fn tables_hold_the_figures_of_the_report() {
     for (row, part) in rows.iter().zip(parts) {
         assert_eq!(row[0], part["part"].as_str().unwrap());
         let bytes = part["host_bytes"].as_f64().unwrap();
-        let shown = row[1].strip_suffix(" MB").map_or(0.0, number);
+        // No column for a GPU, on which nothing is.
+        assert_eq!(row.len(), 3, "{row:?}");
+        let shown = if row[1].is_empty() { 0.0 } else { number(&row[1]) };
         assert!((shown - bytes / 1e6).abs() < 0.051, "{row:?}: {bytes} bytes");
-        assert_eq!(row[2], "", "nothing is on a GPU");
         let ms = part["ms_per_frame"].as_f64();
-        assert_eq!(row[3].strip_suffix(" ms").map(|_| ()), ms.map(|_| ()), "{row:?}");
+        assert_eq!(row[2].is_empty(), ms.is_none(), "{row:?}");
         if let Some(ms) = ms {
-            assert!((number(row[3].strip_suffix(" ms").unwrap()) - ms).abs() < 0.0051, "{row:?}: {ms} ms");
+            assert!((number(&row[2]) - ms).abs() < 0.0051, "{row:?}: {ms} ms");
+        }
+    }
+}
+
+/// No table has a column without a value, and each number has a unit in its title or is a count.
+#[test]
+fn every_column_has_values_and_every_quantity_a_unit() {
+    const WITHOUT_UNIT: [&str; 8] = ["stage", "on", "kind", "colors", "part", "section", "what", "after"];
+    let tables: Vec<&str> =
+        html().split("<table>").skip(1).map(|rest| rest.split("</table>").next().unwrap()).collect();
+    assert!(tables.len() >= 4, "{} tables", tables.len());
+    for table in tables {
+        let cells = |row: &str, tag: &str| -> Vec<String> {
+            row.split(tag).skip(1).map(|cell| between(cell, ">", "<").to_owned()).collect()
+        };
+        let titles = cells(table, "<th");
+        let rows: Vec<Vec<String>> = table.split("<tr>").skip(2).map(|row| cells(row, "<td")).collect();
+        for (column, title) in titles.iter().enumerate() {
+            assert!(rows.iter().any(|row| !row[column].is_empty()), "{title} is empty");
+            let has_unit = [", ms", ", MB", ", s", ", %"].iter().any(|unit| title.contains(unit));
+            assert!(has_unit || WITHOUT_UNIT.contains(&title.as_str()), "{title} has no unit");
         }
     }
 }
 
 #[test]
 fn the_paragraph_on_the_ct_has_the_counts_in_order() {
-    let paragraph = between(html(), "<h2>Resampled CT</h2><p>", "</p>");
+    let paragraph = between(html(), "<h3>Resampled CT</h3><p>", "</p>");
     let count = |before: &str, after: &str| number(between(paragraph, before, after));
     let run = finished();
     let moved = number(paragraph.split_once(" voxels of the body moved").unwrap().0);
@@ -126,7 +187,7 @@ fn the_paragraph_on_the_ct_has_the_counts_in_order() {
 #[test]
 fn lists_and_the_scene_are_shown_in_full() {
     let report = &finished().report;
-    let list = between(html(), "<h2>Left out by the scene</h2><ul>", "</ul>");
+    let list = between(html(), "<h3>Left out by the scene</h3><ul>", "</ul>");
     let left_out = report["left_out"].as_array().unwrap();
     assert_eq!(list.matches("<li>").count(), left_out.len());
     assert!(left_out.iter().all(|line| list.contains(line.as_str().unwrap())), "{list}");

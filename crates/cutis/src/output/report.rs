@@ -27,6 +27,13 @@ pub struct Report {
     pub schema: String,
     /// Version of this program.
     pub cutis_version: String,
+    /// End of the run in UTC, in the form of RFC 3339: `2026-11-27T01:12:03Z`. Empty in a report of
+    /// an earlier version.
+    #[serde(default)]
+    pub finished_at: String,
+    /// Wall time of the run up to its report, ms. 0 in a report of an earlier version.
+    #[serde(default)]
+    pub total_ms: f64,
     /// Machine that ran the scene.
     pub machine: Machine,
     /// Files that the run read.
@@ -330,13 +337,6 @@ pub struct Wound {
     pub initial_mid_mm: f64,
 }
 
-/// The resampled CT.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-pub struct Resample {
-    /// Voxels of the deformed body that moved.
-    pub moved_voxels: u64,
-    /// Voxels inside two or more deformed tetrahedra: the body overlaps itself there.
-    pub folds: u64,
 impl Wound {
     /// One line for people.
     #[must_use]
@@ -346,6 +346,13 @@ impl Wound {
     }
 }
 
+/// The resampled CT.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Resample {
+    /// Voxels of the deformed body that moved.
+    pub moved_voxels: u64,
+    /// Voxels inside two or more deformed tetrahedra: the body overlaps itself there.
+    pub folds: u64,
     /// Voxels that became air because the body moved away or an incision removed it.
     pub vacated_voxels: u64,
 }

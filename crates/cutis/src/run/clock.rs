@@ -11,11 +11,17 @@ use crate::{Error, Progress};
 pub(crate) struct Clock<'a> {
     pub(crate) progress: &'a dyn Progress,
     pub(crate) stages: Vec<Stage>,
+    start: Instant,
 }
 
 impl<'a> Clock<'a> {
     pub(crate) fn new(progress: &'a dyn Progress) -> Self {
-        Self { progress, stages: Vec::new() }
+        Self { progress, stages: Vec::new(), start: Instant::now() }
+    }
+
+    /// Wall time since the clock was made, ms.
+    pub(crate) fn total_ms(&self) -> f64 {
+        self.start.elapsed().as_secs_f64() * 1e3
     }
 
     /// Runs one stage of `total` units (0: unknown) on the CPU.

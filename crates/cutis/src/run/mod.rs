@@ -7,6 +7,7 @@
 
 pub(crate) mod checkpoint;
 pub(crate) mod clock;
+mod date;
 pub(crate) mod files;
 pub(crate) mod frames;
 mod history;

@@ -3,6 +3,7 @@
 use cutis_mesh::{Slit, WoundGape};
 
 use super::clock::Clock;
+use super::date::utc_now;
 use super::files;
 use super::frames::{FrameRow, frame_times, frames_csv};
 use super::simulate::{Setup, Simulated, warn};
@@ -47,6 +48,8 @@ pub(super) fn report(
     let report = Report {
         schema: SCHEMA.into(),
         cutis_version: env!("CARGO_PKG_VERSION").into(),
+        finished_at: utc_now(),
+        total_ms: clock.total_ms(),
         machine: Machine::here(),
         inputs: source.inputs.clone(),
         scene: loaded.scene.clone(),

@@ -8,6 +8,7 @@ mod data;
 mod page;
 mod plots;
 mod summary;
+mod table;
 mod tables;
 pub(crate) mod text;
 
@@ -62,18 +63,16 @@ pub(crate) fn write(
 ) -> Result<(), Error> {
     let rows = plots::shown_rows(shown.rows);
     let quantities = shown.rows.first().map(Quantity::of).unwrap_or_default();
-    let mut plots = plots::over_time(&quantities, &rows);
-    let has_time = !plots.is_empty();
-    plots.extend(report.rest.as_ref().and_then(plots::search));
     let page = Page {
         report,
         figures: shown.figures,
         slices: shown.slices,
-        plots: &plots,
-        has_time,
+        rows: shown.rows,
+        over_time: &plots::over_time(&quantities, &rows),
+        search: report.rest.as_ref().and_then(plots::search),
         has_view: recorder.is_some(),
         resumed: recorder.as_ref().and_then(|recorder| recorder.resumed),
-        scene: &toml::to_string_pretty(&report.scene).unwrap_or_else(|e| e.to_string()),
+        scene: &toml::to_string(&report.scene).unwrap_or_else(|e| e.to_string()),
     };
     let data = |bytes: usize| {
         recorder.map_or_else(String::new, |recorder| {

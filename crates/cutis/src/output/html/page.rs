@@ -9,11 +9,12 @@ use cutis_render::Plane;
 use sha2::{Digest, Sha256};
 
 use super::Figure;
-use super::summary::summary;
-use super::tables::tables;
+use super::summary;
+use super::tables;
 use super::text::{escape, items};
 use crate::output::report::Report;
 use crate::output::slices::SlicePair;
+use crate::run::frames::FrameRow;
 
 const STYLE: &str = include_str!("assets/page.css");
 
@@ -37,9 +38,11 @@ pub(super) struct Page<'a> {
     pub(super) report: &'a Report,
     pub(super) figures: &'a [Figure],
     pub(super) slices: &'a [SlicePair],
-    pub(super) plots: &'a [String],
-    /// Whether there are plots over time.
-    pub(super) has_time: bool,
+    pub(super) rows: &'a [FrameRow],
+    /// Plots over time.
+    pub(super) over_time: &'a [String],
+    /// A plot of the search for rest.
+    pub(super) search: Option<String>,
     /// Whether the page has data for the view.
     pub(super) has_view: bool,
     /// The frame from which the run resumed.
@@ -63,10 +66,11 @@ impl Page<'_> {
             "<title>{}</title>\n<style>{STYLE}</style></head>\n<body><main>",
             escape(&title(report))
         ));
-        put("<h1>Cutis run</h1>");
-        put(&summary(report));
+        put(&summary::heading(report));
+        put(&summary::result(report, self.rows));
         if !report.warnings.is_empty() {
-            put(&format!("<div class=\"warn\"><b>Note</b><ul>{}</ul></div>", items(&report.warnings)));
+            let notes = items(&report.warnings);
+            put(&format!("<div class=\"warn\"><b>Notes on this result</b><ul>{notes}</ul></div>"));
         }
         if self.has_view {
             put(VIEW);
@@ -74,10 +78,15 @@ impl Page<'_> {
         }
         put(&slices(self.slices));
         put(&pictures(self.figures));
-        put(&self.plots());
-        put(&tables(report));
+        put(&plots("<h2>Over time</h2>", self.over_time));
+        put(&tables::history(report));
+        put(&tables::materials(&report.materials));
+        put("<h2>How it was computed</h2>");
+        put(&summary::computation(report));
+        put(&plots("", self.search.as_slice()));
+        put(&tables::computation(report));
         if !report.left_out.is_empty() {
-            put(&format!("<h2>Left out by the scene</h2><ul>{}</ul>", items(&report.left_out)));
+            put(&format!("<h3>Left out by the scene</h3><ul>{}</ul>", items(&report.left_out)));
         }
         put(&format!("<h2>Scene as it ran</h2><pre tabindex=\"0\">{}</pre></main>\n", scene(self.scene)));
         out.push_str(&data(out.len() + script.len()));
@@ -102,17 +111,15 @@ impl Page<'_> {
         }
         out
     }
+}
 
-    fn plots(&self) -> String {
-        let mut out = String::new();
-        if self.has_time {
-            out.push_str("<h2>Over time</h2>");
-        }
-        for plot in self.plots {
-            let _ = write!(out, "<figure class=\"plot\">{plot}</figure>");
-        }
-        out
+/// Plots next to each other under a heading; nothing without plots.
+fn plots(heading: &str, plots: &[String]) -> String {
+    if plots.is_empty() {
+        return String::new();
     }
+    let figure = |plot: &String| format!("<figure class=\"plot\">{plot}</figure>");
+    format!("{heading}<div class=\"plots\">{}</div>", plots.iter().map(figure).collect::<String>())
 }
 
 /// The policy of the page: nothing is loaded, and only this style and this script are used.
@@ -153,9 +160,10 @@ fn pictures(figures: &[Figure]) -> String {
     if figures.is_empty() {
         return String::new();
     }
-    let mut out = String::from("<h2>Pictures</h2><div class=\"pair\">");
-    for Figure { caption, wide, png, small, .. } in figures {
-        let class = if *wide { "wide" } else { "half" };
+    let mut out = String::from("<h2>Pictures</h2><div class=\"pictures\">");
+    let (wide, narrow): (Vec<_>, Vec<_>) = figures.iter().partition(|figure| figure.wide);
+    for Figure { caption, wide, png, small, .. } in narrow.into_iter().chain(wide) {
+        let class = if *wide { "wide" } else { "narrow" };
         let (image, caption) = (image(small.as_ref().unwrap_or(png), caption), escape(caption));
         let _ = write!(out, "<figure class=\"{class}\">{image}<figcaption>{caption}</figcaption></figure>");
     }

@@ -109,7 +109,7 @@ pub(super) fn search(rest: &RestReport) -> Option<String> {
     let curves = [("forces left, of all forces", forces), ("estimated distance from rest", errors)];
     let series: Vec<Series<'_>> =
         curves.iter().map(|(name, points)| Series { name, points, mark: Mark::Dots }).collect();
-    let [x, y] = [("multigrid cycles", Scale::Linear), ("share", Scale::Log)];
+    let [x, y] = [("multigrid cycles", Scale::Linear), ("share (no unit)", Scale::Log)];
     let axis = |(label, scale)| Axis { label, scale };
     (!rest.steps.is_empty()).then(|| line_chart("Search for the state of rest", axis(x), axis(y), &series))
 }
