@@ -59,6 +59,10 @@ fn a_layer_thinner_than_the_lattice_step_causes_a_warning() {
     thick[0].depth_mm = Some([0.0, 12.0]);
     thick[3].depth_mm = Some([12.0, 31.0]);
     assert!(warning(&thick).is_none());
+    // The presets are meant for lattices that are coarser than skin.
+    let preset = cutis::check(&small(&[], &[("materials", "\"layered\"")]), &Silent).unwrap();
+    assert!(!preset.warnings.iter().any(|warning| warning.contains("thinner than the lattice step")));
+    assert!(preset.materials.iter().any(|row| row.name == "skin"));
 }
 
 /// Every preset holds all of the phantom and of real scans, and its table is reported with sources.

@@ -200,7 +200,8 @@ fn off_skin(slits: &[Slit]) -> Vec<String> {
         (length - on_skin > OFF_SKIN * length).then(|| {
             format!(
                 "incision[{}] has no skin along {:.0} of its {length:.0} mm: it leaves the scan, or passes over \
-                 a gap in the skin, and cuts nothing there",
+                 a gap in the skin, and cuts nothing there. Move the ends of the incision onto the skin of the \
+                 scan",
                 slits[0].incision(),
                 length - on_skin
             )
@@ -220,7 +221,8 @@ fn free_pieces(pieces_ml: &[f64]) -> Option<String> {
     let all: Vec<String> = pieces_ml.iter().map(|ml| format!("{ml:.2}")).collect();
     (!all.is_empty()).then(|| {
         format!(
-            "the cuts separate {} pieces from the body, of {} ml: no tissue holds them in their place",
+            "the cuts separate {} pieces from the body, of {} ml: no tissue holds them in their place. Leave \
+             tissue between the cuts, or take a piece out with [[excision]]",
             all.len(),
             all.join(", ")
         )
@@ -233,7 +235,7 @@ fn dropped_tets(mesh: &TetMesh) -> Option<String> {
     (mesh.dropped_tets > 0).then(|| {
         format!(
             "{} of {} tissue tetrahedra lie apart from the largest part and were left out \
-             (tissue.keep = \"largest\")",
+             (tissue.keep = \"largest\"). Set tissue.keep = \"all\" if they belong to the body",
             mesh.dropped_tets,
             mesh.dropped_tets + mesh.tets.len() + inactive
         )

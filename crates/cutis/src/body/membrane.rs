@@ -118,7 +118,8 @@ fn facet_normals(field: &SkinField) -> Option<String> {
     (rough as f64 > MANY_FACET_NORMALS * all as f64).then(|| {
         format!(
             "{rough} of {all} skin triangles have the mean normal of the lattice facets around them, because \
-             the CT gives none there: tissue is thinner than about four lattice steps"
+             the CT gives none there: tissue is thinner than about four lattice steps. Set lattice.spacing_mm to less, so that \
+             lines follow the skin there"
         )
     })
 }

@@ -145,7 +145,8 @@ fn narrow_incisions(incisions: &[IncisionSection], body: &Body) -> Vec<String> {
     let narrow = all.filter_map(width).filter(|(_, width)| *width < 0.95 * step).map(|(n, width)| {
         format!(
             "incision[{n}].width_mm = {width} is less than the lattice step of {step:.2} mm: the lips begin \
-             about one to two steps apart; without width_mm they begin closed"
+             about one to two steps apart. Leave width_mm out, so that they begin closed, or set \
+             lattice.spacing_mm to {width} or less"
         )
     });
     narrow.collect()

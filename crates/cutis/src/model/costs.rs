@@ -55,7 +55,7 @@ pub(super) fn unfinished_handles(scene: &Scene) -> impl Iterator<Item = String> 
         let begins = if at_s > 0.0 { format!("it begins at {at_s} s, ") } else { String::new() };
         format!(
             "handle[{n}] comes {share:.3} % of its way: {begins}its over_s is {over_s} s, and the frames take \
-             {run_s} s"
+             {run_s} s. Set run.frames to more"
         )
     })
 }
@@ -72,7 +72,9 @@ pub(super) fn unfinished_cuts(scene: &Scene, cuts: &GrowingCuts) -> Vec<String> 
     let unfinished = blades.filter(|((_, reached), length)| reached < length);
     let line = |((name, reached), length): ((String, f64), f64)| {
         let [reached, length] = [reached, length].map(|m| m * 1000.0);
-        format!("{name} comes {reached:.1} of {length:.1} mm far in the frames of this run")
+        format!(
+            "{name} comes {reached:.1} of {length:.1} mm far in the frames of this run. Set run.frames to more"
+        )
     };
     unfinished.map(line).collect()
 }
@@ -83,7 +85,7 @@ pub(super) fn unfinished_sutures(scene: &Scene) -> impl Iterator<Item = String> 
     let sutures = scene.suture.iter().enumerate();
     sutures.filter(move |(_, suture)| suture.at_s + suture.tighten_s > last_s).map(move |(n, suture)| {
         let tight_s = suture.at_s + suture.tighten_s;
-        format!("suture[{n}] is tight at {tight_s} s only, and the last frame begins at {last_s:.3} s")
+        format!("suture[{n}] is tight at {tight_s} s only, and the last frame begins at {last_s:.3} s. Set run.frames to more")
     })
 }
 

@@ -103,7 +103,8 @@ fn inexact_rest(error: f64, wanted: f64) -> Option<String> {
     (error > wanted).then(|| {
         format!(
             "the state of rest has an estimated error of {:.2} %, more than run.error = {} %: the search ended \
-             because the forces cancel to single precision",
+             because the forces cancel to single precision. Take that error as the accuracy of this result: a \
+             smaller run.error does not help",
             100.0 * error,
             100.0 * wanted
         )
@@ -193,7 +194,8 @@ fn crossed_lips(loaded: &LoadedScene, body: &Body, wounds: &[Wound]) -> Vec<Stri
         }
         (depth > 0.0).then(|| {
             format!(
-                "the lips of {section} have passed through each other, by {depth:.2} mm: there is no contact"
+                "the lips of {section} have passed through each other, by {depth:.2} mm: there is no contact. \
+                 Leave width_mm out and set constraints.contact, or move them less"
             )
         })
     };
