@@ -1,33 +1,36 @@
 //! Text, boxes and lines on an [`Image`].
 
-use crate::font;
+use std::collections::BTreeMap;
+
+use crate::font::Line;
 use crate::image::{Image, Rgb};
+
+/// Opacity of the dark rim around letters.
+const RIM: f32 = 0.6;
 
 /// Width of a text in pixels.
 pub fn text_width(text: &str, scale: usize) -> usize {
-    (text.chars().count() * font::ADVANCE).saturating_sub(1) * scale
+    Line::new(text, scale).width
 }
 
 impl Image {
-    /// Draws a text with a dark rim. Its top left corner is at `(x, y)`, and a font pixel has
-    /// `scale` picture pixels.
+    /// Draws a text with a dark rim, so that it can be read on any background. Its top left corner
+    /// is at `(x, y)`, and capital letters are `font::HEIGHT · scale` pixels high.
     pub(crate) fn text(&mut self, x: usize, y: usize, text: &str, scale: usize, color: Rgb) {
-        let rim = scale.div_ceil(2);
-        for (grow, color, opacity) in [(rim, [0, 0, 0], 0.6), (0, color, 1.0)] {
-            for (number, character) in text.chars().enumerate() {
-                let glyph = font::glyph(character);
-                let left = x + number * font::ADVANCE * scale;
-                for (row, bits) in glyph.iter().enumerate() {
-                    for column in
-                        (0..font::WIDTH).filter(|column| bits >> (font::WIDTH - 1 - column) & 1 == 1)
-                    {
-                        let (dot_x, dot_y) = (left + column * scale, y + row * scale);
-                        let (from_x, from_y) = (dot_x.saturating_sub(grow), dot_y.saturating_sub(grow));
-                        let (to_x, to_y) = (dot_x + scale + grow, dot_y + scale + grow);
-                        self.fill(from_x..to_x, from_y..to_y, color, opacity);
-                    }
-                }
-            }
+        let line = Line::new(text, scale);
+        let place = |at: [i64; 2]| [at[0] + x as i64, at[1] + y as i64];
+        let mut rim = Rim::new(scale as f64 / 2.0 + 0.5);
+        line.draw(|at, cover| rim.add(place(at), cover));
+        for (&[x, y], &cover) in &rim.cover {
+            self.blend_at([x, y], [0; 3], RIM * cover);
+        }
+        line.draw(|at, cover| self.blend_at(place(at), color, cover));
+    }
+
+    /// Does what [`Image::blend`] does, and has no effect left of the picture or above it.
+    fn blend_at(&mut self, [x, y]: [i64; 2], color: Rgb, opacity: f32) {
+        if let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) {
+            self.blend(x, y, color, opacity);
         }
     }
 
@@ -52,6 +55,35 @@ impl Image {
         for_cover([self.width, self.height], from, to, thickness, |x, y, cover| {
             self.blend(x, y, color, cover)
         });
+    }
+}
+
+/// The pixels around letters, each with the share that a round brush covers.
+struct Rim {
+    /// Places from a pixel of a letter, and how much the brush covers there.
+    brush: Vec<([i64; 2], f32)>,
+    /// Ordered, so that the result does not depend on hashes.
+    cover: BTreeMap<[i64; 2], f32>,
+}
+
+impl Rim {
+    /// A rim of a thickness in pixels.
+    fn new(thickness: f64) -> Self {
+        let reach = thickness.ceil() as i64;
+        let all = (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| [x, y]));
+        let weight = |[x, y]: [i64; 2]| (thickness + 0.5 - (x as f64).hypot(y as f64)).clamp(0.0, 1.0) as f32;
+        let brush = all.map(|at| (at, weight(at))).filter(|(_, weight)| *weight > 0.0).collect();
+        Self { brush, cover: BTreeMap::new() }
+    }
+
+    /// Adds a pixel of a letter.
+    fn add(&mut self, [x, y]: [i64; 2], cover: f32) {
+        if cover > 0.0 {
+            for ([dx, dy], weight) in &self.brush {
+                let pixel = self.cover.entry([x + dx, y + dy]).or_default();
+                *pixel = pixel.max(cover * weight);
+            }
+        }
     }
 }
 

@@ -9,30 +9,35 @@ pub struct Picture {
     pixels: Vec<[u8; 3]>,
 }
 
-/// Shapes of the characters that the tests look for, 5 × 7 cells each.
-const GLYPHS: [(char, [&str; 7]); 21] = [
-    ('R', ["####.", "#...#", "#...#", "####.", "#.#..", "#..#.", "#...#"]),
-    ('L', ["#....", "#....", "#....", "#....", "#....", "#....", "#####"]),
-    ('A', [".###.", "#...#", "#...#", "#####", "#...#", "#...#", "#...#"]),
-    ('P', ["####.", "#...#", "#...#", "####.", "#....", "#....", "#...."]),
-    ('S', [".####", "#....", "#....", ".###.", "....#", "....#", "####."]),
-    ('I', [".###.", "..#..", "..#..", "..#..", "..#..", "..#..", ".###."]),
-    ('0', [".###.", "#...#", "#..##", "#.#.#", "##..#", "#...#", ".###."]),
-    ('1', ["..#..", ".##..", "..#..", "..#..", "..#..", "..#..", ".###."]),
-    ('2', [".###.", "#...#", "....#", "...#.", "..#..", ".#...", "#####"]),
-    ('5', ["#####", "#....", "####.", "....#", "....#", "#...#", ".###."]),
-    ('m', [".....", ".....", "##.#.", "#.#.#", "#.#.#", "#.#.#", "#...#"]),
-    ('b', ["#....", "#....", "####.", "#...#", "#...#", "#...#", "####."]),
-    ('e', [".....", ".....", ".###.", "#...#", "#####", "#....", ".###."]),
-    ('f', ["..##.", ".#..#", ".#...", "###..", ".#...", ".#...", ".#..."]),
-    ('o', [".....", ".....", ".###.", "#...#", "#...#", "#...#", ".###."]),
-    ('r', [".....", ".....", "#.##.", "##..#", "#....", "#....", "#...."]),
-    ('a', [".....", ".....", ".###.", "....#", ".####", "#...#", ".####"]),
-    ('t', [".#...", ".#...", "###..", ".#...", ".#...", ".#..#", "..##."]),
-    ('4', ["...#.", "..##.", ".#.#.", "#..#.", "#####", "...#.", "...#."]),
-    ('8', [".###.", "#...#", "#...#", ".###.", "#...#", "#...#", ".###."]),
-    (' ', [".....", ".....", ".....", ".....", ".....", ".....", "....."]),
+/// Shapes of the characters that the tests look for: the width of their box over its height, and
+/// how much ink each of 5 × 7 cells of the box has, from 0 to 9. They are from FreeType 2, which
+/// drew the font of the pictures with 300 pixels per em.
+const GLYPHS: [(char, f64, [&str; 7]); 20] = [
+    ('R', 0.75, ["99971", "91066", "91056", "97682", "94570", "91082", "91047"]),
+    ('L', 0.63, ["93000", "93000", "93000", "93000", "93000", "93000", "99999"]),
+    ('A', 0.91, ["01910", "03830", "06460", "08080", "28682", "55355", "81018"]),
+    ('P', 0.74, ["99982", "91048", "91029", "96585", "94420", "91000", "91000"]),
+    ('S', 0.72, ["27982", "65038", "66101", "15972", "10058", "84038", "27883"]),
+    ('I', 0.17, ["99999", "99999", "99999", "99999", "99999", "99999", "99999"]),
+    ('0', 0.63, ["27872", "75057", "93039", "92029", "93039", "75057", "27872"]),
+    ('1', 0.41, ["13578", "86499", "00099", "00099", "00099", "00099", "00099"]),
+    ('2', 0.68, ["28871", "84066", "20065", "00381", "02820", "28200", "89888"]),
+    ('5', 0.64, ["49997", "56000", "67651", "45377", "00039", "84058", "27882"]),
+    ('m', 1.38, ["78585", "83938", "70707", "70707", "70707", "70707", "70707"]),
+    ('b', 0.61, ["92000", "92000", "97883", "93048", "92039", "93058", "86882"]),
+    ('e', 0.84, ["06971", "58266", "84139", "99999", "84000", "58346", "16983"]),
+    ('f', 0.44, ["02788", "07910", "79974", "07900", "07900", "07900", "07900"]),
+    ('o', 0.89, ["17971", "57276", "83038", "92029", "83038", "67276", "17971"]),
+    ('r', 0.51, ["88589", "99854", "99100", "99100", "99100", "99100", "99100"]),
+    ('a', 0.82, ["17971", "76276", "11267", "49787", "83057", "86287", "38867"]),
+    ('t', 0.45, ["05930", "68975", "26952", "05930", "05930", "05941", "02798"]),
+    ('4', 0.72, ["00391", "01891", "05491", "27091", "86595", "44495", "00091"]),
+    ('8', 0.63, ["27882", "75057", "66166", "29892", "84048", "84048", "38883"]),
 ];
+
+/// Difference of a shape from that of a character above which it is another one. Shapes of the same
+/// character differ by 0.15 at the most, and those of two characters by 0.17 at least.
+const OTHER: f64 = 0.16;
 
 const WHITE: [u8; 3] = [255; 3];
 
@@ -63,42 +68,105 @@ impl Picture {
         all.filter(|&[x, y]| accepts(self.pixel(x, y))).collect()
     }
 
-    /// Centers, in pixels, of all places where a text stands in pure white, in any size.
+    /// Centers, in pixels, of all places where a text stands in white, in any size.
     pub fn texts(&self, text: &str) -> Vec<[f64; 2]> {
-        let cells: Vec<_> = text.chars().map(cells).collect();
+        let words: Vec<&str> = text.split(' ').collect();
+        let letters: Vec<char> = words.concat().chars().collect();
+        // The letters before which there is a space.
+        let spaces: Vec<usize> = words
+            .iter()
+            .scan(0, |sum, word| Some(std::mem::replace(sum, *sum + word.len())))
+            .skip(1)
+            .collect();
+        let marks = self.marks();
+        let stands = |row: &&[&Mark]| {
+            let fits = row.iter().zip(&letters).all(|(mark, letter)| mark.difference(*letter) < OTHER);
+            let height = row.iter().map(|mark| mark.rows.len()).max().unwrap_or(0) as f64;
+            let gap = |n: usize| row[n].columns.start as f64 - row[n - 1].columns.end as f64;
+            let is_spaced = |n: usize| (0.3 * height..0.8 * height).contains(&gap(n)) == spaces.contains(&n);
+            let in_line = |n: usize| {
+                (0.0..0.8 * height).contains(&gap(n)) && row[n].rows.end.abs_diff(row[0].rows.end) < 3
+            };
+            fits && (1..row.len()).all(|n| in_line(n) && is_spaced(n))
+        };
         let mut found = Vec::new();
-        for scale in 1..=4 {
-            let (width, height) = ((6 * cells.len() - 1) * scale, 7 * scale);
-            for y in 0..=self.height.saturating_sub(height) {
-                for x in 0..=self.width.saturating_sub(width) {
-                    let fits = |(n, cells): (usize, &[[bool; 5]; 7])| {
-                        (0..35).all(|cell| {
-                            let (row, column) = (cell / 5, cell % 5);
-                            let (left, top) = (x + (6 * n + column) * scale, y + row * scale);
-                            self.is_white(left, top, scale, cells[row][column])
-                        })
-                    };
-                    if self.is_framed(x..x + width, y..y + height) && cells.iter().enumerate().all(fits) {
-                        found.push([x as f64 + width as f64 / 2.0, y as f64 + height as f64 / 2.0]);
-                    }
-                }
+        for first in &marks {
+            // The marks on the same line, from left to right.
+            let line: Vec<&Mark> =
+                marks.iter().filter(|mark| mark.rows.end.abs_diff(first.rows.end) < 3).collect();
+            for row in line.windows(letters.len()).filter(|row| std::ptr::eq(row[0], first)).filter(stands) {
+                let last = row[row.len() - 1];
+                let top = row.iter().map(|mark| mark.rows.start).min().unwrap_or(0);
+                found.push([
+                    (first.columns.start + last.columns.end) as f64 / 2.0,
+                    (top + first.rows.end) as f64 / 2.0,
+                ]);
             }
         }
         found
     }
 
-    /// True if no pixel next to a box is pure white.
-    fn is_framed(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
-        let [left, top] = [columns.start, rows.start].map(|start| start.saturating_sub(1));
-        let (right, bottom) = (columns.end.min(self.width - 1), rows.end.min(self.height - 1));
-        let all = (top..=bottom).flat_map(|y| (left..=right).map(move |x| (x, y)));
-        let mut around = all.filter(|(x, y)| !(columns.contains(x) && rows.contains(y)));
-        around.all(|(x, y)| self.pixel(x, y) != WHITE)
+    /// The white marks of the size of letters, from left to right.
+    fn marks(&self) -> Vec<Mark> {
+        let is_white = |x: usize, y: usize| self.ink(x, y) > 0.5;
+        let mut seen = vec![false; self.width * self.height];
+        let mut marks = Vec::new();
+        for start in 0..seen.len() {
+            let (x, y) = (start % self.width, start / self.width);
+            if seen[start] || !is_white(x, y) {
+                continue;
+            }
+            seen[start] = true;
+            let (mut columns, mut rows, mut open) = (x..x + 1, y..y + 1, vec![(x, y)]);
+            while let Some((x, y)) = open.pop() {
+                columns = columns.start.min(x)..columns.end.max(x + 1);
+                rows = rows.start.min(y)..rows.end.max(y + 1);
+                for (x, y) in (y.saturating_sub(1)..(y + 2).min(self.height))
+                    .flat_map(|y| (x.saturating_sub(1)..(x + 2).min(self.width)).map(move |x| (x, y)))
+                {
+                    if !seen[y * self.width + x] && is_white(x, y) {
+                        seen[y * self.width + x] = true;
+                        open.push((x, y));
+                    }
+                }
+            }
+            if (6..80).contains(&rows.len()) && columns.len() < 100 {
+                marks.push(Mark { cells: self.cells(&columns, &rows), columns, rows });
+            }
+        }
+        marks.sort_by_key(|mark| mark.columns.start);
+        marks
     }
 
-    /// True if all pixels of a cell are pure white (with `white`), or if none of them is (without).
-    fn is_white(&self, left: usize, top: usize, size: usize, white: bool) -> bool {
-        (top..top + size).all(|y| (left..left + size).all(|x| (self.pixel(x, y) == WHITE) == white))
+    /// Mean ink of the cells of a box, 5 × 7.
+    fn cells(&self, columns: &Range<usize>, rows: &Range<usize>) -> [[f64; 5]; 7] {
+        let part = |of: &Range<usize>, n: usize, parts: usize| {
+            let at = |n: usize| of.len() as f64 * n as f64 / parts as f64;
+            let (from, to) = (at(n), at(n + 1));
+            (from as usize..(to.ceil() as usize).min(of.len()))
+                .map(move |pixel| {
+                    let share = to.min(pixel as f64 + 1.0) - from.max(pixel as f64);
+                    (pixel, share / (to - from))
+                })
+                .collect::<Vec<_>>()
+        };
+        std::array::from_fn(|row| {
+            std::array::from_fn(|column| {
+                let mut sum = 0.0;
+                for (y, high) in part(rows, row, 7) {
+                    for (x, wide) in part(columns, column, 5) {
+                        sum += high * wide * self.ink(columns.start + x, rows.start + y);
+                    }
+                }
+                sum
+            })
+        })
+    }
+
+    /// How white a pixel is, 0 to 1. Bare skin has about a third.
+    fn ink(&self, x: usize, y: usize) -> f64 {
+        let darkest = self.pixel(x, y).into_iter().min().unwrap_or(0);
+        ((f64::from(darkest) - 100.0) / 155.0).max(0.0)
     }
 
     /// The orientation letters at the left, right, top and bottom edge.
@@ -112,10 +180,14 @@ impl Picture {
             self.part(middle(w), h - h / 10..h),
         ];
         edges.map(|edge| {
-            let is_there = |letter: &char| !edge.texts(&letter.to_string()).is_empty();
-            let there: Vec<char> = "RLAPSI".chars().filter(is_there).collect();
+            // The nearest letter of each mark. A mark that is no letter is far from all.
+            let nearest = |mark: &Mark| {
+                let all = "RLAPSI".chars().map(|letter| (mark.difference(letter), letter));
+                all.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(difference, _)| *difference < OTHER)
+            };
+            let there: Vec<(f64, char)> = edge.marks().iter().filter_map(nearest).collect();
             assert_eq!(there.len(), 1, "letters at one edge: {there:?}");
-            there[0]
+            there[0].1
         })
     }
 
@@ -135,7 +207,26 @@ impl Picture {
     }
 }
 
-fn cells(character: char) -> [[bool; 5]; 7] {
-    let (_, rows) = GLYPHS.iter().find(|(known, _)| *known == character).expect("a known character");
-    rows.map(|row| std::array::from_fn(|column| row.as_bytes()[column] == b'#'))
+/// A white mark of the size of a letter.
+struct Mark {
+    columns: Range<usize>,
+    rows: Range<usize>,
+    cells: [[f64; 5]; 7],
+}
+
+impl Mark {
+    /// How much the shape differs from that of a character: the mean difference of the cells, and a
+    /// part of the difference of the widths.
+    fn difference(&self, character: char) -> f64 {
+        let (_, width, rows) =
+            GLYPHS.iter().find(|(known, ..)| *known == character).expect("a known character");
+        let mut sum = 0.0;
+        for (found, expected) in self.cells.iter().zip(rows) {
+            for (found, expected) in found.iter().zip(expected.bytes()) {
+                sum += (found - f64::from(expected - b'0') / 9.0).abs();
+            }
+        }
+        let widths = self.columns.len() as f64 / self.rows.len() as f64 / width;
+        sum / 35.0 + 0.3 * widths.ln().abs()
+    }
 }
