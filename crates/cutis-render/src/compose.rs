@@ -6,7 +6,8 @@ use crate::{Image, RenderError, Rgb, font};
 
 const PAPER: Rgb = [245, 245, 245];
 const INK: Rgb = [255, 255, 255];
-const BAND: Rgb = [40, 44, 52];
+/// Ground of captions and legends.
+pub(crate) const BAND: Rgb = [40, 44, 52];
 
 /// Combines pictures from left to right, aligned at the top, each below its caption.
 ///

@@ -36,8 +36,10 @@ mod font;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod image;
+mod legend;
 mod lines;
 mod outside;
+mod path;
 pub mod plot;
 mod raymarch;
 mod rays;
@@ -54,6 +56,7 @@ pub use error::RenderError;
 pub use gpu::{GpuRaymarcher, raymarch_gpu};
 pub use image::{Image, Rgb};
 pub use lines::{LineField, draw_lines};
+pub use path::{SkinPaths, draw_paths};
 pub use raymarch::{draw_annotations, raymarch};
 pub use shade::tissue_color;
 pub use side::{Axes, Side};

@@ -2,7 +2,7 @@
 
 use cutis_volume::Volume;
 
-use crate::{RenderError, Side};
+use crate::{Image, RenderError, Side};
 
 /// A part of the world to show.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +76,19 @@ impl View<'_> {
         check((1..=4).contains(&self.samples), "samples", self.samples as f64, "1 to 4")?;
         if let Some(focus) = &self.focus {
             focus.validate()?;
+        }
+        Ok(())
+    }
+
+    /// Returns an error if a picture does not have the size of the view.
+    pub(crate) fn fits(&self, image: &Image) -> Result<(), RenderError> {
+        for (key, of_view, of_image) in
+            [("view.width", self.width, image.width), ("view.height", self.height, image.height)]
+        {
+            if of_view != of_image {
+                let (value, expected) = (of_view as f64, "that of the picture");
+                return Err(RenderError::Setting { key, value, expected });
+            }
         }
         Ok(())
     }

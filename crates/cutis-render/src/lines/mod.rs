@@ -8,11 +8,11 @@ use nalgebra::Point3;
 
 use crate::annotate::{annotate, text_scale};
 use crate::contour::check_corners;
-use crate::draw::{Stroke, text_width};
+use crate::draw::Stroke;
 use crate::field::Field;
+use crate::legend::{Entry, draw_legend};
 use crate::rays::Rays;
-use crate::shade::SKIN;
-use crate::{Axes, Image, RenderError, Rgb, View, font};
+use crate::{Axes, Image, RenderError, Rgb, View};
 use evenly_spaced::{LinePoint, evenly_spaced};
 use visible::VisibleField;
 
@@ -22,8 +22,6 @@ const SPACING: f64 = 9.0;
 const THICKNESS: f64 = 0.75;
 /// Opacity of a line where the weight is 1.
 const OPACITY: f32 = 0.85;
-/// Color of the legend's text.
-const INK: Rgb = [255, 255, 255];
 
 /// Directions on a triangle surface. Positions are in local meters: `world_mm = origin_mm + 1000 ·
 /// local`.
@@ -66,13 +64,7 @@ pub fn draw_lines(
 ) -> Result<(), RenderError> {
     view.validate()?;
     lines.validate()?;
-    for (key, of_view, of_image) in
-        [("view.width", view.width, image.width), ("view.height", view.height, image.height)]
-    {
-        if of_view != of_image {
-            return Err(RenderError::Setting { key, value: of_view as f64, expected: "that of the picture" });
-        }
-    }
+    view.fits(image)?;
     let axes = Axes::new(view.side)?;
     let field = Field::new(volume);
     let rays = Rays::new(&field, view, &axes);
@@ -88,32 +80,12 @@ pub fn draw_lines(
     }
     stroke.draw(image, lines.color);
     if view.annotate {
-        legend(image, lines, scale);
+        let thickness = THICKNESS * scale as f64;
+        let entry = Entry { color: lines.color, opacity: OPACITY, thickness, label: lines.label };
+        draw_legend(image, &entry, scale);
         annotate(image, &axes, rays.pixel_mm);
     }
     Ok(())
-}
-
-/// A piece of skin with a line, and the name of the lines, at the bottom right.
-fn legend(image: &mut Image, lines: &LineField<'_>, scale: usize) {
-    if lines.label.is_empty() {
-        return;
-    }
-    let (margin, height, patch) = (3 * scale, font::HEIGHT * scale, 12 * scale);
-    let text = image.width.saturating_sub(margin + text_width(lines.label, scale));
-    let (left, top) = (text.saturating_sub(patch + margin), image.height.saturating_sub(margin + height));
-    image.fill(
-        left.saturating_sub(1)..left + patch + 1,
-        top.saturating_sub(1)..top + height + 1,
-        [0; 3],
-        0.6,
-    );
-    image.fill(left..left + patch, top..top + height, SKIN, 1.0);
-    let middle = top as f64 + height as f64 / 2.0 - 0.5;
-    let mut stroke = Stroke::new(image, THICKNESS * scale as f64);
-    stroke.segment([left as f64, middle], [(left + patch - 1) as f64, middle], OPACITY);
-    stroke.draw(image, lines.color);
-    image.text(text, top, lines.label, scale, INK);
 }
 
 impl LineField<'_> {

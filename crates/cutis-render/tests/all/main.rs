@@ -3,4 +3,5 @@
 #[cfg(feature = "gpu")]
 mod gpu;
 mod lines;
+mod paths;
 mod pictures;

@@ -3,9 +3,10 @@
 
 use std::path::PathBuf;
 
+use cutis_mesh::Slit;
 use cutis_render::{
-    Contour, Image, LineField, Plane, Rgb, Side, SliceView, View, bare_sides, draw_annotations, draw_lines,
-    side_by_side, skin_depth, slice,
+    Contour, Image, LineField, Plane, Rgb, Side, SkinPaths, SliceView, View, bare_sides, draw_annotations,
+    draw_lines, draw_paths, side_by_side, skin_depth, slice,
 };
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
@@ -34,6 +35,11 @@ const MARGIN: f64 = 4.0;
 const COLORS: [Rgb; 2] = [[90, 160, 255], [255, 170, 60]];
 /// Color of the lines of tension.
 const LINES: Rgb = [20, 50, 120];
+/// Color of the path of a cut that is closed.
+const PATH: Rgb = [40, 20, 30];
+
+/// Parts into which the path of a segment of a cut is divided.
+const PATH_PARTS: u32 = 64;
 
 /// What was drawn.
 pub(super) struct Pictures {
@@ -109,11 +115,20 @@ pub(super) fn draw(
     // would cross.
     let skin = stages.raymarch(&before, &View { annotate: false, ..view })?;
     let mut skin_before = skin.clone();
+    let closed = closed_cuts(body);
+    let caption_before = match closed.is_empty() {
+        true => "Before the first frame",
+        false => "Before the first frame. The line is the path of the cut, which is still closed",
+    };
+    if !closed.is_empty() {
+        let label = if closed.len() == 1 { "path of the cut" } else { "paths of the cuts" };
+        draw_paths(&mut skin_before, &before, &view, &SkinPaths { paths_mm: &closed, color: PATH, label })?;
+    }
     draw_annotations(&mut skin_before, &before, &view)?;
     let depth_after = depth.as_ref().map(|(_, deformed)| deformed);
     let skin_after = stages.raymarch(after, &View { depth: depth_after, ..view })?;
     let mut figures = vec![
-        figure(RunFolder::before, "Before the first frame", false, &skin_before)?,
+        figure(RunFolder::before, caption_before, false, &skin_before)?,
         figure(RunFolder::after, "After", false, &skin_after)?,
         figure(
             RunFolder::slice,
@@ -130,6 +145,18 @@ pub(super) fn draw(
         figures.push(figure(RunFolder::tension, caption, false, &picture)?);
     }
     Ok(Pictures { figures, slices: slices_of_planes })
+}
+
+/// The paths of the incisions without a width, which cannot be seen before they open, world mm.
+fn closed_cuts(body: &Body) -> Vec<Vec<Point3<f64>>> {
+    let frame = &body.mesh.frame;
+    let world = |local: Point3<f64>| frame.origin_mm + local.coords * 1000.0;
+    let points = |slit: &Slit| {
+        let at = |n: u32| world(slit.skin_at(slit.length() * f64::from(n) / f64::from(PATH_PARTS)));
+        (0..=PATH_PARTS).map(at).collect::<Vec<_>>()
+    };
+    let closed = body.cut.incisions().filter(|slits| slits.iter().all(Slit::removes_nothing));
+    closed.map(|slits| slits.iter().flat_map(points).collect()).collect()
 }
 
 /// A picture of the run folder and of the report.
