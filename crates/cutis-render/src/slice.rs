@@ -10,6 +10,9 @@ use crate::field::Field;
 use crate::view::Focus;
 use crate::{Axes, Image, RenderError, Side};
 
+/// HU of air.
+const AIR_HU: f32 = -1000.0;
+
 /// A plane of the patient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Plane {
@@ -34,6 +37,11 @@ pub struct SliceView<'a> {
     pub window_hu: f32,
     /// Center of the gray scale, HU. Default 40.
     pub level_hu: f32,
+    /// Gray at the low end of the window, 0 to below 1. HU between there and air (−1000 HU, black)
+    /// get the grays below it, so that a voxel that is partly air shows how much. With 0 (default)
+    /// all HU below the window are black: an edge between tissue and air appears inside the tissue,
+    /// and where it is cut by voxels, as stairs.
+    pub edge_gray: f32,
     /// Pixels along the longer side. With `None` a pixel has the finest voxel spacing.
     pub long_side: Option<usize>,
     /// The part to show; with `None` the whole slice.
@@ -54,6 +62,7 @@ impl SliceView<'_> {
             radiological: true,
             window_hu: 400.0,
             level_hu: 40.0,
+            edge_gray: 0.0,
             long_side: None,
             focus: None,
             contours: &[],
@@ -83,6 +92,9 @@ impl SliceView<'_> {
         if !self.level_hu.is_finite() {
             return bad("level_hu", self.level_hu.into(), "finite");
         }
+        if !(0.0..1.0).contains(&self.edge_gray) {
+            return bad("edge_gray", self.edge_gray.into(), "0 to below 1");
+        }
         if let Some(focus) = &self.focus {
             focus.validate()?;
         }
@@ -90,10 +102,13 @@ impl SliceView<'_> {
     }
 
     /// Gray level of an HU value: black up to `level − window/2`, white from `level + window/2`,
-    /// and linear in between (DICOM PS3.3 C.11.2.1.3.2, LINEAR_EXACT).
+    /// and linear in between (DICOM PS3.3 C.11.2.1.3.2, LINEAR_EXACT). With `edge_gray` the window
+    /// begins at that gray, and below it the gray falls to black at −1000 HU.
     pub fn gray(&self, hu: f32) -> u8 {
-        let part = (hu - (self.level_hu - self.window_hu / 2.0)) / self.window_hu;
-        (part.clamp(0.0, 1.0) * 255.0).round() as u8
+        let low = self.level_hu - self.window_hu / 2.0;
+        let part = ((hu - low) / self.window_hu).clamp(0.0, 1.0);
+        let below = if low > AIR_HU { ((hu - AIR_HU) / (low - AIR_HU)).clamp(0.0, 1.0) } else { 1.0 };
+        ((self.edge_gray * below + (1.0 - self.edge_gray) * part) * 255.0).round() as u8
     }
 }
 

@@ -5,6 +5,8 @@ use base64::Engine;
 use super::body::{HU, MARKERS_MM, MOVE_MM, NOTCH_MM, finished};
 use super::image::Picture;
 
+/// Gray of tissue of 40 HU in slices.
+const TISSUE: u8 = 179;
 /// Background of the surface pictures.
 const BACKGROUND: [u8; 3] = [24, 26, 32];
 /// Colors of the skin's line in slices: at rest, deformed.
@@ -93,8 +95,8 @@ fn before_and_after_show_their_own_state() {
 
 /// Centers of the markers in a slice, the left one in the picture first.
 fn markers(slice: &Picture) -> [[f64; 2]; 2] {
-    // Window 400, level 40.
-    let gray = ((f64::from(HU[1]) + 160.0) / 400.0 * 255.0).round() as u8;
+    // Window 400, level 40, from the gray 0.4 on.
+    let gray = ((0.4 + 0.6 * (f64::from(HU[1]) + 160.0) / 400.0) * 255.0).round() as u8;
     let pixels = slice.find(|[r, g, b]| r == g && g == b && r.abs_diff(gray) < 3);
     let middle = slice.width / 2;
     let center = |of: &[&[usize; 2]]| {
@@ -128,13 +130,13 @@ fn slices_show_their_markers_where_the_letters_and_the_scale_bar_say() {
     assert!(moved.abs() < 0.75 * MOVE_MM[0], "the left marker moved by {moved} mm");
 }
 
-/// 40 HU is the level, so that tissue has the middle gray; air is black.
+/// 40 HU is the level, so that tissue has the middle of the grays from 0.4 to 1; air is black.
 #[test]
 fn slices_have_the_window_of_soft_tissue() {
     for slice in slices() {
         let gray = |value: u8| slice.find(|pixel| pixel == [value; 3]).len();
         let pixels = slice.width * slice.height;
-        assert!(gray(128) > pixels / 5 && gray(0) > pixels / 5, "{} and {}", gray(128), gray(0));
+        assert!(gray(TISSUE) > pixels / 5 && gray(0) > pixels / 5, "{} and {}", gray(TISSUE), gray(0));
     }
 }
 
@@ -162,7 +164,8 @@ fn lines_follow_the_skin_of_their_state() {
         let pixels = slice.find(near(color));
         pixels.iter().map(|pixel| pixel[0]).min().map(|x| x as f64)
     };
-    let tissue = |slice: &Picture| slice.find(|pixel| pixel == [128; 3]).iter().map(|p| p[0]).min().unwrap();
+    let tissue =
+        |slice: &Picture| slice.find(|pixel| pixel == [TISSUE; 3]).iter().map(|p| p[0]).min().unwrap();
     assert_eq!(first(&before, LINES[1]), None, "no deformed skin in the slice before");
     let rest = first(&before, LINES[0]).unwrap();
     assert_eq!(first(&after, LINES[0]), Some(rest), "the skin at rest is the same in both");

@@ -134,6 +134,22 @@ fn window_and_level_are_exact() {
     assert_eq!((narrow.gray(238.5), narrow.gray(240.5)), (0, 255));
 }
 
+/// Below the window the gray falls to black in air, and it has no jump. Without that all of it is
+/// black.
+#[test]
+fn voxels_that_are_partly_air_can_be_shown() {
+    let plain = SliceView::new(Plane::Axial, 0.0);
+    let view = SliceView { edge_gray: 0.4, ..plain };
+    let grays = [-2000.0, -1000.0, -580.0, -161.0, -160.0, 40.0, 240.0, 1000.0].map(|hu| view.gray(hu));
+    assert_eq!(grays, [0, 0, 51, 102, 102, 179, 255, 255]);
+    assert_eq!([-1000.0, -580.0, -161.0].map(|hu| plain.gray(hu)), [0; 3]);
+    let volume = ball([2.0; 3], [20; 3], 10.0);
+    for edge_gray in [-0.1, 1.0, f32::NAN] {
+        let error = slice(&volume, &SliceView { edge_gray, ..plain }).unwrap_err();
+        assert!(matches!(error, RenderError::Setting { key: "edge_gray", .. }), "{error}");
+    }
+}
+
 #[test]
 fn anisotropic_voxels_keep_their_aspect() {
     let grid = Grid { shape: [40, 30, 10], affine: Affine::from_spacing([1.0, 1.0, 5.0], [0.0; 3]).unwrap() };

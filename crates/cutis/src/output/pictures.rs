@@ -37,9 +37,16 @@ const COLORS: [Rgb; 2] = [[90, 160, 255], [255, 170, 60]];
 const LINES: Rgb = [20, 50, 120];
 /// Color of the path of a cut that is closed.
 const PATH: Rgb = [40, 20, 30];
+/// Gray of slices at the low end of their window. The edge between skin and air then appears where
+/// the CT is halfway between them, and the walls of cuts appear as smooth as they are.
+pub(super) const EDGE_GRAY: f32 = 0.4;
 
 /// Parts into which the path of a segment of a cut is divided.
 const PATH_PARTS: u32 = 64;
+/// Caption of the slices.
+const SLICE: &str = "Slice across the middle, with the skin of the model at rest (blue) and deformed (orange). It \
+                     lies up to half a lattice step below the skin of the CT. A voxel that is partly air is dark \
+                     gray: the edge of the skin is where the CT is halfway between tissue and air";
 
 /// What was drawn.
 pub(super) struct Pictures {
@@ -88,6 +95,7 @@ pub(super) fn draw(
         let view = SliceView {
             contours,
             focus,
+            edge_gray: EDGE_GRAY,
             long_side: Some(PIXELS),
             ..SliceView::new(plane, position(plane, middle_mm))
         };
@@ -130,12 +138,7 @@ pub(super) fn draw(
     let mut figures = vec![
         figure(RunFolder::before, caption_before, false, &skin_before)?,
         figure(RunFolder::after, "After", false, &skin_after)?,
-        figure(
-            RunFolder::slice,
-            "Slice across the middle, with the skin of the model at rest (blue) and deformed (orange)",
-            true,
-            &slices,
-        )?,
+        figure(RunFolder::slice, SLICE, true, &slices)?,
     ];
     if body.membrane.as_ref().is_some_and(Membrane::has_lines) {
         let mut picture = skin;

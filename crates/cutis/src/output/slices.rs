@@ -5,6 +5,7 @@ use cutis_render::{Contour, Plane, Rgb, SliceView, slice};
 use cutis_volume::Volume;
 use nalgebra::Point3;
 
+use super::pictures::EDGE_GRAY;
 use super::wound_place::{WoundPlace, position};
 use crate::Error;
 
@@ -69,6 +70,7 @@ fn of_size(
             let view = SliceView {
                 contours: &[contour],
                 focus: place.map(|place| place.slice),
+                edge_gray: EDGE_GRAY,
                 long_side: Some(pixels),
                 ..SliceView::new(plane, at_mm)
             };
