@@ -51,3 +51,18 @@ fn the_scene_reference_is_up_to_date() {
     let hint = "write it with `cargo run -- scene reference > docs/book/scene-reference.md`";
     assert!(written == cutis::scene::reference(), "{page} is out of date: {hint}");
 }
+
+/// The defaults of substeps and iterations are those of the formulation.
+#[test]
+fn a_formulation_has_its_own_substeps_and_iterations() {
+    use cutis::solver::Formulation;
+    let solver = |keys: &str| {
+        let text = format!("volume = {{ phantom = {{ size = [8, 8, 8] }} }}\nsolver = {{ {keys} }}");
+        let solver = Scene::parse(&text, Path::new("test"), Path::new(""), &[]).unwrap().scene.solver;
+        (solver.formulation, solver.substeps, solver.iterations)
+    };
+    assert_eq!(solver(""), (Formulation::Vbd, 2, 2));
+    assert_eq!(solver("formulation = 'xpbd'"), (Formulation::Xpbd, 10, 1));
+    assert_eq!(solver("formulation = 'pbd', iterations = 3"), (Formulation::Pbd, 10, 3));
+    assert_eq!(solver("substeps = 5"), (Formulation::Vbd, 5, 2));
+}

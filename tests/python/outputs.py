@@ -32,6 +32,7 @@ keep = "all"
 [constraints.distance]
 youngs_modulus_pa = 2.0e4
 [solver]
+formulation = "xpbd"
 dt_s = {dt_s}
 substeps = 1
 gravity_m_s2 = [{gravity}, 0.0, 0.0]

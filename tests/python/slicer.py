@@ -62,6 +62,7 @@ radius_mm = 30.0
 move_mm = [4.0, 9.0, -6.0]
 over_s = 0.02
 [solver]
+formulation = "xpbd"
 substeps = 2
 backend = "cpu"
 [run]

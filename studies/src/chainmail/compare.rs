@@ -66,13 +66,14 @@ impl Comparison {
         };
         let (_, _, rest) = run("rest", &[("handle", "[]"), ("run.frames", "1")])?;
         let vbd = [("solver.formulation", "\"vbd\""), ("solver.substeps", "5"), ("solver.iterations", "2")];
+        let xpbd = [("solver.formulation", "\"xpbd\""), ("solver.substeps", "20")];
         let elastic = [("chainmail.materials", ELASTIC), ("chainmail.relax_per_frame", "200")];
         let models: [(&'static str, Vec<(&str, &str)>); 6] = [
             ("ChainMail, not relaxed", vec![("chainmail.relax_per_frame", "0")]),
             ("ChainMail, `uniform`", vec![("chainmail.materials", "\"uniform\"")]),
             ("ChainMail, the scene's", vec![]),
             ("ChainMail, `k` = 0, relaxed to the end", elastic.into()),
-            ("XPBD, 20 substeps", [&PBD[..], &[("solver.substeps", "20")]].concat()),
+            ("XPBD, 20 substeps", [&PBD[..], &xpbd].concat()),
             ("vertex block descent, 5 × 2", [&PBD[..], &vbd].concat()),
         ];
         let mut answers = Vec::new();

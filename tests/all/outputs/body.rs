@@ -74,6 +74,7 @@ path = "ct.nii.gz"
 spacing_mm = 8.0
 [solver]
 backend = "cpu"
+formulation = "xpbd"
 dt_s = 0.02
 substeps = 5
 [run]

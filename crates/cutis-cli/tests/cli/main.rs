@@ -44,6 +44,8 @@ stc = { area_modulus_n_per_m = 100.0, rest_area_scale = 0.8 }
 [fixed]
 bone_above_hu = 250.0
 end_layers = ["k"]
+[solver]
+formulation = "xpbd"
 [run]
 frames = 2
 [output]

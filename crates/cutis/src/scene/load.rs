@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::SolverSection;
 use super::nearest;
 use super::steps::{self, Steps};
 use crate::{Error, Scene};
@@ -150,6 +151,8 @@ impl Scene {
             value: shorten(&value),
             why,
         })?;
+        let named = |key: &str| lookup(&value, key).is_some();
+        let [substeps_named, iterations_named] = ["solver.substeps", "solver.iterations"].map(named);
         let mut scene: Scene = serde_path_to_error::deserialize(value.clone()).map_err(|e| {
             let (key, message) = (e.path().to_string(), e.inner().to_string().trim().replace('\n', " "));
             let file = file.into();
@@ -166,6 +169,13 @@ impl Scene {
             let why = nearest::plain(&nearest::with_suggestion(&first_chars(&message, MAX_REASON)));
             Error::SceneKey { file, key: shorten(&steps.name(&key)), value: found, why }
         })?;
+        let (substeps, iterations) = SolverSection::steps_of(scene.solver.formulation);
+        if !substeps_named {
+            scene.solver.substeps = substeps;
+        }
+        if !iterations_named {
+            scene.solver.iterations = iterations;
+        }
         crate::model::fill_defaults(&mut scene);
         super::pick_region::fill(&mut scene);
         let of_scene = SceneFile { file, steps: &steps };

@@ -69,7 +69,15 @@ fn edited(loaded: &LoadedScene, wanted: &Scene, directory: &Path) -> Result<Stri
     if absolute(home) != absolute(directory) {
         make_markups_absolute(&mut document, home)?;
     }
-    change(document.as_table_mut(), &value(&written)?, &value(wanted)?);
+    let mut from = value(&written)?;
+    if written.solver.formulation != wanted.solver.formulation {
+        // The defaults of these keys depend on the formulation, so they are written.
+        let solver = from.get_mut("solver").and_then(toml::Value::as_table_mut);
+        solver
+            .into_iter()
+            .for_each(|solver| solver.retain(|key, _| key != "substeps" && key != "iterations"));
+    }
+    change(document.as_table_mut(), &from, &value(wanted)?);
 
     let read = |document: &DocumentMut| Scene::parse(&document.to_string(), &loaded.file, directory, &[]);
     let path = |scene: &Scene| scene.volume.path.as_deref().map(absolute);
@@ -193,6 +201,8 @@ fn value(value_: &toml::Value) -> Value {
 
 #[cfg(test)]
 mod tests {
+    use cutis_solver::Formulation;
+
     use super::*;
     use crate::scene::Override;
 
@@ -256,6 +266,17 @@ frames = 3
         loaded.scene.solver.substeps = 9;
         let again = edited(&loaded, &loaded.scene, Path::new("here")).unwrap();
         assert_eq!(again, loaded.text.replace("substeps = 7", "substeps = 9"));
+    }
+
+    #[test]
+    fn another_formulation_keeps_the_picked_steps() {
+        let mut loaded = loaded(TEXT, &[]);
+        let solver = &mut loaded.scene.solver;
+        assert_eq!((solver.formulation, solver.substeps, solver.iterations), (Formulation::Vbd, 2, 2));
+        // Two of each are not the defaults of the other formulation.
+        solver.formulation = Formulation::Xpbd;
+        let text = edited(&loaded, &loaded.scene, Path::new("here")).unwrap();
+        assert!(text.contains("substeps = 2\n") && text.contains("iterations = 2\n"), "{text}");
     }
 
     #[test]

@@ -128,8 +128,9 @@ mod tests {
     #[test]
     fn the_estimate_agrees_with_the_solver() {
         for (solver, more) in [
-            ("{ backend = \"cpu\" }", vec![]),
-            ("{ backend = \"cpu\", iterations = 4 }", vec!["multipliers"]),
+            ("{ backend = \"cpu\" }", vec!["incidences", "teams"]),
+            ("{ backend = \"cpu\", formulation = \"xpbd\" }", vec![]),
+            ("{ backend = \"cpu\", formulation = \"xpbd\", iterations = 4 }", vec!["multipliers"]),
             ("{ backend = \"cpu\", formulation = \"vbd\", iterations = 2 }", vec!["incidences", "teams"]),
             ("{ backend = \"cpu\", formulation = \"pbd\", iterations = 2 }", vec![]),
         ] {

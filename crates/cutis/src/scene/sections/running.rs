@@ -16,14 +16,13 @@ pub struct SolverSection {
     pub adapter: Option<String>,
     /// `pbd` as in the paper, `xpbd` its compliant form, or `vbd`, vertex block descent. `vbd` has
     /// the materials of `xpbd`, and its state of rest is an equilibrium for any number of substeps.
-    /// `cutis scene new` writes `vbd`. `xpbd` needs many substeps for stiff skin: with too few, a
-    /// wound opens too far.
+    /// `xpbd` needs many substeps for stiff skin: with too few, a wound opens too far.
     pub formulation: Formulation,
     /// Duration of a frame, s.
     pub dt_s: f64,
-    /// Substeps per frame, 1 or more.
+    /// Substeps per frame, 1 or more. Left out: 2 with `vbd`, 10 with `xpbd` and `pbd`.
     pub substeps: u32,
-    /// Iterations per substep, 1 or more.
+    /// Iterations per substep, 1 or more. Left out: 2 with `vbd`, 1 with `xpbd` and `pbd`.
     pub iterations: u32,
     /// Acceleration, m/s², along R, A, S.
     pub gravity_m_s2: [f64; 3],
@@ -36,15 +35,28 @@ pub struct SolverSection {
     pub threads: usize,
 }
 
+impl SolverSection {
+    /// The substeps and iterations of a scene that names only this formulation. The fit is that of
+    /// the wounds in `docs/results/accuracy.md`.
+    pub(in crate::scene) const fn steps_of(formulation: Formulation) -> (u32, u32) {
+        match formulation {
+            Formulation::Vbd => (2, 2),
+            Formulation::Pbd | Formulation::Xpbd => (10, 1),
+        }
+    }
+}
+
 impl Default for SolverSection {
     fn default() -> Self {
+        let formulation = Formulation::Vbd;
+        let (substeps, iterations) = Self::steps_of(formulation);
         Self {
             backend: BackendChoice::default(),
             adapter: None,
-            formulation: Formulation::default(),
+            formulation,
             dt_s: 1.0 / 60.0,
-            substeps: 10,
-            iterations: 1,
+            substeps,
+            iterations,
             gravity_m_s2: [0.0; 3],
             damping_per_s: 10.0,
             relaxation: 1.0,
