@@ -14,13 +14,21 @@ const AIR_HU: f32 = -449.0;
 const STEP_MM: f64 = 1.0;
 /// Thickness of tissue that is not a sheet or a tube in front of the body, mm.
 const THICK_MM: f64 = 8.0;
-/// Half of the length of the cut, mm, and its largest share of the width of the body.
-const HALF_MM: (f64, f64) = (30.0, 0.15);
+/// Half of the length of the cut, mm.
+const HALF_MM: f64 = 30.0;
+/// Largest share of half of the cut in the width of the body, and in the height of the scan. The
+/// ends of the cut are as far from the ends of the scan as the cut is long.
+const HALF_SHARE: (f64, f64) = (0.15, 1.0 / 6.0);
+/// Distance of the skin from the straight line between the ends of the cut, mm, that is flat.
+const FLAT_MM: f64 = 5.0;
+/// Part of the width of the body, to each side of its middle, in which the cut may lie.
+const ASIDE: f64 = 0.25;
 /// Share of the depth of the body, from the front, behind which everything is fixed.
 const FREE_SHARE: f64 = 0.6;
 
-/// The commented scene of [`template`] for a volume. Its cut crosses the middle of the front of the
-/// body, and what lies behind is fixed, as on a table. Both are a beginning, to be changed.
+/// The commented scene of [`template`] for a volume. Its cut runs up the front of the body, across
+/// the lines of tension of the trunk, where a cut opens most. A comment has a cut across the body,
+/// for a limb. What lies behind is fixed, as on a table. All is a beginning, to be changed.
 ///
 /// # Errors
 /// [`Error::Volume`] if the volume cannot be read, and [`Error::Request`] if there is no tissue in
@@ -46,8 +54,10 @@ pub fn template_for(path: &Path, options: &ReadOptions) -> Result<String, Error>
     let point = |mm: [f64; 3]| format!("{:?}", mm.map(|mm| (mm * 10.0).round() / 10.0 + 0.0));
     let lines = [
         ("path = ", volume),
-        ("from_mm = ", format!("from_mm = {}", point(site.from_mm))),
-        ("to_mm = ", format!("to_mm = {}", point(site.to_mm))),
+        ("from_mm = ", format!("from_mm = {}", point(site.up_mm[0]))),
+        ("to_mm = ", format!("to_mm = {}", point(site.up_mm[1]))),
+        ("# from_mm = ", format!("# from_mm = {}{FOR_LIMB}", point(site.across_mm[0]))),
+        ("# to_mm = ", format!("# to_mm = {}", point(site.across_mm[1]))),
         (
             "# planes = ",
             format!("planes = [{{ point_mm = {}, normal = [0.0, -1.0, 0.0] }}]", point(site.behind_mm)),
@@ -60,11 +70,17 @@ pub fn template_for(path: &Path, options: &ReadOptions) -> Result<String, Error>
     Ok(template().lines().map(changed).collect())
 }
 
+/// Says when the second cut is the one to take.
+const FOR_LIMB: &str = "    # for preset = \"limb\" or \"arm\": their lines run along z";
+
 /// Where a first cut is possible, world mm.
 #[derive(Debug, PartialEq)]
 struct Site {
-    from_mm: [f64; 3],
-    to_mm: [f64; 3],
+    /// The ends of a cut along z.
+    up_mm: [[f64; 3]; 2],
+    /// The ends of a cut along x.
+    across_mm: [[f64; 3]; 2],
+    /// Where the fixed part of the body begins.
     behind_mm: [f64; 3],
 }
 
@@ -85,17 +101,47 @@ impl Site {
         let widest = starts.zip(stops).max_by_key(|(start, stop)| stop - start)?;
         let part = &with_tissue[widest.0..widest.1];
         let (left, right) = (part.first().map_or(first, |c| c.0), part.last().map_or(last, |c| c.0));
-        let middle = (left + right) / 2.0;
-        let half = HALF_MM.0.min(HALF_MM.1 * (right - left));
-        let point = |x: f64| Some([x, front(x)?, z]);
-        let back = samples(low.y, high.y).find(|&y| is_tissue(volume, [middle, y, z]))?;
+        let (middle, width) = ((left + right) / 2.0, right - left);
+        let half = HALF_MM.min(HALF_SHARE.0 * width).min(HALF_SHARE.1 * (high.z - low.z));
+        let place = |x: f64, z: f64| Some([x, self::front(volume, x, z, [low.y, high.y])?, z]);
         let y = front(middle)?;
-        Some(Self {
-            from_mm: point(middle - half)?,
-            to_mm: point(middle + half)?,
-            behind_mm: [middle, y - FREE_SHARE * (y - back), z],
-        })
+        let back = samples(low.y, high.y).find(|&y| is_tissue(volume, [middle, y, z]))?;
+        let behind = y - FREE_SHARE * (y - back);
+        let aside = samples(0.0, ASIDE * width).flat_map(|by| [middle - by, middle + by]);
+        // The sides of a round body are too near to the part that is fixed.
+        let free = |points: &Vec<[f64; 3]>| points.iter().all(|[_, y, _]| y - behind >= 2.0 * half);
+        let up_mm = flattest(aside, |x| line(|by| place(x, z + by), half).filter(free))?;
+        let across_mm = [place(middle - half, z)?, place(middle + half, z)?];
+        Some(Self { up_mm, across_mm, behind_mm: [middle, behind, z] })
     }
+}
+
+/// The points of the skin along a line of length `2 half`. None if the skin has a gap there.
+fn line(place: impl Fn(f64) -> Option<[f64; 3]>, half: f64) -> Option<Vec<[f64; 3]>> {
+    let count = (2.0 * half / STEP_MM).ceil().max(1.0);
+    (0..=count as usize).map(|n| place(half * (2.0 * n as f64 / count - 1.0))).collect()
+}
+
+/// The ends of the first flat line, or of the flattest one if none is flat.
+fn flattest(
+    places: impl Iterator<Item = f64>,
+    line: impl Fn(f64) -> Option<Vec<[f64; 3]>>,
+) -> Option<[[f64; 3]; 2]> {
+    let mut best: Option<(f64, [[f64; 3]; 2])> = None;
+    for points in places.filter_map(line) {
+        let (Some(&from), Some(&to)) = (points.first(), points.last()) else { continue };
+        let last = (points.len() - 1) as f64;
+        let off =
+            |(n, point): (usize, &[f64; 3])| (point[1] - from[1] - (to[1] - from[1]) * n as f64 / last).abs();
+        let off = points.iter().enumerate().map(off).fold(0.0, f64::max);
+        if best.is_none_or(|(least, _)| off < least) {
+            best = Some((off, [from, to]));
+        }
+        if off <= FLAT_MM {
+            break;
+        }
+    }
+    best.map(|(_, ends)| ends)
 }
 
 /// The first y from the front at which thick tissue begins.
@@ -160,16 +206,34 @@ mod tests {
     }
 
     #[test]
-    fn the_cut_crosses_the_front_of_the_widest_part() {
+    fn the_cut_runs_up_the_front_of_the_widest_part() {
         let site = Site::find(&block()).unwrap();
-        let expected = [[38.0, 60.5, 0.0], [62.0, 60.5, 0.0]];
-        for (found, expected) in [site.from_mm, site.to_mm].into_iter().zip(expected) {
+        // The scan is 40 mm high, so that a cut of 13.3 mm is as far from its ends.
+        let expected = [[50.0, 60.5, -6.67], [50.0, 60.5, 6.67], [43.3, 60.5, 0.0], [56.7, 60.5, 0.0]];
+        for (found, expected) in site.up_mm.into_iter().chain(site.across_mm).zip(expected) {
             let distance = (Vector3::from(found) - Vector3::from(expected)).norm();
             assert!(distance <= 2.0, "{found:?} is not {expected:?}");
         }
         assert!((site.behind_mm[1] - (60.5 - 0.6 * 41.0)).abs() < 2.0, "{site:?}");
         let air = Volume::new(*block().grid(), vec![-1000; block().grid().len()], 1.0, 0.0).unwrap();
         assert_eq!(Site::find(&air), None);
+    }
+
+    /// A ridge and a hole in the middle of the front. The cut lies next to them.
+    #[test]
+    fn the_cut_avoids_uneven_and_open_skin() {
+        let grid = *block().grid();
+        let ridge = |n: usize| {
+            let [x, y, z] = grid.mm(grid.point(n)).into();
+            let hole = (44.0..=50.0).contains(&x) && (1.0..5.0).contains(&z);
+            let front = if (50.0..=56.0).contains(&x) && z > 0.0 { 74.0 } else { 60.0 };
+            let inside = (10.0..=90.0).contains(&x) && (20.0..=front).contains(&y) && !hole;
+            if inside { 40 } else { -1000 }
+        };
+        let volume = Volume::new(grid, (0..grid.len()).map(ridge).collect(), 1.0, 0.0).unwrap();
+        let [from, to] = Site::find(&volume).unwrap().up_mm;
+        assert!(from[0] == to[0] && (from[1] - to[1]).abs() <= FLAT_MM, "{from:?} {to:?}");
+        assert!(!(44.0..=56.0).contains(&from[0]) && (30.0..=70.0).contains(&from[0]), "{from:?}");
     }
 
     #[test]
