@@ -65,6 +65,18 @@ fn narrow_slits_and_free_bodies_cause_warnings() {
     assert!(!warns(&[], "nothing is fixed"));
 }
 
+#[test]
+fn values_without_the_usual_effect_cause_notes() {
+    for (key, odd, usual) in [
+        ("run.frames", "0", "1"),
+        ("solver.damping_per_s", "1e40", "10"),
+        ("incision.0.depth_mm", "0.8", "10"),
+    ] {
+        let note = key.replace(".0.", "[0].") + " = ";
+        assert!(warns(&[(key, odd)], &note) && !warns(&[(key, usual)], &note), "{key}");
+    }
+}
+
 /// The small phantom ends at z = 147 mm.
 #[test]
 fn an_incision_that_leaves_the_scan_causes_a_warning() {

@@ -10,6 +10,7 @@ mod lattice;
 mod materials;
 mod membrane;
 mod memory;
+pub(crate) mod near_end;
 mod no_skin;
 mod region;
 mod sections;

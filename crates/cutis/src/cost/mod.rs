@@ -3,6 +3,7 @@
 
 mod cost_report;
 mod left_out;
+mod odd_values;
 mod plan;
 
 pub use cost_report::{CostPart, CostReport};

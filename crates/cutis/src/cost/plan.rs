@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{CostReport, left_out};
+use super::{CostReport, left_out, odd_values};
 use crate::backend::{Chosen, Request};
-use crate::body::{Body, Membrane};
+use crate::body::{Body, Membrane, near_end};
 use crate::ct::source::Source;
 use crate::model::constraints::coloring::Coloring;
 use crate::model::constraints::kinds::{ConstraintKind, KindRow, ScanTension};
@@ -91,6 +91,8 @@ impl Plan {
         let ModelCosts { backend, sizes, colors, colorings, memory, device_memory, projections, .. } = costs;
         let mut warnings = [source.warnings.as_slice(), &body.warnings].concat();
         warnings.extend(costs.warnings);
+        warnings.extend(near_end::notes(scene, &source.volume));
+        warnings.extend(odd_values::notes(scene, body));
         warnings.extend(narrow_incisions(&scene.incision, body));
         warnings.extend(backend.note.clone());
         warnings.extend(idle_adapter(scene, &backend));
