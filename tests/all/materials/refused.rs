@@ -54,7 +54,11 @@ fn a_layer_thinner_than_the_lattice_step_causes_a_warning() {
         let plan = cutis::check(&small(rows, &[]), &Silent).unwrap();
         plan.warnings.into_iter().find(|warning| warning.contains("thinner than the lattice step"))
     };
-    assert!(warning(&LAYERS).is_some_and(|text| text.starts_with("materials[0] (`skin`)")));
+    let text = warning(&LAYERS).unwrap();
+    assert!(
+        text.starts_with("materials[0] (`skin`)") && text.contains("spacing_mm of 5.0 or less"),
+        "{text}"
+    );
     let mut thick = LAYERS;
     thick[0].depth_mm = Some([0.0, 12.0]);
     thick[3].depth_mm = Some([12.0, 31.0]);
@@ -90,6 +94,12 @@ fn presets_hold_whole_bodies() {
             let named = |name: &str| rows.iter().any(|row| row.name == name && row.vertices > 0);
             assert!(named("skin") && named("fat") && named("bone"), "{preset}: {rows:?}");
             assert!(rows.iter().all(|row| row.source.is_some()), "{preset}");
+            // The thin skin of a preset is as it should be.
+            assert!(
+                !plan.warnings.iter().any(|line| line.contains("thinner than the lattice")),
+                "{:?}",
+                plan.warnings
+            );
         }
     }
 }

@@ -3,6 +3,7 @@
 mod devices;
 mod help;
 mod look;
+mod plan_table;
 mod simulate;
 mod sweep;
 mod tune;

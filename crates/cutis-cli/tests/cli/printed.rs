@@ -32,32 +32,31 @@ fn the_reference_is_printed_to_the_byte() {
 const LAYERED: [&str; 6] =
     ["--set", "materials=layered", "--set", "constraints.distance={}", "--set", "constraints.volume={}"];
 
-/// `cutis check` prints each row of the table with its counts and its source, and the report has
-/// the same rows.
+/// `cutis check` prints each row of the table with its counts. The report has the same rows with
+/// their sources.
 #[test]
 fn materials_are_printed_and_reported_with_their_sources() {
     let desk = Desk::new();
     let call = |first: &[&str]| desk.cutis(&[first, &LAYERED].concat()).expect_success().stdout;
     let printed = call(&["check", "scene.toml"]);
     let lines: Vec<&str> = printed.lines().collect();
-    let title = lines.iter().position(|line| *line == "materials:").unwrap();
+    let title = lines.iter().position(|line| line.starts_with("materials (")).unwrap();
     let report: Value = serde_json::from_str(&call(&["run", "scene.toml", "--json"])).unwrap();
     let rows = report["materials"].as_array().unwrap();
     assert_eq!(rows.len(), 4);
     for (n, row) in rows.iter().enumerate() {
-        let [of_row, of_source] = [0, 1].map(|line| lines[title + 2 + 2 * n + line].trim());
+        let of_row = lines[title + 2 + n].trim();
         let words: Vec<&str> = of_row.split_whitespace().collect();
         assert!(of_row.starts_with(row["name"].as_str().unwrap()), "{of_row}");
         let counts = ["vertices", "tets"].map(|key| row[key].as_u64().unwrap().to_string());
         assert_eq!(words[words.len() - 2..], counts, "{of_row}");
-        assert_eq!(Some(of_source), row["source"].as_str());
     }
-    assert!(lines[title + 2].contains("0 to 2") && lines[title + 3].contains("Pailler-Mattei 2008"));
+    assert!(lines[title + 2].contains("0 to 2"), "{printed}");
     let page = std::fs::read_to_string(desk.path("scene-run/report.html")).unwrap();
     assert!(page.contains("<h2>Materials</h2>") && page.contains("Samani 2007"));
     // Control: a scene without a table has none.
     let plain = desk.cutis(&["check", "scene.toml"]).expect_success().stdout;
-    assert!(!plain.contains("materials:\n") && plain.contains("  materials: each kind has one modulus"));
+    assert!(!plain.contains("materials (") && plain.contains(", materials, "), "{plain}");
 }
 
 /// `| head` closes the pipe early, which is not an error.

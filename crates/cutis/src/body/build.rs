@@ -13,7 +13,7 @@ use super::{
     thin,
 };
 use crate::Error;
-use crate::scene::Keep;
+use crate::scene::{Keep, TissueMaterials};
 
 impl Body {
     /// Builds the body of a scene from its CT.
@@ -66,7 +66,10 @@ impl Body {
         let mut mesh = region::mesh(sections, &whole, &hu, &from_cuts_mm)?;
         warnings.extend(sections.has_tension.then(|| thin::warning(&whole, &mesh, &skin)).flatten());
         let mut materials = BodyMaterials::assign(sections, &whole, &hu, &mesh, &skin)?;
-        warnings.extend(materials.iter().flat_map(|materials| materials.warnings(&mesh)));
+        // The skin of a preset is thinner than most lattices, and its membrane bears the tension.
+        if !matches!(sections.materials, Some(TissueMaterials::Preset(_))) {
+            warnings.extend(materials.iter().flat_map(|materials| materials.warnings(&mesh)));
+        }
         let (mut skin, mut inactive_skin) = mesh.divide_skin(&skin);
         let inactive_hu = inactive_skin.lattice_index.iter().map(|&point| hu[point as usize]).collect();
         drop(hu);
@@ -200,8 +203,7 @@ fn off_skin(slits: &[Slit]) -> Vec<String> {
         (length - on_skin > OFF_SKIN * length).then(|| {
             format!(
                 "incision[{}] has no skin along {:.0} of its {length:.0} mm: it leaves the scan, or passes over \
-                 a gap in the skin, and cuts nothing there. Move the ends of the incision onto the skin of the \
-                 scan",
+                 a gap in the skin, and cuts nothing there",
                 slits[0].incision(),
                 length - on_skin
             )
@@ -221,23 +223,25 @@ fn free_pieces(pieces_ml: &[f64]) -> Option<String> {
     let all: Vec<String> = pieces_ml.iter().map(|ml| format!("{ml:.2}")).collect();
     (!all.is_empty()).then(|| {
         format!(
-            "the cuts separate {} pieces from the body, of {} ml: no tissue holds them in their place. Leave \
-             tissue between the cuts, or take a piece out with [[excision]]",
+            "the cuts separate {} pieces from the body, of {} ml: no tissue holds them in their place",
             all.len(),
             all.join(", ")
         )
     })
 }
 
+/// Share of the tetrahedra that lie apart above which they are reported. Fewer are noise of the CT.
+const DROPPED: f64 = 1e-2;
+
 /// Warning about tissue that is not connected with the largest part.
 fn dropped_tets(mesh: &TetMesh) -> Option<String> {
     let inactive = mesh.inactive.as_ref().map_or(0, |inactive| inactive.tets);
-    (mesh.dropped_tets > 0).then(|| {
+    let all = mesh.dropped_tets + mesh.tets.len() + inactive;
+    (mesh.dropped_tets as f64 > DROPPED * all as f64).then(|| {
         format!(
-            "{} of {} tissue tetrahedra lie apart from the largest part and were left out \
-             (tissue.keep = \"largest\"). Set tissue.keep = \"all\" if they belong to the body",
+            "{} of {all} tissue tetrahedra lie apart from the largest part and were left out. If they belong to \
+             the body, set tissue.keep = \"all\"",
             mesh.dropped_tets,
-            mesh.dropped_tets + mesh.tets.len() + inactive
         )
     })
 }

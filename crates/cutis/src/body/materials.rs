@@ -7,15 +7,13 @@ use rayon::prelude::*;
 use super::BodySections;
 use crate::Error;
 use crate::output::report::MaterialRow;
-use crate::scene::{MATERIALS_KEY, SceneFile, TissueMaterialSection, TissueMaterials};
+use crate::scene::{MATERIALS_KEY, SceneFile, TissueMaterialSection};
 
 /// The scene's table of materials, and the row of each vertex of the mesh.
 pub(crate) struct BodyMaterials {
     pub(crate) rows: Vec<TissueMaterialSection>,
     /// Number of the row of each vertex.
     pub(crate) row_of_vertex: Vec<u8>,
-    /// Whether the rows are those of a preset.
-    is_preset: bool,
 }
 
 impl BodyMaterials {
@@ -48,8 +46,7 @@ impl BodyMaterials {
             let why = not_held(&rows, mesh, vertex, depth_mm(vertex), count);
             return Err(file.bad_key(MATERIALS_KEY, "", &why));
         }
-        let is_preset = matches!(materials, TissueMaterials::Preset(_));
-        Ok(Some(Self { rows, row_of_vertex: found.into_iter().flatten().collect(), is_preset }))
+        Ok(Some(Self { rows, row_of_vertex: found.into_iter().flatten().collect() }))
     }
 
     /// Adds the virtual nodes of cuts, each with the material of the vertex at its place.
@@ -80,21 +77,18 @@ impl BodyMaterials {
         self.rows.iter().zip(counts).map(row).collect()
     }
 
-    /// Warnings about layers of the scene's own table that are thinner than a step of the lattice.
-    /// The presets have such a layer on every common lattice: their skin has 2 mm.
+    /// Warnings about layers that are thinner than a step of the lattice.
     pub(super) fn warnings(&self, mesh: &TetMesh) -> Vec<String> {
-        if self.is_preset {
-            return Vec::new();
-        }
         let step = mesh.lattice.longest_step_mm();
         let thickness = |row: &TissueMaterialSection| row.depth_mm.map(|[low, high]| high - low);
         let thin = self.rows.iter().enumerate().filter(|(_, row)| thickness(row).is_some_and(|mm| mm < step));
         let warning = |(n, row): (usize, &TissueMaterialSection)| {
             format!(
                 "{MATERIALS_KEY}[{n}] (`{}`) is a layer thinner than the lattice step of {step:.2} mm: it acts \
-                 like a layer of about half a step, or is missed. Set lattice.spacing_mm to the thickness of the \
-                 layer or less, or join it with the next row",
-                row.name
+                 like a layer of about half a step, or is missed. Use a lattice.spacing_mm of {:.1} or less, or \
+                 leave the layer to the skin (constraints.membrane)",
+                row.name,
+                thickness(row).unwrap_or_default()
             )
         };
         thin.map(warning).collect()

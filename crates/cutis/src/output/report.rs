@@ -257,14 +257,12 @@ pub struct MembraneReport {
 }
 
 impl MembraneReport {
-    /// One line about the coverage and the normals.
+    /// One line about the coverage. A warning reports normals that are not those of the CT.
     pub fn summary(&self) -> String {
-        let Self { triangles, coverage, normals_from_facets } = self;
-        let lines = match coverage {
+        match self.coverage {
             Some(coverage) => format!("a direction on {:.1} % of the skin", 100.0 * coverage),
             None => "no direction: the skin is isotropic".to_owned(),
-        };
-        format!("{lines}; {normals_from_facets} of {triangles} triangles have the normal of their facets")
+        }
     }
 }
 
