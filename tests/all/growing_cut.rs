@@ -217,11 +217,11 @@ fn paths_that_are_not_possible_are_refused() {
         ("path_mm = [[30, 110, -50], [nan, 0, 0]]".to_owned(), ["incision[0].path_mm[1]", "finite"]),
         (
             "path_mm = [[30, 110, -50], [30, 110, 50], [30, 110, 0]]".to_owned(),
-            ["incision 0", "turns by 180"],
+            ["`incision[0]`", "turns by 180"],
         ),
         (
             "path_mm = [[0, 110, 0], [60, 105, 0], [60, 105, 40], [30, 110, 40], [30, 110, -40]]".to_owned(),
-            ["incision 0", "two incisions"],
+            ["`incision[0]`", "two incisions"],
         ),
         ("path_mm = [[30, 110, -50], [30, 200, 0], [30, 110, 50]]".to_owned(), ["incision", "from the skin"]),
     ] {

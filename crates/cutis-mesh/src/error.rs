@@ -116,7 +116,7 @@ pub enum MeshError {
     },
     /// A stitch has no skin at one of its ends, or nothing is cut between its ends.
     #[error(
-        "a stitch across incision {incision} has no skin of its own within {reach_mm:.1} mm of {at_mm:.1?} mm; make it shorter or longer, or place it where the incision is"
+        "a stitch across incision {incision} has no skin of its own within {reach_mm:.1} mm of {at_mm:.1?} mm; use a finer lattice, make it shorter or longer, or place it where the incision is"
     )]
     StitchOffSkin {
         /// Number of the incision, from 0.
@@ -148,7 +148,8 @@ pub enum MeshError {
     },
     /// The segment of an incision is too far from the skin.
     #[error(
-        "incision {incision}: the segment {from_mm:?} → {to_mm:?} mm is {distance_mm:.1} mm from the skin; it must lie within {reach_mm:.1} mm of it"
+        "incision {incision}: the segment {from_mm:?} → {to_mm:?} mm is {distance_mm:.1} mm from the skin, its start {:.1} mm and its end {:.1} mm; it must lie within {reach_mm:.1} mm of the skin",
+        ends_mm[0], ends_mm[1]
     )]
     IncisionOffSkin {
         /// Number of the incision, from 0.
@@ -159,6 +160,8 @@ pub enum MeshError {
         to_mm: [f64; 3],
         /// Distance in mm from the segment to the nearest center of a skin triangle.
         distance_mm: f64,
+        /// The same for its start and its end.
+        ends_mm: [f64; 2],
         /// Largest allowed distance in mm.
         reach_mm: f64,
     },

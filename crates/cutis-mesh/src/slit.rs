@@ -8,6 +8,8 @@ use crate::path::check_path;
 use crate::skin_surface::{Facet, SkinSurface};
 use crate::{Lattice, MeshError};
 
+/// Largest distance in m between the skin and a shallow segment, for any length.
+const MOST_REACH: f64 = 0.05;
 /// Largest number of sample points and bins along one slit. It limits the work for very long
 /// segments.
 const MOST_BINS: f64 = 1024.0;
@@ -83,10 +85,10 @@ impl Slit {
 
     /// Finds the axes of the slit and the height of the skin along it.
     ///
-    /// Let `reach` be the largest of the depth, a quarter of the length and two lattice steps. This
-    /// suffices for a segment under strongly curved skin. The segment must come within `reach` of
-    /// the center of a skin triangle. Along at least half of the segment there must be skin within
-    /// `reach` above or below it.
+    /// Let `reach` be the largest of the depth, a quarter of the length up to 50 mm, and two
+    /// lattice steps. This suffices for a segment under strongly curved skin. The segment must come
+    /// within `reach` of the center of a skin triangle. Along at least half of the segment there
+    /// must be skin within `reach` above or below it.
     pub(crate) fn place(
         surface: &SkinSurface<'_>,
         number: usize,
@@ -104,17 +106,21 @@ impl Slit {
         let along = (end - start) / length;
         let (depth, half_width) = (cut.depth_mm / 1000.0, cut.width_mm.unwrap_or(0.0) / 2000.0);
         let (step, facets) = (surface.step, &surface.facets);
-        let reach = depth.max(length / 4.0).max(2.0 * step);
+        let reach = depth.max((length / 4.0).min(MOST_REACH)).max(2.0 * step);
 
         let from_segment = |facet: &Facet| {
             let s = (facet.center - start).dot(&along).clamp(0.0, length);
             (facet.center - (start + along * s)).norm()
+        };
+        let from_end = |end: Point3<f64>| {
+            facets.iter().map(|facet| (facet.center - end).norm()).fold(f64::INFINITY, f64::min)
         };
         let off_skin = |distance: f64| MeshError::IncisionOffSkin {
             incision: number,
             from_mm,
             to_mm,
             distance_mm: distance * 1000.0,
+            ends_mm: [start, end].map(|end| from_end(end) * 1000.0),
             reach_mm: reach * 1000.0,
         };
         if facets.is_empty() {
@@ -167,10 +173,7 @@ impl Slit {
         let (heights, on_skin) = slit.heights(surface);
         slit.on_skin = on_skin as f64 / heights.len() as f64;
         if slit.on_skin < 0.5 {
-            let from = |end: Point3<f64>| {
-                facets.iter().map(|facet| (facet.center - end).norm()).fold(f64::INFINITY, f64::min)
-            };
-            let distance = from(start).max(from(end));
+            let distance = from_end(start).max(from_end(end));
             let (share, reach_mm) = (slit.on_skin, reach * 1000.0);
             let over_gap = MeshError::IncisionOverGap { incision: number, from_mm, to_mm, share, reach_mm };
             return Err(if distance > reach { off_skin(distance) } else { over_gap });

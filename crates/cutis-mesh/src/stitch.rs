@@ -202,7 +202,8 @@ impl Cut {
             let at_mm: [f64; 3] = mesh.frame.to_mm(at.cast()).into();
             let reach_mm = tissue.reach * 1000.0;
             refuse(format!(
-                "a stitch has no tissue within {reach_mm:.1} mm of {at_mm:.1?} mm; change bite_mm"
+                "a stitch has no tissue within {reach_mm:.1} mm of {at_mm:.1?} mm; use a finer lattice, \
+                 or change bite_mm"
             ))
         };
         let stitch = |number: usize| {

@@ -197,7 +197,7 @@ pub enum Error {
         why: String,
     },
     /// A checkpoint belongs to another scene or is damaged.
-    #[error("{}: not a checkpoint of this scene: {why}", path.display())]
+    #[error("{}: no checkpoint of this scene: {why}", path.display())]
     Checkpoint {
         /// The checkpoint file.
         path: PathBuf,

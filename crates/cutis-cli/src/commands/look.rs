@@ -26,7 +26,7 @@ pub(crate) fn inspect(volume: &VolumeArgs, json: bool) -> Result<(), Error> {
 fn folder_page(found: &FolderInspection) -> String {
     let mut lines: Vec<String> = found.series.iter().map(series_lines).collect();
     if !found.damaged.is_empty() {
-        lines.push("damaged files; no series is read as long as they are in the folder:".into());
+        lines.push("files that cannot be read; no series is read as long as they are in the folder:".into());
         lines.extend(found.damaged.iter().map(|what| format!("  {what}")));
     }
     lines.extend(found.notes.iter().map(|note| format!("note: {note}")));

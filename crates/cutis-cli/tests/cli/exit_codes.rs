@@ -65,7 +65,7 @@ fn bad_input_ends_with_two_and_a_message_that_names_it() {
     let bytes = std::fs::read(desk.path("good.nii.gz")).unwrap();
     desk.put("half.nii.gz", &bytes[..bytes.len() / 2]);
     desk.put("hostile.nii", hostile_header());
-    let cases: [(&str, &[&str]); 30] = [
+    let cases: [(&str, &[&str]); 35] = [
         ("run missing.toml", &["missing.toml", "read"]),
         ("run typo.toml", &["typo.toml", "incision[0].depht_mm", "depth_mm"]),
         ("run type.toml", &["type.toml", "constraints.stc.rest_area_scale", "tight"]),
@@ -74,17 +74,28 @@ fn bad_input_ends_with_two_and_a_message_that_names_it() {
         ("run scene.toml --set run.frame=1", &["scene.toml", "run.frame", "frames"]),
         ("run scene.toml --adapter=", &["scene.toml", "solver.adapter", "cutis devices"]),
         ("run scene.toml --backend tpu", &["scene.toml", "solver.backend", "tpu", "reference"]),
-        ("run scene.toml --set tissue.air_below_hu=5000", &["scene.toml", "tissue", "no tissue"]),
         (
-            "run scene.toml --resume --out nothing-there",
-            &["nothing-there/checkpoint.bin", "run.checkpoint_every"],
+            "run scene.toml --set tissue.air_below_hu=5000",
+            &["scene.toml", "tissue.air_below_hu", "5000", "air"],
         ),
+        ("run scene.toml --resume --out nothing-there", &["nothing-there/checkpoint.bin", "there is no"]),
         ("check scene.toml --set volume.path=a.nii", &["scene.toml", "volume", "exactly one"]),
         ("check scene.toml --set volume={path='half.nii'}", &["half.nii", "truncated"]),
-        ("check scene.toml --lattice 0.0001", &["scene.toml", "lattice", "at most"]),
+        ("check scene.toml --lattice 0.0001", &["scene.toml", "lattice.spacing_mm", "0.0001", "or more"]),
+        ("check scene.toml --lattice 1000", &["lattice.spacing_mm", "1000", "shortest side"]),
+        ("check scene.toml --set ..=3", &["key `..`", "an empty name"]),
+        ("check scene.toml --set solver.substeps=0", &["scene.toml, overridden: key `solver.substeps`"]),
+        (
+            "check scene.toml --set incision.0.to_mm.1=500",
+            &["key `incision[0]`: the segment", "from the skin, its start", "it must lie within 50.0 mm"],
+        ),
+        ("resample scene.toml --run nope --out out.nii", &["nope/checkpoint.bin", "there is no folder nope"]),
         ("check lost.toml", &["lost.toml", "volume.path", "missing.nii.gz"]),
         ("check empty.toml", &["empty.toml", "key `volume`", "is missing"]),
-        ("check scene.toml --set stpe=1", &["scene.toml", "unknown key", "the nearest one is `step`"]),
+        (
+            "check scene.toml --set stpe=1",
+            &["scene.toml", "unknown key", "`stpe`; the nearest one is `step`; expected"],
+        ),
         ("check scene.toml --set run.frames=1.5", &["run.frames", "1.5", "expected a whole number"]),
         (
             "check scene.toml --set incision.0.depth_mm=2000",
@@ -133,6 +144,27 @@ fn hostile_header() -> Vec<u8> {
     put(108, &352_f32.to_le_bytes());
     put(344, b"n+1\0");
     bytes
+}
+
+/// The checkpoint of another scene is refused with the keys that differ.
+#[test]
+fn the_keys_of_another_scene_are_named() {
+    let desk = Desk::new();
+    let run = ["run", "scene.toml", "--out", "run", "--set", "run.checkpoint_every=2"];
+    desk.cutis(&run).expect_success();
+    let resample = ["resample", "scene.toml", "--run", "run", "--out", "out.nii", "--set"];
+    // Control: keys of the run and of its outputs may differ.
+    desk.cutis(&[&resample[..], &["run.frames=7"]].concat()).expect_success();
+    for (change, key) in [
+        ("solver.substeps=3", "differs in `solver.substeps`;"),
+        ("lattice.spacing_mm=16", "differs in `lattice.spacing_mm`;"),
+    ] {
+        let other = desk.cutis(&[&resample[..], &[change]].concat());
+        other.expect_error(2, &["run/checkpoint.bin", key, "--set"]);
+    }
+    std::fs::remove_file(desk.path("run/report.json")).unwrap();
+    desk.cutis(&[&resample[..], &["solver.substeps=3"]].concat())
+        .expect_error(2, &["program version differ"]);
 }
 
 /// A lattice that is too fine for the memory is refused with the need, the memory and the key,

@@ -1,7 +1,9 @@
 //! Builds a body from its CT.
 
 use cutis_mesh::sever::Severed;
-use cutis_mesh::{Cut, Excision, Incision, Lattice, Piece, Pocket, Skin, Slit, TetMesh, Tissue, TissueMask};
+use cutis_mesh::{
+    Cut, Excision, Incision, Lattice, MeshError, Piece, Pocket, Skin, Slit, TetMesh, Tissue, TissueMask,
+};
 use cutis_skin::{BodySkin, SkinMoves};
 use cutis_volume::{Grid, TableKind, Volume};
 use nalgebra::Point3;
@@ -9,8 +11,8 @@ use nalgebra::Point3;
 use super::cut_error::cut_error;
 use super::lattice::lattice;
 use super::{
-    Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, memory, no_skin, region, sutures,
-    thin,
+    AIR_BELOW_HU, Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, memory,
+    no_skin, region, sutures, thin,
 };
 use crate::Error;
 use crate::scene::{Keep, TissueMaterials};
@@ -35,7 +37,8 @@ impl Body {
         let largest_component = tissue.keep == Keep::Largest;
         let found = Tissue { air: &air, cut_away: &tissue.cut_planes, largest_component };
         let mut warnings = Vec::new();
-        let (whole, skin) = find_tissue(sections, &lattice, &found, &mut warnings)?;
+        let tissue_error = |error| no_tissue(sections, volume, error);
+        let (whole, skin) = find_tissue(sections, &lattice, &found, &mut warnings).map_err(tissue_error)?;
         if let Some(Skin { report, .. }) = skin.as_ref().filter(|skin| skin.triangles.is_empty()) {
             let why = no_skin::reason(volume, tissue.air_below_hu, report);
             match sections.cuts() || sections.smooth_skin {
@@ -145,12 +148,9 @@ fn find_tissue(
     lattice: &Lattice,
     tissue: &Tissue<'_>,
     warnings: &mut Vec<String>,
-) -> Result<(TissueMask, Option<Skin>), Error> {
-    let blame = sections.file.blame("tissue");
-    let Some(mode) = sections.skin else {
-        return Ok((TissueMask::find(lattice, tissue).map_err(blame)?, None));
-    };
-    let (whole, mut skin) = TissueMask::find_with_skin(lattice, tissue, mode, None).map_err(blame)?;
+) -> Result<(TissueMask, Option<Skin>), MeshError> {
+    let Some(mode) = sections.skin else { return Ok((TissueMask::find(lattice, tissue)?, None)) };
+    let (whole, mut skin) = TissueMask::find_with_skin(lattice, tissue, mode, None)?;
     let (on_body, dropped) = whole.skin(&skin);
     if dropped > 0 {
         warnings.push(format!(
@@ -159,6 +159,23 @@ fn find_tissue(
     }
     skin.triangles = on_body;
     Ok((whole, Some(skin)))
+}
+
+/// The error of a threshold of air that lies above all values of the CT names the key. Others name
+/// the section.
+fn no_tissue(sections: &BodySections<'_>, volume: &Volume, error: MeshError) -> Error {
+    let key = "tissue.air_below_hu";
+    let threshold = sections.tissue.air_below_hu;
+    let most = volume.voxels().iter().map(|&stored| volume.hu(stored)).fold(f32::NEG_INFINITY, f32::max);
+    match error {
+        MeshError::NoTissue { .. } if most < threshold && threshold > AIR_BELOW_HU => {
+            let why = format!(
+                "makes all of the CT air: its values go up to {most} HU; the usual value is {AIR_BELOW_HU}"
+            );
+            sections.file.bad_key(key, &threshold.to_string(), &why)
+        }
+        other => sections.file.blame("tissue")(other),
+    }
 }
 
 /// The body with the vertices of its skin on a smooth surface. `hu` has one value per lattice

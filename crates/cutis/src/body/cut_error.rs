@@ -22,6 +22,18 @@ pub(super) fn cut_error(file: SceneFile<'_>) -> impl Fn(MeshError) -> Error {
             MeshError::Excision { excision, .. } => format!("excision[{excision}]"),
             _ => "incision".to_owned(),
         };
-        file.blame(&section)(error)
+        // The section has the number of the cut, with which these messages begin too.
+        let text = match &error {
+            MeshError::Undermining { why, .. } | MeshError::Excision { why, .. } => why.clone(),
+            other => other.to_string(),
+        };
+        let number = format!("{}: ", section.replace('[', " ").replace(']', ""));
+        match (text.strip_prefix(&number), &error) {
+            (Some(why), _) => file.bad_key(&section, "", why),
+            (None, MeshError::Undermining { .. } | MeshError::Excision { .. }) => {
+                file.bad_key(&section, "", &text)
+            }
+            (None, _) => file.blame(&section)(error),
+        }
     }
 }

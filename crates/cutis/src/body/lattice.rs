@@ -5,7 +5,7 @@ use cutis_volume::sample::{self, LatticeSize};
 use cutis_volume::{Grid, Volume};
 use nalgebra::{Point3, Vector3};
 
-use super::BodySections;
+use super::{BodySections, memory};
 use crate::Error;
 use crate::scene::{IncisionSection, LatticeSection, Zone};
 
@@ -26,7 +26,8 @@ impl LatticeSection {
 /// [`Error`] for a lattice that does not fit the CT.
 pub(crate) fn lattice(sections: &BodySections<'_>, volume: &Volume) -> Result<Lattice, Error> {
     let (file, section) = (sections.file, sections.lattice);
-    let even = sample::lattice_grid(volume.grid(), section.size()).map_err(file.blame("lattice"))?;
+    let even = sample::lattice_grid(volume.grid(), section.size())
+        .map_err(|error| memory::lattice_size(sections, volume.grid(), error))?;
     let lattice = match &section.grading {
         None => Lattice::new(even, section.split),
         Some(grading) => {

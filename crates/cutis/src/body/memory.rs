@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use cutis_solver::Formulation;
+use cutis_volume::{Grid, VolumeError};
 
 use super::BodySections;
 use crate::Error;
@@ -51,6 +52,36 @@ pub(super) fn check_tissue(sections: &BodySections<'_>, points: usize) -> Result
 /// Refuses a body of `tets` tetrahedra that cannot be simulated in the memory of this machine.
 pub(super) fn check_tets(sections: &BodySections<'_>, tets: usize) -> Result<(), Error> {
     refuse_above(available(), sections, tets as u64 * sections.bytes_per_tet, &format!("{tets} tetrahedra"))
+}
+
+/// The error of a spacing that is too large for the scan, or so small that the points of the
+/// lattice cannot be counted. Other errors name the section.
+pub(super) fn lattice_size(sections: &BodySections<'_>, scan: &Grid, error: VolumeError) -> Error {
+    let (VolumeError::LatticeSize { vertices, most, .. }, Some(spacing)) =
+        (&error, sections.lattice.spacing_mm)
+    else {
+        return sections.file.blame("lattice")(error);
+    };
+    let steps = scan.affine.spacing_mm();
+    let sides: [f64; 3] = std::array::from_fn(|axis| scan.shape[axis].saturating_sub(1) as f64 * steps[axis]);
+    let shortest = sides.into_iter().fold(f64::INFINITY, f64::min);
+    let points: f64 = vertices.iter().product();
+    let why = match points > *most as f64 {
+        true => {
+            let fits = (*most).min(available().map_or(*most, |available| available / BYTES_PER_POINT));
+            format!(
+                "gives {points:.2e} lattice points over a scan of {:.0} x {:.0} x {:.0} mm; use {:.2} or more",
+                sides[0],
+                sides[1],
+                sides[2],
+                (spacing * (points / fits as f64).cbrt() * 100.0).ceil() / 100.0
+            )
+        }
+        false => {
+            format!("is more than the scan has along its shortest side, {shortest:.1} mm; use at most that")
+        }
+    };
+    sections.file.bad_key("lattice.spacing_mm", &spacing.to_string(), &why)
 }
 
 /// Refuses a lattice of `points` points outside a scene.

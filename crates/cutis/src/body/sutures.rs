@@ -1,6 +1,6 @@
 //! The stitches of the sutures of a scene.
 
-use cutis_mesh::{Cut, Stitch, Stitching, TetMesh};
+use cutis_mesh::{Cut, MeshError, Stitch, Stitching, TetMesh};
 
 use super::BodySections;
 use crate::Error;
@@ -24,7 +24,11 @@ pub(super) fn stitches(
             (Some(every), None) => cut.stitches(wound, mesh, skin, &along(every)),
             (Some(every), Some(excision)) => cut.stitches_across(excision, mesh, skin, &along(every)),
         };
-        placed.map_err(sections.file.blame(&format!("suture[{n}]")))
+        let section = format!("suture[{n}]");
+        placed.map_err(|error| match error {
+            MeshError::Excision { why, .. } => sections.file.bad_key(&section, "", &why),
+            other => sections.file.blame(&section)(other),
+        })
     };
     sections.sutures.iter().zip(&sections.closes).enumerate().map(place).collect()
 }

@@ -15,6 +15,7 @@ use crate::ct::source;
 use crate::run::checkpoint::{self, Checkpoint};
 use crate::run::clock::Clock;
 use crate::run::files::RunFolder;
+use crate::run::other_scene;
 use crate::scene::LoadedScene;
 use crate::{Error, Progress};
 
@@ -55,12 +56,14 @@ pub fn resample_run(
     check_name(request)?;
     let mut clock = Clock::new(progress);
     let folder = RunFolder(request.run.clone());
+    Checkpoint::find(&folder.checkpoint())?;
     let mut stages = Stages::on(Request::of(loaded)?.open()?);
     let source = clock.stage("read the CT", 0, |_| source::load(loaded))?;
     let body = clock
         .stage("lattice, skin, incision", 0, |_| Body::build(&BodySections::of(loaded), &source.volume))?;
     let fingerprint = checkpoint::fingerprint(&loaded.scene, &source.sha256);
-    let saved = Checkpoint::read(&folder.checkpoint(), &fingerprint, body.mesh.positions.len())?;
+    let saved = Checkpoint::read(&folder.checkpoint(), &fingerprint, body.mesh.positions.len())
+        .map_err(|error| other_scene::explain(error, &folder, &loaded.scene))?;
     let warp = BodyWarp::new(&body, &saved.positions, last_cut_s(&loaded.scene, saved.frame), None, &stages)?;
     let out = &request.out;
     match &request.input {

@@ -20,6 +20,10 @@ use super::history;
 use crate::run::files;
 use crate::{Error, Scene};
 
+/// Why the checkpoint of another scene is refused.
+pub(crate) const OTHER_SCENE: &str = "scene, volume or program version differ from those that wrote it; give the same \
+                                      --set as for the run";
+
 const MAGIC: &[u8; 8] = b"CUTISCP4";
 const HEADER: usize = 8 + 32 + 4 + 8;
 const SEAL: usize = 32;
@@ -79,6 +83,19 @@ impl Checkpoint {
         files::write(path, &bytes)
     }
 
+    /// Whether there is a checkpoint.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`] if there is no such file.
+    pub(crate) fn find(path: &Path) -> Result<(), Error> {
+        let why = match path.parent() {
+            _ if path.exists() => return Ok(()),
+            Some(folder) if !folder.exists() => format!("there is no folder {}", folder.display()),
+            _ => "there is no such file; a run with run.checkpoint_every above 0 writes it".into(),
+        };
+        Err(Error::Checkpoint { path: path.into(), why })
+    }
+
     /// Reads a checkpoint of a scene with `vertices` vertices.
     ///
     /// # Errors
@@ -86,15 +103,11 @@ impl Checkpoint {
     /// another scene.
     pub(crate) fn read(path: &Path, fingerprint: &[u8; 32], vertices: usize) -> Result<Self, Error> {
         let fail = |why: String| Error::Checkpoint { path: path.into(), why };
-        if !path.exists() {
-            return Err(fail(
-                "there is no such file; a run with run.checkpoint_every above 0 writes it".into(),
-            ));
-        }
+        Self::find(path)?;
         let bytes = files::read(path)?;
         let saved = Self::parse(path, &bytes)?;
         if bytes[8..40] != fingerprint[..] {
-            return Err(fail("scene, volume or program version differ from those that wrote it; give the same --set as for the run".into()));
+            return Err(fail(OTHER_SCENE.into()));
         }
         match saved.positions.len() == vertices {
             true => Ok(saved),

@@ -11,6 +11,7 @@ mod date;
 pub(crate) mod files;
 pub(crate) mod frames;
 mod history;
+pub(crate) mod other_scene;
 mod peak_memory;
 pub(crate) mod prepare;
 mod run_loop;
@@ -29,6 +30,7 @@ use crate::output::{self, DeformedBody};
 use crate::scene::LoadedScene;
 use crate::{Error, Progress};
 
+use checkpoint::Checkpoint;
 use clock::Clock;
 use files::RunFolder;
 use prepare::prepare;
@@ -78,6 +80,9 @@ fn run_with(
     let (mut clock, folder) = (Clock::new(progress), RunFolder(options.out.clone()));
     files::check_writable(&folder.0)?;
     folder.remove_abandoned(progress);
+    if options.resume && loaded.scene.run.checkpoint_every == 0 {
+        Checkpoint::find(&folder.checkpoint())?;
+    }
     let prepare::Prepared { source, body, model, backend, plan } = prepare(loaded, request, &mut clock)?;
     let setup = simulate::Setup { loaded, options, folder: &folder, source: &source, body: &body };
     let simulated = simulate(&setup, model, &backend, plan, &mut clock)?;
@@ -108,7 +113,6 @@ mod tests {
     use std::fs;
     use std::sync::Mutex;
 
-    use super::checkpoint::Checkpoint;
     use super::*;
     use crate::Override;
 

@@ -7,6 +7,7 @@ use super::checkpoint::{self, Checkpoint};
 use super::clock::Clock;
 use super::files::{self, RunFolder};
 use super::frames::FrameRow;
+use super::other_scene;
 use super::run_loop::{RunLoop, RunResult};
 use super::series::Series;
 use super::stops::Stop;
@@ -130,7 +131,8 @@ fn resume(
     simulation: &mut dyn Simulation,
 ) -> Result<(u32, Vec<FrameRow>), Error> {
     let (path, frames) = (setup.folder.checkpoint(), setup.loaded.scene.run.frames);
-    let saved = Checkpoint::read(&path, fingerprint, setup.body.mesh.positions.len())?;
+    let saved = Checkpoint::read(&path, fingerprint, setup.body.mesh.positions.len())
+        .map_err(|error| other_scene::explain(error, setup.folder, &setup.loaded.scene))?;
     if saved.frame > frames {
         let why = format!("it is at frame {}, and run.frames = {frames} lies before it", saved.frame);
         return Err(Error::Checkpoint { path, why });

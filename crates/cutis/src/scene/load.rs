@@ -124,6 +124,15 @@ impl Scene {
         directory: &Path,
         overrides: &[Override],
     ) -> Result<LoadedScene, Error> {
+        Self::parse_with(text, file, directory, overrides).map_err(|error| name_override(error, overrides))
+    }
+
+    fn parse_with(
+        text: &str,
+        file: &Path,
+        directory: &Path,
+        overrides: &[Override],
+    ) -> Result<LoadedScene, Error> {
         let table: toml::Table = toml::from_str(text).map_err(|e| {
             // The message quotes the line, which may be the whole file if the file is not a scene.
             let lines: Vec<String> = e.to_string().trim_end().lines().map(shorten).collect();
@@ -197,6 +206,23 @@ impl Scene {
     }
 }
 
+/// Says that the value of a key comes from an override and does not stand in the file.
+fn name_override(error: Error, overrides: &[Override]) -> Error {
+    let dots = |key: &str| key.replace('[', ".").replace(']', "");
+    match error {
+        Error::SceneKey { file, key, value, why } => {
+            let own = dots(&key);
+            let of = |o: &Override| own == dots(&o.key) || own.starts_with(&format!("{}.", dots(&o.key)));
+            let file = match overrides.iter().any(of) {
+                true => format!("{}, overridden", file.display()).into(),
+                false => file,
+            };
+            Error::SceneKey { file, key, value, why }
+        }
+        other => other,
+    }
+}
+
 /// The key that a message of serde about the section `at` misses.
 fn missing_key(at: &str, message: &str) -> Option<String> {
     let missing = message.strip_prefix("missing field `")?.split('`').next()?;
@@ -211,6 +237,9 @@ fn set(mut at: &mut toml::Value, key: &str, new: toml::Value) -> Result<(), Stri
     let parts = key.split('.').count();
     if parts > MAX_KEY_PARTS {
         return Err(format!("has {parts} parts; a key of a scene has at most {MAX_KEY_PARTS}"));
+    }
+    if key.split('.').any(str::is_empty) {
+        return Err("has an empty name: write names with one dot between them, as in solver.substeps".into());
     }
     for part in key.split('.') {
         at = match at {

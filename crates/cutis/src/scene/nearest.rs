@@ -8,12 +8,18 @@ pub(crate) fn of<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Optio
     (2 * edits <= longer).then_some(name)
 }
 
-/// The message of serde about an unknown key, with the nearest valid one. Other messages stay.
+/// The message of serde about an unknown key, with the nearest valid one before the list of all.
+/// Other messages stay.
 pub(crate) fn with_suggestion(message: &str) -> String {
     let mut words = message.split('`').skip(1).step_by(2);
     let wrong = words.next().filter(|_| message.starts_with("unknown field"));
     let near = wrong.and_then(|wrong| of(wrong, words));
-    near.map_or_else(|| message.to_owned(), |near| format!("{message}; the nearest one is `{near}`"))
+    match (near, message.split_once(", expected ")) {
+        (Some(near), Some((unknown, all))) => {
+            format!("{unknown}; the nearest one is `{near}`; expected {all}")
+        }
+        _ => message.to_owned(),
+    }
 }
 
 /// A message of serde in the words of people who do not know Rust.
@@ -77,7 +83,9 @@ mod tests {
         assert_eq!(of("spcing_mm", names.into_iter()), Some("spacing_mm"));
         assert_eq!(of("frames", names.into_iter()), None);
         let message = "unknown field `spliit`, expected one of `spacing_mm`, `split`";
-        assert!(with_suggestion(message).ends_with("`split`; the nearest one is `split`"));
+        let named =
+            "unknown field `spliit`; the nearest one is `split`; expected one of `spacing_mm`, `split`";
+        assert_eq!(with_suggestion(message), named);
         assert_eq!(with_suggestion("invalid type: `spliit`"), "invalid type: `spliit`");
     }
 
