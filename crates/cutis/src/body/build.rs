@@ -11,7 +11,7 @@ use nalgebra::Point3;
 use super::cut_error::cut_error;
 use super::lattice::lattice;
 use super::{
-    AIR_BELOW_HU, Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, handles, memory,
+    AIR_BELOW_HU, Body, BodyMaterials, BodySections, GrowingCuts, Membrane, air, estimate, handles, memory,
     no_skin, region, sutures, thin,
 };
 use crate::Error;
@@ -30,6 +30,7 @@ impl Body {
         }
         let lattice = lattice(sections, volume)?;
         memory::check_points(sections, lattice.grid().len())?;
+        memory::check_estimate(sections, estimate::tets(sections, volume, &lattice))?;
         refuse_deep_cuts(sections, volume.grid())?;
         let hu = lattice.sample(volume)?;
         let air = air(&hu, tissue.air_below_hu);

@@ -49,6 +49,15 @@ pub(super) fn check_tissue(sections: &BodySections<'_>, points: usize) -> Result
     refuse_above(available, sections, needed, &format!("about {tets} tetrahedra"))
 }
 
+/// Refuses a body whose estimate is far too large, before its lattice is sampled. The estimate may
+/// hold a table that is left out later, so that only one and a half times the memory is refused.
+pub(super) fn check_estimate(sections: &BodySections<'_>, tets: Option<u64>) -> Result<(), Error> {
+    let tets = tets.unwrap_or(0);
+    let needed = tets.saturating_mul(sections.bytes_per_tet);
+    let available = available().filter(|&available| needed / 3 * 2 > available);
+    refuse_above(available, sections, needed, &format!("about {tets} tetrahedra"))
+}
+
 /// Refuses a body of `tets` tetrahedra that cannot be simulated in the memory of this machine.
 pub(super) fn check_tets(sections: &BodySections<'_>, tets: usize) -> Result<(), Error> {
     refuse_above(available(), sections, tets as u64 * sections.bytes_per_tet, &format!("{tets} tetrahedra"))
@@ -201,7 +210,11 @@ mod tests {
         loaded.scene.lattice.region = None;
         let sections = BodySections::of(&loaded);
         check_tissue(&sections, 1000).unwrap();
+        check_estimate(&sections, None).unwrap();
+        check_estimate(&sections, Some(1000)).unwrap();
         if available().is_some() {
+            let early = check_estimate(&sections, Some(most as u64)).unwrap_err().to_string();
+            assert!(early.contains("about 1125899906842624 tetrahedra take"), "{early}");
             let text = check_tissue(&sections, most).unwrap_err().to_string();
             assert!(text.contains("tetrahedra take about") && text.contains("lattice.spacing_mm"), "{text}");
         }

@@ -2,6 +2,7 @@
 
 mod build;
 mod cut_error;
+mod estimate;
 mod find_skin;
 mod fixed;
 mod growing;

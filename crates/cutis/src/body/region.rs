@@ -113,7 +113,7 @@ pub(super) fn picked(lattice: &LatticeSection) -> Option<PickedRegion> {
     lattice.region.as_ref()?.picked()
 }
 
-fn region_zone(lattice: &LatticeSection) -> Option<Zone> {
+pub(super) fn region_zone(lattice: &LatticeSection) -> Option<Zone> {
     lattice.region.as_ref()?.zone()
 }
 
