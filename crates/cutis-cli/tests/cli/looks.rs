@@ -90,7 +90,7 @@ fn the_table_of_a_plan_has_the_figures_of_its_json() {
     let number = |text: &str| text.trim().parse::<f64>().unwrap();
     let (ms, rest) = time.split_once(" ms per frame, about ").unwrap();
     let (s, rest) = rest.split_once(" s for 2 frames").unwrap();
-    assert!((number(s) - 2e-3 * number(ms)).abs() < 0.051 && rest.contains(" substeps of the body"), "{time}");
+    assert!((number(s) - 2e-3 * number(ms)).abs() < 0.051 && rest.contains(" of the body at rest"), "{time}");
 }
 
 /// The plan of a scene from the template fits a screen. It names what the scene leaves out, and

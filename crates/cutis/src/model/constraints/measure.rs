@@ -50,6 +50,7 @@ pub(super) fn substeps(
             if once_per_substep { 1.0 } else { f64::from(settings.iterations) / f64::from(iterations) };
         whole.add(part.name, part.seconds * repeats);
     }
-    let how = format!("{done} substeps of the body at rest, on this machine as busy as it is now");
+    let many = if done == 1.0 { "" } else { "s" };
+    let how = format!("{done} substep{many} of the body at rest, on this machine as busy as it is now");
     Ok(costs.with_times(&whole, f64::max(done, 1.0) / f64::from(settings.substeps), &how))
 }
