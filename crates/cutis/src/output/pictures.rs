@@ -10,6 +10,7 @@ use cutis_render::{
 };
 use cutis_volume::Volume;
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 use super::DeformedBody;
 use super::html::Figure;
@@ -135,18 +136,19 @@ pub(super) fn draw(
     draw_annotations(&mut skin_before, &before, &view)?;
     let depth_after = depth.as_ref().map(|(_, deformed)| deformed);
     let skin_after = stages.raymarch(after, &View { depth: depth_after, ..view })?;
-    let mut figures = vec![
-        figure(RunFolder::before, caption_before, false, &skin_before)?,
-        figure(RunFolder::after, "After", false, &skin_after)?,
-        figure(RunFolder::slice, SLICE, true, &slices)?,
+    let mut drawn: Vec<Drawn> = vec![
+        (RunFolder::before, caption_before, false, skin_before),
+        (RunFolder::after, "After", false, skin_after),
+        (RunFolder::slice, SLICE, true, slices),
     ];
     if body.membrane.as_ref().is_some_and(Membrane::has_lines) {
         let mut picture = skin;
         add_lines(&mut picture, body, scene, &before, &view)?;
         let caption = "Lines of tension in the scan: the skin is tightest along them. They are faint where the \
                        direction counts little";
-        figures.push(figure(RunFolder::tension, caption, false, &picture)?);
+        drawn.push((RunFolder::tension, caption, false, picture));
     }
+    let figures = drawn.par_iter().map(figure).collect::<Result<_, _>>()?;
     Ok(Pictures { figures, slices: slices_of_planes })
 }
 
@@ -162,15 +164,13 @@ fn closed_cuts(body: &Body) -> Vec<Vec<Point3<f64>>> {
     closed.map(|slits| slits.iter().flat_map(points).collect()).collect()
 }
 
+/// The path of a picture in the run folder, its caption, whether it is wide, and the picture.
+type Drawn = (fn(&RunFolder) -> PathBuf, &'static str, bool, Image);
+
 /// A picture of the run folder and of the report.
-fn figure(
-    path: fn(&RunFolder) -> PathBuf,
-    caption: &'static str,
-    wide: bool,
-    image: &Image,
-) -> Result<Figure, Error> {
+fn figure((path, caption, wide, image): &Drawn) -> Result<Figure, Error> {
     let png = image.to_png()?;
-    Ok(Figure { path, caption, wide, small: smaller(image, &png)?, png })
+    Ok(Figure { path: *path, caption, wide: *wide, small: smaller(image, &png)?, png })
 }
 
 /// Draws the lines of tension of a membrane on a picture of the body at rest.

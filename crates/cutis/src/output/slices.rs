@@ -4,6 +4,7 @@ use cutis_mesh::Frame;
 use cutis_render::{Contour, Plane, Rgb, SliceView, slice};
 use cutis_volume::Volume;
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use super::pictures::EDGE_GRAY;
 use super::wound_place::{WoundPlace, position};
@@ -61,22 +62,21 @@ fn of_size(
     frame: &Frame,
     place: Option<&WoundPlace>,
 ) -> Result<Vec<SlicePair>, Error> {
-    let mut pairs = Vec::new();
-    for plane in [Plane::Axial, Plane::Coronal, Plane::Sagittal] {
-        let at_mm = position(plane, through_mm);
-        let draw = |n: usize| {
-            let (positions, triangles) = skins[n];
-            let contour = Contour { origin_mm: frame.origin_mm, positions, triangles, color: colors[n] };
-            let view = SliceView {
-                contours: &[contour],
-                focus: place.map(|place| place.slice),
-                edge_gray: EDGE_GRAY,
-                long_side: Some(pixels),
-                ..SliceView::new(plane, at_mm)
-            };
-            Ok::<_, Error>(slice(volumes[n], &view)?.to_png()?)
+    let draw = |plane: Plane, n: usize| {
+        let (positions, triangles) = skins[n];
+        let contour = Contour { origin_mm: frame.origin_mm, positions, triangles, color: colors[n] };
+        let view = SliceView {
+            contours: &[contour],
+            focus: place.map(|place| place.slice),
+            edge_gray: EDGE_GRAY,
+            long_side: Some(pixels),
+            ..SliceView::new(plane, position(plane, through_mm))
         };
-        pairs.push(SlicePair { plane, at_mm, png: [draw(0)?, draw(1)?] });
-    }
-    Ok(pairs)
+        Ok::<_, Error>(slice(volumes[n], &view)?.to_png()?)
+    };
+    let pair = |plane| {
+        let (before, after) = rayon::join(|| draw(plane, 0), || draw(plane, 1));
+        Ok(SlicePair { plane, at_mm: position(plane, through_mm), png: [before?, after?] })
+    };
+    [Plane::Axial, Plane::Coronal, Plane::Sagittal].into_par_iter().map(pair).collect()
 }
