@@ -24,7 +24,7 @@ fn labels_and_fields_are_written_or_refused_by_name() {
         "--field from-rest --out forward.nrrd",
     ] {
         let done = call(words).expect_success();
-        assert!(done.stdout.contains("voxels inside the deformed body"), "{}", done.stdout);
+        assert!(done.stdout.contains("voxels of the body moved"), "{}", done.stdout);
     }
     let original = std::fs::read(desk.path("field.nrrd")).unwrap();
     assert!(original != std::fs::read(desk.path("forward.nrrd")).unwrap(), "two directions");
