@@ -43,7 +43,7 @@ pub(super) fn tets(sections: &BodySections<'_>, volume: &Volume, lattice: &Latti
         at.filter(|&at| volume.hu(volume.voxels()[grid.index(at)]) >= air && held(grid.mm(at))).count()
     };
     let slices: Vec<usize> = (0..nz).step_by(stride).collect();
-    let samples: usize = slices.into_par_iter().map(in_slice).sum();
+    let samples = slices.into_par_iter().map(in_slice).reduce(|| 0, |a, b| a + b);
     let volume_of = |steps: [f64; 3]| steps.iter().product::<f64>();
     let per_sample = volume_of(grid.affine.spacing_mm()) * (stride as f64).powi(3);
     let cells = samples as f64 * per_sample / volume_of(lattice.grid().affine.spacing_mm());

@@ -1,6 +1,6 @@
 //! The figures of a report that the table of a sweep has.
 
-use crate::report::{Report, fixed};
+use crate::report::Report;
 
 /// A figure: column, value, and whether it depends on the machine.
 pub(super) struct Figure {
@@ -8,17 +8,14 @@ pub(super) struct Figure {
     pub(super) value: f64,
 }
 
-/// Decimals of a length in mm. Positions are less exact than that.
-const DECIMALS_OF_MM: usize = 6;
+/// Length in mm below which a value is what rounding left of zero: positions are less exact.
+const ROUNDING_MM: f64 = 5e-7;
 
 impl Figure {
     /// The value as a cell of the table.
     pub(super) fn text(&self) -> String {
-        if !self.column.ends_with("_mm") {
-            return self.value.to_string();
-        }
-        let text = fixed(self.value, DECIMALS_OF_MM);
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        let is_rounding = self.column.ends_with("_mm") && self.value.abs() < ROUNDING_MM;
+        if is_rounding { "0".into() } else { self.value.to_string() }
     }
 }
 
@@ -88,4 +85,19 @@ pub(super) fn order(column: &str) -> (usize, usize, String) {
     let digits: String = column.chars().filter(char::is_ascii_digit).collect();
     let part = ["_initial_mm", "_final_mm", "_mid_mm"].iter().position(|end| column.ends_with(end));
     (group, digits.parse().unwrap_or_default(), part.unwrap_or_default().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Figure;
+
+    #[test]
+    fn lengths_that_rounding_left_are_zero_and_others_keep_all_digits() {
+        let text = |column: &str, value| Figure { column: column.into(), value }.text();
+        assert_eq!(text("wound0_initial_mm", -1.456_952_299e-7), "0");
+        assert_eq!(text("wound0_initial_mm", -0.0), "0");
+        assert_eq!(text("wound0_final_mm", 31.388_349_254_112_38), "31.38834925411238");
+        assert_eq!(text("wound0_final_mm", -2.5e-6), "-0.0000025");
+        assert_eq!(text("rest_error", 1e-7), "0.0000001");
+    }
 }
