@@ -110,8 +110,11 @@ impl Site {
         let aside = samples(0.0, ASIDE * width).flat_map(|by| [middle - by, middle + by]);
         // The sides of a round body are too near to the part that is fixed.
         let free = |points: &Vec<[f64; 3]>| points.iter().all(|[_, y, _]| y - behind >= 2.0 * half);
-        let up_mm = flattest(aside, |x| line(|by| place(x, z + by), half).filter(free))?;
         let across_mm = [place(middle - half, z)?, place(middle + half, z)?];
+        // Where the front is steep, as at a chin, the cut runs across the body.
+        let up_mm = flattest(aside, |x| line(|by| place(x, z + by), half).filter(free))
+            .filter(|[from, to]| (from[1] - to[1]).abs() <= 2.0 * half)
+            .unwrap_or(across_mm);
         Some(Self { up_mm, across_mm, behind_mm: [middle, behind, z] })
     }
 }
