@@ -13,7 +13,7 @@ mod charts;
 mod checks;
 mod config;
 mod errors;
-mod front;
+pub mod front;
 mod grid;
 mod measurement;
 mod options;

@@ -2,6 +2,7 @@
 //! frames with the settings of the scene.
 
 mod frames;
+mod front;
 mod search;
 
 use std::io::Write;
@@ -23,13 +24,17 @@ pub struct Options {
     /// Write all figures to this file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Write docs/results/rest.md. Needs the scan of the abdomen.
+    /// Only the search against frames with many settings, on the problems of the study of accuracy.
+    #[arg(long, conflicts_with = "most_vertices")]
+    pub front: bool,
+    /// Write docs/results/rest.md, or its part on many settings. Needs the scan of the abdomen.
     #[arg(long, conflicts_with = "most_vertices")]
     pub write: bool,
 }
 
 /// Tables of the page.
-pub const TABLES: [&str; 6] = ["provenance", "bodies", "sizes", "stiffnesses", "frames", "checks"];
+pub const TABLES: [&str; 8] =
+    ["provenance", "frames", "bodies", "sizes", "stiffnesses", "checks", "front-provenance", "front"];
 
 /// Measures everything. Returns whether all checks hold.
 ///
@@ -37,6 +42,9 @@ pub const TABLES: [&str; 6] = ["provenance", "bodies", "sizes", "stiffnesses", "
 /// A scene is refused, a search does not end, or a file cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
     let page = options.write.then(|| Page::open("rest", &TABLES)).transpose()?;
+    if options.front {
+        return run_front(options, page, out);
+    }
     let provenance = Provenance::start(if options.write { "rest --write" } else { "rest" });
     let most = options.most_vertices.unwrap_or(usize::MAX);
     let mut checks = Checks::default();
@@ -69,6 +77,31 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
         page.set("checks", &checks.summary())?;
         let chart = frames::chart(&demo.found, &frames);
         std::fs::write(results().join("rest-demo.svg"), chart)?;
+        page.save(&results())?;
+    }
+    Ok(checks.pass())
+}
+
+/// Measures the search against frames with many settings.
+fn run_front(options: &Options, page: Option<Page>, out: &mut dyn Write) -> Result<bool, Failure> {
+    let provenance = Provenance::start(if options.write { "rest --front --write" } else { "rest --front" });
+    if options.write {
+        crate::accuracy::problems::scene::abdomen_scan()?;
+    }
+    let mut checks = Checks::default();
+    let fronts = front::measure(&mut checks)?;
+    let table = front::table(&fronts).markdown();
+    writeln!(out, "{table}")?;
+    checks.print(out)?;
+    if let Some(path) = &options.json {
+        write_json(path, &json!({"provenance": provenance, "fronts": fronts}))?;
+    }
+    if let Some(mut page) = page.filter(|_| checks.pass()) {
+        page.set("front", &table)?;
+        page.set("front-provenance", &(provenance.markdown() + "\n" + &checks.summary()))?;
+        for front in &fronts {
+            std::fs::write(results().join(front::file(front)), front::chart(front))?;
+        }
         page.save(&results())?;
     }
     Ok(checks.pass())
