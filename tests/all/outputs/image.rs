@@ -1,5 +1,6 @@
 //! Pictures as users see them: colors, letters and the scale bar, found by their pixels alone.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 /// A decoded picture, 8-bit RGB.
@@ -118,12 +119,14 @@ impl Picture {
             }
             seen[start] = true;
             let (mut columns, mut rows, mut open) = (x..x + 1, y..y + 1, vec![(x, y)]);
+            let mut near = HashSet::new();
             while let Some((x, y)) = open.pop() {
                 columns = columns.start.min(x)..columns.end.max(x + 1);
                 rows = rows.start.min(y)..rows.end.max(y + 1);
                 for (x, y) in (y.saturating_sub(1)..(y + 2).min(self.height))
                     .flat_map(|y| (x.saturating_sub(1)..(x + 2).min(self.width)).map(move |x| (x, y)))
                 {
+                    near.insert((x, y));
                     if !seen[y * self.width + x] && is_white(x, y) {
                         seen[y * self.width + x] = true;
                         open.push((x, y));
@@ -131,15 +134,21 @@ impl Picture {
                 }
             }
             if (6..80).contains(&rows.len()) && columns.len() < 100 {
-                marks.push(Mark { cells: self.cells(&columns, &rows), columns, rows });
+                marks.push(Mark { cells: self.cells(&columns, &rows, &near), columns, rows });
             }
         }
         marks.sort_by_key(|mark| mark.columns.start);
         marks
     }
 
-    /// Mean ink of the cells of a box, 5 × 7.
-    fn cells(&self, columns: &Range<usize>, rows: &Range<usize>) -> [[f64; 5]; 7] {
+    /// Mean ink of the cells of a box, 5 × 7. Only the pixels `near` a mark count, because bright
+    /// tissue may lie beyond the dark rim of a letter.
+    fn cells(
+        &self,
+        columns: &Range<usize>,
+        rows: &Range<usize>,
+        near: &HashSet<(usize, usize)>,
+    ) -> [[f64; 5]; 7] {
         let part = |of: &Range<usize>, n: usize, parts: usize| {
             let at = |n: usize| of.len() as f64 * n as f64 / parts as f64;
             let (from, to) = (at(n), at(n + 1));
@@ -155,7 +164,8 @@ impl Picture {
                 let mut sum = 0.0;
                 for (y, high) in part(rows, row, 7) {
                     for (x, wide) in part(columns, column, 5) {
-                        sum += high * wide * self.ink(columns.start + x, rows.start + y);
+                        let at = (columns.start + x, rows.start + y);
+                        sum += if near.contains(&at) { high * wide * self.ink(at.0, at.1) } else { 0.0 };
                     }
                 }
                 sum
