@@ -56,8 +56,8 @@ pub fn resample_run(
     check_name(request)?;
     let mut clock = Clock::new(progress);
     let folder = RunFolder(request.run.clone());
-    Checkpoint::find(&folder.checkpoint())?;
     let mut stages = Stages::on(Request::of(loaded)?.open()?);
+    Checkpoint::find(&folder.checkpoint())?;
     let source = clock.stage("read the CT", 0, |_| source::load(loaded))?;
     let body = clock
         .stage("lattice, skin, incision", 0, |_| Body::build(&BodySections::of(loaded), &source.volume))?;
