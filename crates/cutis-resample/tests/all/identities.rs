@@ -134,28 +134,32 @@ fn affine_deformation_matches_the_closed_form() {
     }
 }
 
+/// The shifts stay within a tile of the output, or lead out of it along each axis.
 #[test]
 fn voxels_outside_both_shapes_keep_their_value() {
-    let grid = Grid { shape: [24, 24, 24], affine: oblique() };
+    let grid = Grid { shape: [80, 50, 50], affine: oblique() };
     let volume = noise(grid, 4);
     let mesh = lattice(&grid, [3, 3, 3], [6.0; 3], [12.0; 3]);
-    let by = grid.affine.step_mm(0) * 0.008;
-    let (out, report) = run(&volume, &warp(&mesh, &moved(&mesh, |p| p + by)));
-    let cube = |low: usize, [i, j, k]: [usize; 3]| {
-        (low..=low + 6).contains(&i) && (6..=12).contains(&j) && (6..=12).contains(&k)
-    };
-    for (index, &value) in out.voxels().iter().enumerate() {
-        let point = grid.point(index);
-        let expected = if cube(14, point) {
-            volume.voxels()[index - 8]
-        } else if cube(6, point) {
-            -1024
-        } else {
-            volume.voxels()[index]
+    for shift in [[8, 0, 0], [60, 0, 0], [0, 34, 0], [0, 0, 30]] {
+        let step = |axis: usize| grid.affine.step_mm(axis) * (shift[axis] as f64 / 1000.0);
+        let by = (0..3).map(step).sum::<Vector3<f64>>();
+        let (out, report) = run(&volume, &warp(&mesh, &moved(&mesh, |p| p + by)));
+        let cube = |low: [usize; 3], point: [usize; 3]| {
+            (0..3).all(|axis| (low[axis]..=low[axis] + 6).contains(&point[axis]))
         };
-        assert_eq!(value, expected, "at {point:?}");
+        for (index, &value) in out.voxels().iter().enumerate() {
+            let point = grid.point(index);
+            let expected = if cube(shift.map(|n| n + 6), point) {
+                volume.voxels()[grid.index(std::array::from_fn(|axis| point[axis] - shift[axis]))]
+            } else if cube([6; 3], point) {
+                -1024
+            } else {
+                volume.voxels()[index]
+            };
+            assert_eq!(value, expected, "at {point:?}, shifted by {shift:?}");
+        }
+        assert_eq!((report.vacated_voxels, report.moved_voxels), (343, 343));
     }
-    assert_eq!((report.vacated_voxels, report.moved_voxels), (343, 343));
 }
 
 #[test]
@@ -186,6 +190,16 @@ fn folds_and_inverted_tets_are_counted() {
     assert!(report.folds > 300, "{report:?}");
     let shell = Warp { body_tets: 6, ..warp(&mesh, &folded) };
     assert_eq!(run(&volume, &shell).1.folds, 0, "a shell may fold");
+    // Each tet twice. Only those that move count.
+    let twice = [&mesh.tets[..], &mesh.tets].concat();
+    let folds = |deformed: &[Point3<f32>]| {
+        let warp = Warp { tets: &twice, body_tets: twice.len(), ..warp(&mesh, deformed) };
+        run(&volume, &warp).1.folds
+    };
+    let corner =
+        moved(&mesh, |p| if p.coords.amax() > 0.016 && p.y > 0.008 && p.z > 0.008 { p * 0.99 } else { p });
+    let [none, few, all] = [folds(&mesh.rest), folds(&corner), folds(&moved(&mesh, |p| p * 0.99))];
+    assert!(none == 0 && few > 0 && few < all, "{none}, {few}, {all}");
     let flat = moved(&mesh, |p| Point3::new(p.x, p.y, 0.003));
     let (_, report) = run(&volume, &warp(&mesh, &flat));
     assert_eq!((report.inverted_tets, report.moved_voxels), (12, 0));
