@@ -107,7 +107,7 @@ mod tests {
 
     /// A disk with smooth shading, on a dark ground.
     fn disk([x, y]: [f64; 2]) -> Light {
-        let (x, y) = (x / 45.0 - 1.0, y / 45.0 - 1.0);
+        let (x, y) = (x / 90.0 - 1.0, y / 90.0 - 1.0);
         let inside = x * x + y * y < 0.7;
         Light::repeat(if inside { (0.9 - 0.4 * (x * x + y * y)) as f32 } else { 0.02 })
     }
@@ -124,10 +124,10 @@ mod tests {
 
     #[test]
     fn smooth_parts_take_few_rays_and_edges_one_per_pixel() {
-        let (image, rays) = picture(91, 90);
+        let (image, rays) = picture(181, 180);
         let (mut different, mut flat) = (0, 0);
-        for pixel in 0..91 * 90 {
-            let place = [(pixel % 91) as f64 + 0.5, (pixel / 91) as f64 + 0.5];
+        for pixel in 0..181 * 180 {
+            let place = [(pixel % 181) as f64 + 0.5, (pixel / 181) as f64 + 0.5];
             let exact = encode(disk(place));
             let found = &image.rgb[3 * pixel..][..3];
             let error = exact.iter().zip(found).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
@@ -135,9 +135,9 @@ mod tests {
             different += usize::from(error == 1);
             flat += usize::from(found == [encode(Light::repeat(0.9))[0]; 3]);
         }
-        assert!(rays < 91 * 90 * 2 / 5, "{rays} rays");
+        assert!(rays < 181 * 180 * 2 / 5, "{rays} rays");
         assert!(
-            different > 0 && flat < 91 * 90 / 10,
+            different > 0 && flat < 181 * 180 / 10,
             "the control: some pixels are means, and not all are equal"
         );
     }

@@ -66,7 +66,7 @@ fn voxel_counts_match_the_file() {
     let (moved, vacated) = (run.number("/resample/moved_voxels"), run.number("/resample/vacated_voxels"));
     // Where tissue is uniform, a voxel that moved keeps its value.
     let changed = count(&|n| before.voxels[n] != after.voxels[n]);
-    assert!((1.0..3.0).contains(&((moved + vacated) / changed)), "{moved} moved, {changed} changed");
+    assert!((1.0..6.0).contains(&((moved + vacated) / changed)), "{moved} moved, {changed} changed");
     let left = count(&|n| is_tissue(&before, n) && !is_tissue(&after, n));
     assert!(left > 50.0 && (0.8..2.0).contains(&(vacated / left)), "{vacated} vacated, {left} now of air");
     assert_eq!(run.number("/resample/folds"), 0.0);
