@@ -25,26 +25,29 @@ pub struct Options {
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
     /// Only the search against frames with many settings, on the problems of the study of accuracy.
-    #[arg(long, conflicts_with = "most_vertices")]
+    /// Takes about a quarter of an hour.
+    #[arg(long, conflicts_with_all = ["most_vertices", "write"])]
     pub front: bool,
-    /// Write docs/results/rest.md, or its part on many settings. Needs the scan of the abdomen.
+    /// With `--front`, write a chart of each problem to this folder.
+    #[arg(long, value_name = "FOLDER", requires = "front")]
+    pub charts: Option<PathBuf>,
+    /// Write docs/results/rest.md. Needs the scan of the abdomen.
     #[arg(long, conflicts_with = "most_vertices")]
     pub write: bool,
 }
 
 /// Tables of the page.
-pub const TABLES: [&str; 8] =
-    ["provenance", "frames", "bodies", "sizes", "stiffnesses", "checks", "front-provenance", "front"];
+pub const TABLES: [&str; 6] = ["provenance", "bodies", "sizes", "stiffnesses", "frames", "checks"];
 
 /// Measures everything. Returns whether all checks hold.
 ///
 /// # Errors
 /// A scene is refused, a search does not end, or a file cannot be written.
 pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
-    let page = options.write.then(|| Page::open("rest", &TABLES)).transpose()?;
     if options.front {
-        return run_front(options, page, out);
+        return run_front(options, out);
     }
+    let page = options.write.then(|| Page::open("rest", &TABLES)).transpose()?;
     let provenance = Provenance::start(if options.write { "rest --write" } else { "rest" });
     let most = options.most_vertices.unwrap_or(usize::MAX);
     let mut checks = Checks::default();
@@ -83,26 +86,19 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
 }
 
 /// Measures the search against frames with many settings.
-fn run_front(options: &Options, page: Option<Page>, out: &mut dyn Write) -> Result<bool, Failure> {
-    let provenance = Provenance::start(if options.write { "rest --front --write" } else { "rest --front" });
-    if options.write {
-        crate::accuracy::problems::scene::abdomen_scan()?;
-    }
+fn run_front(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
+    let provenance = Provenance::start("rest --front");
     let mut checks = Checks::default();
     let fronts = front::measure(&mut checks)?;
-    let table = front::table(&fronts).markdown();
-    writeln!(out, "{table}")?;
+    writeln!(out, "{}", front::table(&fronts).markdown())?;
     checks.print(out)?;
     if let Some(path) = &options.json {
         write_json(path, &json!({"provenance": provenance, "fronts": fronts}))?;
     }
-    if let Some(mut page) = page.filter(|_| checks.pass()) {
-        page.set("front", &table)?;
-        page.set("front-provenance", &(provenance.markdown() + "\n" + &checks.summary()))?;
+    if let Some(folder) = &options.charts {
         for front in &fronts {
-            std::fs::write(results().join(front::file(front)), front::chart(front))?;
+            std::fs::write(folder.join(front::file(front)), front::chart(front))?;
         }
-        page.save(&results())?;
     }
     Ok(checks.pass())
 }
