@@ -103,7 +103,7 @@ fn toml_of(scene: &cutis::Scene) -> String {
 fn slices_of_the_phantom_have_the_letters_of_its_anatomy() {
     let volume = Phantom::new([64, 64, 48], 1).unwrap().volume().unwrap();
     let draw = |plane| {
-        let view = SliceView { long_side: Some(900), ..SliceView::new(plane, 0.0) };
+        let view = SliceView { long_side: Some(1200), ..SliceView::new(plane, 0.0) };
         Picture::of_bytes(&slice(&volume, &view).unwrap().to_png().unwrap())
     };
     // Mean position of bone, from 0 at the left or top to 1 at the right or bottom.
