@@ -5,39 +5,30 @@ use rayon::prelude::*;
 
 use crate::raster::{Corners, GROUP, Rasters, RestMaps, TetRaster};
 
-/// Distinct tets, with their barycentric coordinates and the maps to their rest shapes.
+/// Distinct tets, with their barycentric coordinates.
 pub struct Prepared {
     /// Numbers of the tets, in ascending order.
     tets: Vec<u32>,
-    groups: Vec<(Rasters, RestMaps)>,
+    groups: Vec<Rasters>,
 }
 
+/// The corners of a tet, in continuous voxel indices.
+pub type CornersOf<'a> = &'a (dyn Fn(u32) -> [Point3<f64>; 4] + Sync);
+
 impl Prepared {
-    /// Prepares tets that may occur several times. `corners` gives the corners of a tet in
-    /// continuous voxel indices: where it is looked up, and at rest.
-    pub fn new(
-        mut tets: Vec<u32>,
-        tolerance: f64,
-        corners: &(dyn Fn(u32) -> [[Point3<f64>; 4]; 2] + Sync),
-    ) -> Self {
+    /// Prepares tets that may occur several times, with their corners where they are looked up.
+    pub fn new(mut tets: Vec<u32>, tolerance: f64, corners: CornersOf<'_>) -> Self {
         tets.par_sort_unstable();
         tets.dedup();
-        let prepare = |tets: &[u32]| {
-            let empty: Corners = [[[0.0; GROUP]; 3]; 4];
-            let mut places = [empty; 2];
-            for (lane, &tet) in tets.iter().enumerate() {
-                for (places, corners) in places.iter_mut().zip(corners(tet)) {
-                    for (place, corner) in places.iter_mut().zip(corners) {
-                        (0..3).for_each(|axis| place[axis][lane] = corner[axis]);
-                    }
-                }
-            }
-            let rasters = Rasters::new(&places[0], tolerance);
-            let maps = RestMaps::new(&rasters, &places[1]);
-            (rasters, maps)
-        };
-        let groups = tets.par_chunks(GROUP).map(prepare).collect();
+        let raster = |tets: &[u32]| Rasters::new(&gather(tets, corners), tolerance);
+        let groups = tets.par_chunks(GROUP).map(raster).collect();
         Self { tets, groups }
+    }
+
+    /// The maps to the rest shapes, a group after the other. `corners` are those at rest.
+    pub fn rest_maps(&self, corners: CornersOf<'_>) -> Vec<RestMaps> {
+        let groups = self.tets.par_chunks(GROUP).zip(&self.groups);
+        groups.map(|(tets, rasters)| RestMaps::new(rasters, &gather(tets, corners))).collect()
     }
 
     /// The numbers of the tets, in ascending order.
@@ -53,12 +44,17 @@ impl Prepared {
     /// The tet at a place in the list. `None` if it has no volume.
     #[inline(always)]
     pub fn raster(&self, slot: usize) -> Option<TetRaster<'_>> {
-        self.groups[slot / GROUP].0.tet(slot % GROUP)
+        self.groups[slot / GROUP].tet(slot % GROUP)
     }
+}
 
-    /// The rest index of an index in the tet at a place in the list.
-    #[inline(always)]
-    pub fn at_rest(&self, slot: usize, index: [f64; 3]) -> [f64; 3] {
-        self.groups[slot / GROUP].1.at(slot % GROUP, index)
+/// The corners of a group of tets.
+fn gather(tets: &[u32], corners: CornersOf<'_>) -> Corners {
+    let mut places: Corners = [[[0.0; GROUP]; 3]; 4];
+    for (lane, &tet) in tets.iter().enumerate() {
+        for (place, corner) in places.iter_mut().zip(corners(tet)) {
+            (0..3).for_each(|axis| place[axis][lane] = corner[axis]);
+        }
     }
+    places
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::partial_volume::{Pair, Walls};
 use crate::prepared::Prepared;
-use crate::raster::TetRaster;
+use crate::raster::{GROUP, RestMaps, TetRaster};
 use crate::sample::{scanned_range, stored_air, trilinear};
 
 /// Number of points within a voxel: the bits of a mask.
@@ -24,8 +24,9 @@ type Places = [[f64; POINTS]; 3];
 /// What the means of some voxels need.
 pub struct WallMeans<'a> {
     walls: &'a Walls<'a>,
-    /// The deformed tets.
+    /// The deformed tets, and their maps to the rest shapes.
     held: Reaching,
+    to_rest: Vec<RestMaps>,
     /// Whether each deformed tet has moved.
     is_moved: Vec<bool>,
     /// The tets at rest that moved, and those that were removed.
@@ -52,6 +53,7 @@ impl<'a> WallMeans<'a> {
         let held = reaching(warp.deformed, warp.tets, &|tet| !walls.has_burst(&warp.tets[tet]));
         Self {
             walls,
+            to_rest: held.tets.rest_maps(&|tet| walls.corners(warp.rest, &warp.tets[tet as usize])),
             is_moved: held.tets.numbers().iter().map(|&tet| warp.tet_moved(tet as usize)).collect(),
             held,
             left: [
@@ -95,7 +97,7 @@ impl<'a> WallMeans<'a> {
             for n in bits(own) {
                 let point = place(n);
                 sum += self.sample(if self.is_moved[slot] {
-                    self.held.tets.at_rest(slot, point)
+                    self.to_rest[slot / GROUP].at(slot % GROUP, point)
                 } else {
                     point
                 });
@@ -157,9 +159,8 @@ impl Reaching {
     ) -> Self {
         let mut pairs = walls.pairs(voxels, positions, tets, counts);
         let numbers = pairs.par_iter().map(|&(_, tet)| tet).collect();
-        let tets = Prepared::new(numbers, walls.space.tolerance, &|tet| {
-            [positions, walls.warp.rest].map(|positions| walls.corners(positions, &tets[tet as usize]))
-        });
+        let corners = |tet: u32| walls.corners(positions, &tets[tet as usize]);
+        let tets = Prepared::new(numbers, walls.space.tolerance, &corners);
         pairs.par_iter_mut().for_each(|(_, tet)| *tet = tets.slot(*tet) as u32);
         Self { pairs, tets }
     }
