@@ -124,6 +124,37 @@ fn the_value_of_a_voxel_at_a_wall_is_the_share_of_the_tissue_in_it() {
     }
 }
 
+/// HU grow along the columns. The wall that moved has the values of its place at rest.
+#[test]
+fn a_wall_takes_its_tissue_with_it() {
+    const SLOPE: f64 = 20.0;
+    const OPENING: f64 = 8.0;
+    let grid = Grid { shape: [SIDE; 3], affine: oblique() };
+    let voxels = (0..grid.len()).map(|n| (SLOPE * grid.point(n)[0] as f64) as i16).collect();
+    let volume = Volume::new(grid, voxels, 1.0, 0.0).unwrap();
+    let body = divided(&grid);
+    let by = (grid.affine.step_mm(0) * (OPENING / 1000.0)).map(|c| c as f32);
+    let moved = |(n, p): (usize, &Point3<f32>)| if n < body.first { *p } else { p + by };
+    let deformed: Vec<_> = body.rest.iter().enumerate().map(moved).collect();
+    let warp = body.warp(&deformed);
+    let sharp = resample(&volume, &warp, &|_, _| {}).unwrap().0;
+    let all: Vec<u32> = (0..body.tets.len() as u32).collect();
+    let smooth = blend_walls(&volume, &warp, &all, sharp).unwrap().0;
+    let (mut errors, mut control, mut count) = (0.0, 0.0, 0.0);
+    for (voxel, gap) in gap(&grid, OPENING).into_iter().enumerate() {
+        let [i, j, k] = grid.point(voxel).map(|index| index as f64);
+        // Air is the lowest value, 0.
+        if (0.2..0.8).contains(&gap) && i > cut_at(j, k) + OPENING / 2.0 {
+            let value = f64::from(smooth.voxels()[voxel]);
+            errors += (value - (1.0 - gap) * SLOPE * (i - OPENING)).abs();
+            control += (value - (1.0 - gap) * SLOPE * i).abs();
+            count += 1.0;
+        }
+    }
+    assert!(count > 100.0 && errors / count < 15.0, "{} in {count} voxels", errors / count);
+    assert!(control / count > 60.0, "the control, values of the place now: {}", control / count);
+}
+
 #[test]
 fn a_body_that_did_not_move_keeps_all_values_and_so_do_voxels_away_from_walls() {
     let grid = Grid { shape: [SIDE; 3], affine: oblique() };
