@@ -173,6 +173,21 @@ impl<R: Real> DescentStep<R> {
     }
 }
 
+/// Refuses a gravity with which a vertex falls so far in a substep that lengths overflow. Steps
+/// that are not finite are left out, so the body would stand still.
+fn check_gravity<T: Scalar>(settings: &Settings) -> Result<(), SolverError> {
+    let h = settings.substep_s();
+    let overflows = |g: &f64| {
+        let fall = T::constant(g * h * h);
+        !(fall * fall).is_finite()
+    };
+    let expected = "a gravity whose fall in a substep has a finite square in the number type";
+    match settings.gravity_m_s2.into_iter().find(overflows) {
+        Some(value) => Err(SolverError::Setting { key: "gravity_m_s2", value, expected }),
+        None => Ok(()),
+    }
+}
+
 /// Data for vertex block descent: the color groups of the vertices and the constraints at each
 /// vertex.
 #[derive(Clone, Debug)]
@@ -188,10 +203,12 @@ impl<T: Scalar> Descent<T> {
     /// else with greedy ones.
     ///
     /// # Errors
-    /// Returns [`SolverError::Formulation`] for a PBD stiffness, [`SolverError::Stiffness`] for a
+    /// Returns [`SolverError::Setting`] for a gravity that is too large for the number type,
+    /// [`SolverError::Formulation`] for a PBD stiffness, [`SolverError::Stiffness`] for a
     /// compliance of zero, and [`SolverError::Groups`] if two vertices of a group share a
     /// constraint.
     pub fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
+        check_gravity::<T>(settings)?;
         let incidences = Self::incidences_of(system)?;
         let groups = groups_of(system, &tuples_of(system.kinds()), &incidences)?;
         Ok(Self { groups, incidences, teams: Teams::default(), step: DescentStep::new(settings) })

@@ -128,6 +128,9 @@ fn a_run_that_fails_ends_with_one() {
     let done = desk.cutis(&["run", "scene.toml", "--out", "run", "--set", "solver.gravity_m_s2=[1e300,0,0]"]);
     done.expect_error(1, &["finite"]);
     assert!(desk.names("run").is_empty(), "{:?}", desk.names("run"));
+    let gravity = "solver={ formulation = 'vbd', gravity_m_s2 = [0, 0, 1e300] }";
+    let done = desk.cutis(&["run", "scene.toml", "--out", "run", "--set", gravity]);
+    done.expect_error(2, &["gravity_m_s2", "1e300"]);
 }
 
 /// A file of 1 KB with a header for 32767³ voxels, which would take 70 TB.

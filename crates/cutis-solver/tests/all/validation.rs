@@ -2,7 +2,7 @@
 //! measurements.
 
 use cutis_coloring::{Groups, greedy};
-use cutis_constraints::{Distance, Volume};
+use cutis_constraints::{Distance, Scalar, Volume};
 use cutis_solver::{
     Formulation, Handle, Settings, Solver, SolverError, SolverReference, Stiffness, SystemBuilder, Values,
 };
@@ -167,6 +167,24 @@ fn overflow_names_the_vertex_and_restores_the_state_before() {
     assert_eq!(solver.time_s(), 2.0);
     solver.step(1).unwrap();
     assert_eq!(solver.positions().unwrap(), kept, "a body at rest stays in place");
+}
+
+/// Vertex block descent leaves out steps that are not finite, so it must not begin with a gravity
+/// that overflows. The same gravity is small enough for a wider number type.
+#[test]
+fn descent_refuses_a_gravity_that_overflows() {
+    fn found<T: Scalar>(gravity: f64) -> Option<SolverError> {
+        let system = SystemBuilder::<T>::new(&points(), &[0.0, 1.0, 1.0]).unwrap().build();
+        let formulation = Formulation::Vbd;
+        let settings = Settings { formulation, gravity_m_s2: [0.0, gravity, 0.0], ..Settings::default() };
+        SolverReference::new(system, settings).err()
+    }
+    let is_refused = |error: Option<SolverError>| match error {
+        Some(SolverError::Setting { key, .. }) => key == "gravity_m_s2",
+        other => other.is_some(),
+    };
+    assert!(is_refused(found::<f32>(-1e30)) && is_refused(found::<f64>(1e300)));
+    assert_eq!((found::<f32>(-9.81), found::<f64>(-1e30)), (None, None));
 }
 
 #[test]
