@@ -42,6 +42,7 @@ mod lanes;
 mod lip_adhesion;
 mod lip_contact;
 mod material;
+mod prefetch;
 mod real;
 mod skin_strip;
 mod skin_strip_at_rest;
@@ -63,6 +64,7 @@ pub use material::{
     MaterialError, distance_compliance, lip_contact_compliance, skin_compliance, skin_strip_compliance,
     volume_compliance,
 };
+pub use prefetch::prefetch;
 pub use real::{Real, Scalar, cross};
 pub use skin_strip::SkinStrip;
 pub use skin_strip_at_rest::SkinStripAtRest;

@@ -13,7 +13,7 @@ const NONE: u32 = u32::MAX;
 
 /// A division of the nodes of a level.
 pub(crate) struct Aggregates {
-    /// Aggregate of each node.
+    /// Aggregate of each node. Aggregates have the order of their first nodes.
     pub of: Vec<u32>,
     pub count: usize,
 }
@@ -75,7 +75,17 @@ impl Aggregates {
                 aggregates += 1;
             }
         }
-        Self { of, count: aggregates as usize }
+        let mut number = vec![NONE; aggregates as usize];
+        let mut count = 0;
+        for aggregate in &mut of {
+            let number = &mut number[*aggregate as usize];
+            if *number == NONE {
+                *number = count;
+                count += 1;
+            }
+            *aggregate = *number;
+        }
+        Self { of, count: count as usize }
     }
 }
 

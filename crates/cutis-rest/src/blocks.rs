@@ -2,10 +2,14 @@
 
 use std::ops::Range;
 
+use cutis_constraints::prefetch;
 use rayon::prelude::*;
 
 /// Rows that a thread takes at once.
 pub(crate) const ROWS: usize = 256;
+
+/// Numbers after the present ones that are fetched into the cache.
+pub(crate) const AHEAD: usize = 512;
 
 /// Numbers after the last block, so that a register can be read at the last column of a block.
 const PADDING: usize = 8;
@@ -117,6 +121,13 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         pattern.places(row).map(|place| (pattern.columns[place] as usize, self.block(place)))
     }
 
+    /// Fetches a block into the cache.
+    #[inline(always)]
+    pub fn prefetch(&self, place: usize) {
+        prefetch(&self.values, R * C * place);
+        prefetch(&self.values, R * C * place + R * C - 1);
+    }
+
     /// Adds a block times a vector. The rest of the sum, beyond `R`, has no meaning.
     #[inline(always)]
     pub fn add_times<const L: usize, const M: usize>(&self, place: usize, x: &[f32; M], sum: &mut [f32; L]) {
@@ -130,13 +141,22 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
 
     /// One row of blocks times a vector.
     #[inline(always)]
-    pub fn row_times<const L: usize, const M: usize>(&self, row: usize, x: &[[f32; M]]) -> [f32; L] {
-        let mut sum = [0.0; L];
+    pub fn row_times<const L: usize>(&self, row: usize, x: impl Fn(usize) -> [f32; L]) -> [f32; L] {
+        // Two sums, so that an addition does not wait for the one before.
+        let mut sums = [[0.0; L]; 2];
         for place in self.pattern.places(row) {
-            self.add_times(place, &x[self.pattern.columns[place] as usize], &mut sum);
+            prefetch(&self.values, R * C * place + AHEAD);
+            prefetch(&self.values, R * C * place + AHEAD + 16);
+            let x = x(self.pattern.columns[place] as usize);
+            let values = &self.values[R * C * place..][..R * (C - 1) + L];
+            for column in 0..C {
+                let sum = &mut sums[column % 2];
+                for row in 0..L {
+                    sum[row] += values[R * column + row] * x[column];
+                }
+            }
         }
-        sum[R..].fill(0.0);
-        sum
+        std::array::from_fn(|row| if row < R { sums[0][row] + sums[1][row] } else { 0.0 })
     }
 
     /// One row of transposed blocks times a vector, whose numbers beyond `R` are zeros.
@@ -148,6 +168,7 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
     ) -> [f32; L] {
         let mut products = [[0.0; M]; C];
         for place in self.pattern.places(row) {
+            prefetch(&self.values, R * C * place + AHEAD);
             let values = &self.values[R * C * place..][..R * (C - 1) + M];
             let x = &x[self.pattern.columns[place] as usize];
             for (column, products) in products.iter_mut().enumerate() {

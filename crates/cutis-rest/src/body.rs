@@ -13,6 +13,7 @@ use crate::blocks::Pattern;
 use crate::constraints::Constraints;
 use crate::energy::{PART, State};
 use crate::matrix::is_curved;
+use crate::order::near_neighbors;
 
 /// Mark of a vertex that cannot move.
 pub(crate) const FIXED: u32 = u32::MAX;
@@ -20,7 +21,7 @@ pub(crate) const FIXED: u32 = u32::MAX;
 /// The energies of a system in double precision. Vertices with inverse mass 0 are fixed.
 pub struct Body {
     pub(crate) kinds: Vec<Elements>,
-    /// The vertices that can move, ascending.
+    /// The vertices that can move, in the order of [`near_neighbors`].
     pub(crate) free: Vec<u32>,
     /// For each vertex its place in `free`, or [`FIXED`].
     pub(crate) place: Vec<u32>,
@@ -106,21 +107,27 @@ impl Body {
         }
         let vertices = system.vertices();
         let mut place = vec![FIXED; vertices.len()];
-        let (mut free, mut weights) = (Vec::new(), Vec::new());
-        for (v, vertex) in vertices.iter().enumerate() {
-            let inverse_mass = vertex.inverse_mass().to_f64();
-            if inverse_mass > 0.0 {
-                place[v] = free.len() as u32;
-                free.push(v as u32);
-                let load = system.loads().get(v).map(|load| load.map(T::to_f64)).unwrap_or_default();
-                weights.push(Vector3::from(gravity_m_s2) / inverse_mass + load);
-            }
-        }
+        let start: Vec<Point3<f64>> =
+            vertices.iter().map(|vertex| vertex.position().map(T::to_f64)).collect();
+        let inverse_mass = |v: u32| vertices[v as usize].inverse_mass().to_f64();
+        let free: Vec<u32> = (0..vertices.len() as u32).filter(|&v| inverse_mass(v) > 0.0).collect();
         if free.is_empty() {
             return Err(RestError::NothingMoves { vertices: vertices.len() });
         }
-        let start: Vec<Point3<f64>> =
-            vertices.iter().map(|vertex| vertex.position().map(T::to_f64)).collect();
+        let tuples: Vec<_> = system
+            .kinds()
+            .iter()
+            .map(|kind| Tuples { vertices: kind.indices(), arity: kind.arity() })
+            .collect();
+        let free = near_neighbors(free, &tuples, vertices.len());
+        for (n, &v) in free.iter().enumerate() {
+            place[v as usize] = n as u32;
+        }
+        let weight = |&v: &u32| {
+            let load = system.loads().get(v as usize).map(|load| load.map(T::to_f64)).unwrap_or_default();
+            Vector3::from(gravity_m_s2) / inverse_mass(v) + load
+        };
+        let weights = free.iter().map(weight).collect();
         let mut kinds = Vec::new();
         let mut incidences = Vec::new();
         for kind in system.kinds() {

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use crate::blocks::ROWS;
 use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
-use crate::smoother::Operator;
 use crate::vectors::{PART, add, dot};
 
 /// An approximate solution.
@@ -23,7 +22,9 @@ pub(crate) struct Solution {
 /// `tolerance` of the length of `x`. The residual alone says little about the length where some
 /// forces are much stiffer than others. Ends early where the matrix is not positive definite.
 ///
-/// The vectors have single precision, which is enough for the tolerances of a Newton step.
+/// The vectors have single precision, which is enough for the tolerances of a Newton step. The
+/// product of the matrix and a direction follows from those of the cycles, which have them at hand
+/// (Chronopoulos and Gear, J. Comput. Appl. Math. 25, 1989).
 pub(crate) fn solve(
     matrix: &Matrix,
     multigrid: &mut Multigrid,
@@ -33,12 +34,12 @@ pub(crate) fn solve(
 ) -> Solution {
     let largest = right.iter().map(Vector3::amax).fold(0.0, f64::max);
     let zero = vec![[0.0f32; 4]; right.len()];
-    let (mut x, mut z, mut product) = (zero.clone(), zero.clone(), zero);
+    let (mut x, mut z, mut z_product) = (zero.clone(), zero.clone(), zero);
     // Single precision has a smaller range of exponents.
     let scaled = |v: &Vector3<f64>| [v.x, v.y, v.z, 0.0].map(|x| (x / largest) as f32);
     let mut residual: Vec<[f32; 4]> = right.par_iter().with_min_len(ROWS).map(scaled).collect();
-    multigrid.cycle(matrix, &residual, &mut z);
-    let mut direction = z.clone();
+    multigrid.cycle(matrix, &residual, &mut z, &mut z_product);
+    let (mut direction, mut product) = (z.clone(), z_product.clone());
     let mut energy = dot(&residual, &z);
     let first = energy;
     let (mut cycles, mut indefinite) = (1, false);
@@ -47,7 +48,6 @@ pub(crate) fn solve(
         && energy > 0.0
         && (energy > tolerance * tolerance * first || steps.to_come() > tolerance * dot(&x, &x).sqrt())
     {
-        matrix.times(&direction, &mut product);
         let curvature = dot(&direction, &product);
         if curvature.is_nan() || curvature <= 0.0 {
             indefinite = true;
@@ -56,7 +56,7 @@ pub(crate) fn solve(
         let length = energy / curvature;
         add(&mut x, length as f32, &direction);
         add(&mut residual, -length as f32, &product);
-        multigrid.cycle(matrix, &residual, &mut z);
+        multigrid.cycle(matrix, &residual, &mut z, &mut z_product);
         cycles += 1;
         let next = dot(&residual, &z);
         if next.is_nan() || next <= 0.0 {
@@ -65,6 +65,7 @@ pub(crate) fn solve(
         let ratio = (next / energy) as f32;
         energy = next;
         let (square, along) = turn(&mut direction, ratio, &z);
+        turn(&mut product, ratio, &z_product);
         steps.push(length, square, along);
     }
     if x.iter().all(|x| *x == [0.0; 4]) {

@@ -3,11 +3,13 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use cutis_constraints::prefetch;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
+use simba::simd::{SimdValue, WideF32x4};
 
 use crate::Body;
-use crate::blocks::{Block, Pattern};
+use crate::blocks::{AHEAD, Block, Pattern};
 use crate::body::FIXED;
 use crate::constraints::{Constraints, Evaluation};
 use crate::energy::{PART, Scratch};
@@ -69,31 +71,35 @@ impl Operator<3, 4> for Matrix {
     }
 
     #[inline(always)]
-    fn row_times(&self, node: usize, x: &[[f32; 4]]) -> [f32; 4] {
-        let own = x[node];
-        let mut sum = [0.0; 4];
+    fn row_times(&self, node: usize, x: impl Fn(usize) -> [f32; 4]) -> [f32; 4] {
+        let own = WideF32x4::from(x(node));
+        // One sum per column, so that an addition does not wait for the one before.
+        let mut sums = self.sums[node].map(WideF32x4::from);
+        for (sum, column) in sums.iter_mut().zip(columns(own)) {
+            *sum *= column;
+        }
         let places = self.pattern.places(node);
-        for place in places {
-            let other = &x[self.pattern.columns[place] as usize];
-            let values = &self.values[9 * place..][..10];
-            let mut difference = [0.0; 4];
-            for n in 0..4 {
-                difference[n] = other[n] - own[n];
-            }
-            for column in 0..3 {
-                for row in 0..4 {
-                    sum[row] += values[3 * column + row] * difference[column];
-                }
+        let neighbors = &self.pattern.columns[places.clone()];
+        let values = &self.values[9 * places.start..9 * places.end + 1];
+        for (n, &neighbor) in neighbors.iter().enumerate() {
+            prefetch(&self.values, 9 * (places.start + n) + AHEAD);
+            let block = &values[9 * n..9 * n + 10];
+            let difference = columns(WideF32x4::from(x(neighbor as usize)) - own);
+            for (column, sum) in sums.iter_mut().enumerate() {
+                let block: [f32; 4] = std::array::from_fn(|row| block[3 * column + row]);
+                *sum += WideF32x4::from(block) * difference[column];
             }
         }
-        for (column, x) in self.sums[node].iter().zip(own) {
-            for n in 0..4 {
-                sum[n] += column[n] * x;
-            }
-        }
-        sum[3] = 0.0;
-        sum
+        let [x, y, z, _] = (sums[0] + sums[1] + sums[2]).into();
+        [x, y, z, 0.0]
     }
+}
+
+/// The first three numbers, each in all lanes.
+#[inline(always)]
+fn columns(x: WideF32x4) -> [WideF32x4; 3] {
+    let x: [f32; 4] = x.into();
+    std::array::from_fn(|n| WideF32x4::splat(x[n]))
 }
 
 impl Body {

@@ -19,6 +19,8 @@ use crate::vectors::Vector;
 pub(crate) const RIGID: usize = 6;
 /// [`RIGID`] and the zeros of a vector.
 const LANES: usize = 8;
+/// Blocks after the present one that are fetched into the cache.
+const AHEAD: usize = 8;
 /// A level with at most this many nodes is solved directly.
 const BOTTOM: usize = 150;
 
@@ -81,13 +83,25 @@ impl Multigrid {
         }
     }
 
-    /// One V-cycle: writes an approximate solution of the equations with this right-hand side.
-    pub fn cycle(&mut self, matrix: &Matrix, right: &[[f32; 4]], to: &mut [[f32; 4]]) {
-        match &mut self.fine {
+    /// One V-cycle: writes an approximate solution of the equations with this right-hand side, and
+    /// the matrix times it.
+    pub fn cycle(
+        &mut self,
+        matrix: &Matrix,
+        right: &[[f32; 4]],
+        to: &mut [[f32; 4]],
+        product: &mut [[f32; 4]],
+    ) {
+        let Self { fine, coarse, bottom } = self;
+        match fine {
             Some(fine) => {
-                fine.cycle(matrix, right, to, |right, to| below(&mut self.coarse, &self.bottom, right, to))
+                let below = |right: &[_], to: &mut [_]| below(coarse, bottom, right, to);
+                fine.cycle(matrix, right, to, Some(product), below);
             }
-            None => self.bottom.solve::<3, 4>(right, to),
+            None => {
+                bottom.solve::<3, 4>(right, to);
+                matrix.times(to, product);
+            }
         }
     }
 
@@ -102,7 +116,7 @@ impl Multigrid {
 fn below(levels: &mut [Coarse], bottom: &Bottom, right: &[[f32; LANES]], to: &mut [[f32; LANES]]) {
     match levels {
         [Coarse { matrix, level }, rest @ ..] => {
-            level.cycle(&*matrix, right, to, |right, to| below(rest, bottom, right, to));
+            level.cycle(&*matrix, right, to, None, |right, to| below(rest, bottom, right, to));
         }
         [] => bottom.solve::<RIGID, LANES>(right, to),
     }
@@ -134,6 +148,7 @@ impl<const B: usize, const L: usize> Level<B, L> {
         matrix: &impl Operator<B, L>,
         right: &[[f32; L]],
         to: &mut [[f32; L]],
+        product: Option<&mut [[f32; L]]>,
         below: impl FnOnce(&[[f32; LANES]], &mut [[f32; LANES]]),
     ) {
         let Self { smoother, prolongation, columns, residual, coarse } = self;
@@ -141,7 +156,11 @@ impl<const B: usize, const L: usize> Level<B, L> {
         smoother.start(matrix, to, residual);
         let mut restricted = vec![[0.0; LANES]; coarse.len()];
         let restrict = |(column, to): (usize, &mut [f32; LANES])| {
-            for &(fine, place) in columns.of_column(column) {
+            let blocks = columns.of_column(column);
+            for (n, &(fine, place)) in blocks.iter().enumerate() {
+                if let Some(&(_, place)) = blocks.get(n + AHEAD) {
+                    prolongation.prefetch(place as usize);
+                }
                 prolongation.add_times(place as usize, &residual[fine as usize], to);
             }
             to[RIGID..].fill(0.0);
@@ -155,7 +174,7 @@ impl<const B: usize, const L: usize> Level<B, L> {
             }
         };
         to.par_iter_mut().enumerate().with_min_len(ROWS).for_each(prolong);
-        smoother.smooth(matrix, right, to, residual);
+        smoother.smooth(matrix, right, to, residual, product);
     }
 }
 

@@ -4,7 +4,8 @@ use nalgebra::{Cholesky, SMatrix};
 use rayon::prelude::*;
 
 use crate::blocks::{Block, Blocks, Pattern, ROWS};
-use crate::vectors::{Vector, add, dot};
+use crate::fronts::Fronts;
+use crate::vectors::{Vector, dot};
 
 /// Matrix products of a smoother.
 const PRODUCTS: usize = 3;
@@ -21,8 +22,8 @@ pub(crate) trait Operator<const B: usize, const L: usize>: Sync {
     fn block(&self, place: usize) -> Block<B, B>;
     /// The block of a node on the diagonal.
     fn diagonal(&self, node: usize) -> Block<B, B>;
-    /// The row of a node times a vector.
-    fn row_times(&self, node: usize, x: &[[f32; L]]) -> [f32; L];
+    /// The row of a node times a vector, which `x` has at each node.
+    fn row_times(&self, node: usize, x: impl Fn(usize) -> [f32; L]) -> [f32; L];
     /// Number of nodes.
     fn nodes(&self) -> usize {
         self.pattern().height()
@@ -35,7 +36,7 @@ pub(crate) trait Operator<const B: usize, const L: usize>: Sync {
     }
     /// The matrix times a vector.
     fn times(&self, x: &[[f32; L]], to: &mut [[f32; L]]) {
-        let row = |(node, to): (usize, &mut [f32; L])| *to = self.row_times(node, x);
+        let row = |(node, to): (usize, &mut [f32; L])| *to = self.row_times(node, |node| x[node]);
         to.par_iter_mut().enumerate().with_min_len(ROWS).for_each(row);
     }
 }
@@ -54,7 +55,7 @@ impl<const B: usize, const L: usize> Operator<B, L> for Blocks<B, B> {
     }
 
     #[inline(always)]
-    fn row_times(&self, node: usize, x: &[[f32; L]]) -> [f32; L] {
+    fn row_times(&self, node: usize, x: impl Fn(usize) -> [f32; L]) -> [f32; L] {
         Blocks::row_times(self, node, x)
     }
 }
@@ -69,8 +70,9 @@ pub(crate) struct Smoother<const B: usize, const L: usize> {
     /// Approximate eigenvector of the largest eigenvalue.
     vector: Vector<L>,
     /// The change of each unknown, and the next change.
-    change: Vector<L>,
-    next: Vector<L>,
+    changes: [Vector<L>; 2],
+    /// The rows that the products take together.
+    fronts: Fronts<4>,
 }
 
 impl<const B: usize, const L: usize> Smoother<B, L> {
@@ -82,8 +84,8 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
             inverse: Vec::new(),
             largest: 1.0,
             vector: (0..nodes).map(start).collect(),
-            change: zero.clone(),
-            next: zero,
+            changes: [zero.clone(), zero],
+            fronts: Fronts::of(matrix.pattern(), B * B),
         };
         smoother.invert(matrix);
         smoother.find_largest(matrix, POWER_STEPS[0]);
@@ -113,13 +115,13 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
     fn find_largest(&mut self, matrix: &impl Operator<B, L>, steps: usize) {
         let mut largest: f64 = 1.0;
         for _ in 0..steps {
-            let (vector, inverse) = (&self.vector, &self.inverse);
+            let (vector, inverse, next) = (&self.vector, &self.inverse, &mut self.changes[0]);
             let row = |(node, to): (usize, &mut [f32; L])| {
-                *to = times(&inverse[node], &matrix.row_times(node, vector));
+                *to = times(&inverse[node], &matrix.row_times(node, |node| vector[node]));
             };
-            self.next.par_iter_mut().enumerate().with_min_len(ROWS).for_each(row);
+            next.par_iter_mut().enumerate().with_min_len(ROWS).for_each(row);
             let before = dot(&self.vector, &self.vector).sqrt();
-            let after = dot(&self.next, &self.next).sqrt();
+            let after = dot(next, next).sqrt();
             if !(after > 0.0 && after.is_finite() && before > 0.0) {
                 break;
             }
@@ -130,7 +132,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
                     to[n] = x[n] * scale;
                 }
             };
-            self.vector.par_iter_mut().with_min_len(ROWS).zip(&self.next).for_each(scaled);
+            self.vector.par_iter_mut().with_min_len(ROWS).zip(&*next).for_each(scaled);
         }
         self.largest = (1.1 * largest) as f32;
     }
@@ -162,61 +164,101 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
 
     /// Smooths from zero. `residual` is the right-hand side before, and the residual of `x` after.
     pub fn start(&mut self, matrix: &impl Operator<B, L>, x: &mut [[f32; L]], residual: &mut [[f32; L]]) {
-        let factors = self.factors();
-        let Self { inverse, change, next, .. } = self;
-        let rows = x.par_iter_mut().zip(&mut *change).zip(&*residual).zip(&*inverse);
-        rows.with_min_len(ROWS).for_each(|(((x, change), r), inverse)| {
-            let step = times(inverse, r);
-            for n in 0..L {
-                change[n] = factors[0].1 * step[n];
-            }
-            *x = *change;
-        });
-        for n in 1..=PRODUCTS {
-            let rows = x.par_iter_mut().zip(&mut *next).zip(&mut *residual).enumerate();
-            rows.with_min_len(ROWS).for_each(|(node, ((x, next), r))| {
-                let product = matrix.row_times(node, change);
-                for n in 0..L {
-                    r[n] -= product[n];
-                }
-                if let Some(&(old, new)) = factors.get(n) {
-                    let step = times(&inverse[node], r);
-                    for n in 0..L {
-                        next[n] = old * change[node][n] + new * step[n];
-                        x[n] += next[n];
-                    }
-                }
-            });
-            std::mem::swap(change, next);
-        }
+        let [(_, first), second, third] = self.factors();
+        let rows = x.par_iter_mut().zip(&*residual).zip(&self.inverse).with_min_len(ROWS);
+        rows.for_each(|((x, r), inverse)| *x = times(inverse, r).map(|step| first * step));
+        self.steps(matrix, None, x, residual, [Some(second), Some(third), None], None);
     }
 
-    /// Smooths an approximation `x`. `residual` is memory for the residual.
+    /// Smooths an approximation `x`. `residual` is memory for the residual. Writes the matrix times
+    /// the result to `product`, if there is one.
     pub fn smooth(
         &mut self,
         matrix: &impl Operator<B, L>,
         right: &[[f32; L]],
         x: &mut [[f32; L]],
         residual: &mut [[f32; L]],
+        product: Option<&mut [[f32; L]]>,
     ) {
-        let factors = self.factors();
-        let Self { inverse, change, next, .. } = self;
-        for (n, (old, new)) in factors.into_iter().enumerate() {
-            let from: &[[f32; L]] = if n == 0 { x } else { change };
-            let rows = next.par_iter_mut().zip(&mut *residual).enumerate();
-            rows.with_min_len(ROWS).for_each(|(node, (next, r))| {
-                let product = matrix.row_times(node, from);
-                let before = if n == 0 { right[node] } else { *r };
-                for n in 0..L {
-                    r[n] = before[n] - product[n];
-                }
-                let step = times(&inverse[node], r);
-                for n in 0..L {
-                    next[n] = old * from[node][n] + new * step[n];
-                }
-            });
-            std::mem::swap(change, next);
-            add(x, 1.0, change);
+        let factors = self.factors().map(Some);
+        self.steps(matrix, Some(right), x, residual, factors, product);
+    }
+
+    /// Three products with the matrix, and three changes of `x`. The first product is that with
+    /// `x`, and the others are those with the changes. A change is a multiple of the change before,
+    /// or of `x`, plus a multiple of the inverse blocks times the residual. `right` is the
+    /// right-hand side. Without it, `residual` has it. The fourth product is that with the last
+    /// `x`.
+    ///
+    /// All products move through the rows together, see [`Fronts`].
+    fn steps(
+        &mut self,
+        matrix: &impl Operator<B, L>,
+        right: Option<&[[f32; L]]>,
+        x: &mut [[f32; L]],
+        residual: &mut [[f32; L]],
+        factors: [Option<(f32, f32)>; PRODUCTS],
+        mut product: Option<&mut [[f32; L]]>,
+    ) {
+        let Self { inverse, changes: [first, second], fronts, .. } = self;
+        let rows = fronts.rows;
+        let step = |node: usize, from: &[f32; L], r: &[f32; L], (old, new): (f32, f32)| {
+            let step = times(&inverse[node], r);
+            std::array::from_fn::<f32, L, _>(|n| old * from[n] + new * step[n])
+        };
+        for [a, b, c, d] in &fronts.fronts {
+            // The fourth product reads `x` where the third one has finished, and the first one
+            // reads it where the third one has not begun.
+            let (x_done, x_rest) = x.split_at_mut(c.start);
+            let (x_c, x_ahead) = x_rest.split_at_mut(c.len());
+            let (first_done, first_rest) = first.split_at_mut(a.start);
+            let (second_done, second_rest) = second.split_at_mut(b.start);
+            let (r_done, r_a) = residual.split_at_mut(a.start);
+            let (r_done, r_b) = r_done.split_at_mut(b.start);
+            let r_c = &mut r_done[c.clone()];
+            let r_b = &mut r_b[..b.len()];
+            let first_stage = || {
+                let of_rows = first_rest[..a.len()].par_iter_mut().zip(&mut r_a[..a.len()]).enumerate();
+                of_rows.with_min_len(rows).for_each(|(n, (change, r))| {
+                    let node = a.start + n;
+                    let product = matrix.row_times(node, |node| x_ahead[node - c.end]);
+                    let before = right.map_or(*r, |right| right[node]);
+                    *r = std::array::from_fn(|n| before[n] - product[n]);
+                    if let Some(factors) = factors[0] {
+                        *change = step(node, &x_ahead[node - c.end], r, factors);
+                    }
+                });
+            };
+            let second_stage = || {
+                let of_rows = second_rest[..b.len()].par_iter_mut().zip(r_b).enumerate();
+                of_rows.with_min_len(rows).for_each(|(n, (change, r))| {
+                    let node = b.start + n;
+                    let product = matrix.row_times(node, |node| first_done[node]);
+                    *r = std::array::from_fn(|n| r[n] - product[n]);
+                    if let Some(factors) = factors[1] {
+                        *change = step(node, &first_done[node], r, factors);
+                    }
+                });
+            };
+            let third_stage = || {
+                let of_rows = x_c.par_iter_mut().zip(r_c).enumerate();
+                of_rows.with_min_len(rows).for_each(|(n, (x, r))| {
+                    let node = c.start + n;
+                    let product = matrix.row_times(node, |node| second_done[node]);
+                    *r = std::array::from_fn(|n| r[n] - product[n]);
+                    let last = factors[2].map(|factors| step(node, &second_done[node], r, factors));
+                    for n in 0..L {
+                        x[n] = x[n] + first_done[node][n] + second_done[node][n];
+                        x[n] += last.map_or(0.0, |last| last[n]);
+                    }
+                });
+            };
+            let fourth_stage = || {
+                let Some(product) = &mut product else { return };
+                let of_rows = product[d.clone()].par_iter_mut().enumerate().with_min_len(rows);
+                of_rows.for_each(|(n, to)| *to = matrix.row_times(d.start + n, |node| x_done[node]));
+            };
+            rayon::join(|| rayon::join(first_stage, second_stage), || rayon::join(third_stage, fourth_stage));
         }
     }
 }
@@ -251,4 +293,63 @@ fn noise(n: usize) -> f32 {
     let mixed = (n as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     (((mixed ^ (mixed >> 32)) >> 11) as f64 / 2f64.powi(52) - 1.0) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A symmetric band, in which each node has some neighbors on both sides.
+    fn band(count: usize) -> Blocks<3, 3> {
+        Blocks::by_rows(0..count, count, |sums, row| {
+            for column in row.saturating_sub(6)..(row + 7).min(count) {
+                let (low, high) = (row.min(column), row.max(column));
+                let strength = if row == column { 20.0 } else { f64::from(noise(7 * low + high)) };
+                for n in 0..3 {
+                    sums.at(column)[n][n] += strength + n as f64 / 8.0;
+                }
+            }
+        })
+    }
+
+    /// Products that go through the rows together give the bits of products one after the other.
+    #[test]
+    fn products_together_give_the_bits_of_single_ones() {
+        let matrix = band(60_000);
+        let vector = |seed: usize| -> Vector<4> {
+            let number = |node: usize, n: usize| if n < 3 { noise(seed + 3 * node + n) } else { 0.0 };
+            (0..60_000).map(|node| std::array::from_fn(|n| number(node, n))).collect()
+        };
+        let mut smoother = Smoother::<3, 4>::new(&matrix);
+        assert!(smoother.fronts.fronts.len() > 5, "{}", smoother.fronts.fronts.len());
+        let (right, start) = (vector(0), vector(1_000_000));
+        let times = |x: &Vector<4>| {
+            let mut product = start.clone();
+            matrix.times(x, &mut product);
+            product
+        };
+        let minus = |a: &Vector<4>, b: &Vector<4>| -> Vector<4> {
+            a.iter().zip(b).map(|(a, b)| std::array::from_fn(|n| a[n] - b[n])).collect()
+        };
+        let (mut x, mut change, mut r) = (start.clone(), start.clone(), right.clone());
+        for (old, new) in smoother.factors() {
+            r = minus(&r, &times(&change));
+            for (node, change) in change.iter_mut().enumerate() {
+                let step = super::times(&smoother.inverse[node], &r[node]);
+                *change = std::array::from_fn(|n| old * change[n] + new * step[n]);
+                x[node] = std::array::from_fn(|n| x[node][n] + change[n]);
+            }
+        }
+        let (mut found, mut residual, mut product) = (start.clone(), start.clone(), start.clone());
+        smoother.smooth(&matrix, &right, &mut found, &mut residual, Some(&mut product));
+        assert!(found == x && residual == r && product == times(&x));
+        assert!(product != times(&start), "control");
+
+        // From zero the residual comes out.
+        let mut residual = right.clone();
+        smoother.start(&matrix, &mut found, &mut residual);
+        let exact = minus(&right, &times(&found));
+        let largest = |x: &Vector<4>| x.as_flattened().iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+        assert!(largest(&minus(&exact, &residual)) < 1e-5 * largest(&right));
+    }
 }
