@@ -46,6 +46,7 @@ mod tests {
             ("peers", &crate::peers::TABLES),
             ("region", &crate::region::TABLES),
             ("rest", &crate::rest::TABLES),
+            ("rest-front", &crate::rest::FRONT_TABLES),
             ("speed", &crate::speed::TABLES),
             ("stability", &crate::stability::TABLES),
             ("tuning", &crate::tuning::TABLES),

@@ -13,9 +13,12 @@ use serde::Serialize;
 
 use super::search::distance;
 use crate::accuracy::front::pareto;
-use crate::accuracy::problems::{NAMES, Problem, named};
+use crate::accuracy::problems::{Problem, named};
 use crate::kit::{Checks, Failure, Table, number, optional, percent};
 
+/// The problems of the study of accuracy in which no handle moves. A body that a handle pulls rests
+/// where the handle ends.
+const PROBLEMS: [&str; 4] = ["sheet", "incision", "abdomen", "hanging"];
 /// Errors of the table.
 const ERRORS: [f64; 3] = [0.1, 0.01, 0.001];
 /// Stated error at which the search ends.
@@ -63,13 +66,13 @@ impl Front {
     }
 }
 
-/// Measures all problems of the study of accuracy.
+/// Measures the problems.
 ///
 /// # Errors
 /// A problem cannot be built, or a method refuses it.
 pub fn measure(checks: &mut Checks) -> Result<Vec<Front>, Failure> {
     let mut fronts = Vec::new();
-    for name in NAMES {
+    for name in PROBLEMS {
         let Some(problem) = named(name, false)? else { continue };
         let front = one(&problem)?;
         let last = front.search.points.last().map_or(f64::INFINITY, |[_, error]| *error);

@@ -24,20 +24,20 @@ pub struct Options {
     /// Write all figures to this file.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Only the search against frames with many settings, on the problems of the study of accuracy.
-    /// Takes about a quarter of an hour.
-    #[arg(long, conflicts_with_all = ["most_vertices", "write"])]
+    /// Only the search against frames with many settings, on problems of the study of accuracy.
+    /// Takes about eight minutes.
+    #[arg(long, conflicts_with = "most_vertices")]
     pub front: bool,
-    /// With `--front`, write a chart of each problem to this folder.
-    #[arg(long, value_name = "FOLDER", requires = "front")]
-    pub charts: Option<PathBuf>,
-    /// Write docs/results/rest.md. Needs the scan of the abdomen.
+    /// Write docs/results/rest.md, which needs the scan of the abdomen. With `--front`, write
+    /// docs/results/rest-front.md and its charts.
     #[arg(long, conflicts_with = "most_vertices")]
     pub write: bool,
 }
 
 /// Tables of the page.
 pub const TABLES: [&str; 6] = ["provenance", "bodies", "sizes", "stiffnesses", "frames", "checks"];
+/// Tables of the page of `--front`.
+pub const FRONT_TABLES: [&str; 3] = ["provenance", "front", "checks"];
 
 /// Measures everything. Returns whether all checks hold.
 ///
@@ -87,18 +87,25 @@ pub fn run(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
 
 /// Measures the search against frames with many settings.
 fn run_front(options: &Options, out: &mut dyn Write) -> Result<bool, Failure> {
-    let provenance = Provenance::start("rest --front");
+    let page = options.write.then(|| Page::open("rest-front", &FRONT_TABLES)).transpose()?;
+    let command = if options.write { "rest --front --write" } else { "rest --front" };
+    let provenance = Provenance::start(command);
     let mut checks = Checks::default();
     let fronts = front::measure(&mut checks)?;
-    writeln!(out, "{}", front::table(&fronts).markdown())?;
+    let table = front::table(&fronts).markdown();
+    writeln!(out, "{table}")?;
     checks.print(out)?;
     if let Some(path) = &options.json {
         write_json(path, &json!({"provenance": provenance, "fronts": fronts}))?;
     }
-    if let Some(folder) = &options.charts {
+    if let Some(mut page) = page.filter(|_| checks.pass()) {
+        page.set("front", &table)?;
+        page.set("provenance", &provenance.markdown())?;
+        page.set("checks", &checks.summary())?;
         for front in &fronts {
-            std::fs::write(folder.join(front::file(front)), front::chart(front))?;
+            std::fs::write(results().join(front::file(front)), front::chart(front))?;
         }
+        page.save(&results())?;
     }
     Ok(checks.pass())
 }
