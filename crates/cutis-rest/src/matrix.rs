@@ -73,11 +73,7 @@ impl Operator<3, 4> for Matrix {
     #[inline(always)]
     fn row_times(&self, node: usize, x: impl Fn(usize) -> [f32; 4]) -> [f32; 4] {
         let own = WideF32x4::from(x(node));
-        // One sum per column, so that an addition does not wait for the one before.
-        let mut sums = self.sums[node].map(WideF32x4::from);
-        for (sum, column) in sums.iter_mut().zip(columns(own)) {
-            *sum *= column;
-        }
+        let mut sum = WideF32x4::splat(0.0);
         let places = self.pattern.places(node);
         let neighbors = &self.pattern.columns[places.clone()];
         let values = &self.values[9 * places.start..9 * places.end + 1];
@@ -85,12 +81,16 @@ impl Operator<3, 4> for Matrix {
             prefetch(&self.values, 9 * (places.start + n) + AHEAD);
             let block = &values[9 * n..9 * n + 10];
             let difference = columns(WideF32x4::from(x(neighbor as usize)) - own);
-            for (column, sum) in sums.iter_mut().enumerate() {
+            for (column, difference) in difference.into_iter().enumerate() {
                 let block: [f32; 4] = std::array::from_fn(|row| block[3 * column + row]);
-                *sum += WideF32x4::from(block) * difference[column];
+                sum += WideF32x4::from(block) * difference;
             }
         }
-        let [x, y, z, _] = (sums[0] + sums[1] + sums[2]).into();
+        // Last, because it may be much larger. Coming first, it would round off all others.
+        for (column, own) in self.sums[node].iter().zip(columns(own)) {
+            sum += WideF32x4::from(*column) * own;
+        }
+        let [x, y, z, _] = sum.into();
         [x, y, z, 0.0]
     }
 }

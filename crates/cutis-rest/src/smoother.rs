@@ -167,7 +167,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         let [(_, first), second, third] = self.factors();
         let rows = x.par_iter_mut().zip(&*residual).zip(&self.inverse).with_min_len(ROWS);
         rows.for_each(|((x, r), inverse)| *x = times(inverse, r).map(|step| first * step));
-        self.steps(matrix, None, x, residual, [Some(second), Some(third), None], None);
+        self.steps(matrix, None, x, residual, ([second, third], None), None);
     }
 
     /// Smooths an approximation `x`. `residual` is memory for the residual. Writes the matrix times
@@ -180,15 +180,15 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         residual: &mut [[f32; L]],
         product: Option<&mut [[f32; L]]>,
     ) {
-        let factors = self.factors().map(Some);
-        self.steps(matrix, Some(right), x, residual, factors, product);
+        let [first, second, third] = self.factors();
+        self.steps(matrix, Some(right), x, residual, ([first, second], Some(third)), product);
     }
 
-    /// Three products with the matrix, and three changes of `x`. The first product is that with
-    /// `x`, and the others are those with the changes. A change is a multiple of the change before,
-    /// or of `x`, plus a multiple of the inverse blocks times the residual. `right` is the
-    /// right-hand side. Without it, `residual` has it. The fourth product is that with the last
-    /// `x`.
+    /// Three products with the matrix, and a change of `x` after each of the first two, and also
+    /// after the third one if there are factors for it. The first product is that with `x`, and the
+    /// others are those with the changes. A change is a multiple of the change before, or of `x`,
+    /// plus a multiple of the inverse blocks times the residual. `right` is the right-hand side.
+    /// Without it, `residual` has it. The fourth product is that with the last `x`.
     ///
     /// All products move through the rows together, see [`Fronts`].
     fn steps(
@@ -197,7 +197,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         right: Option<&[[f32; L]]>,
         x: &mut [[f32; L]],
         residual: &mut [[f32; L]],
-        factors: [Option<(f32, f32)>; PRODUCTS],
+        (factors, last): ([(f32, f32); 2], Option<(f32, f32)>),
         mut product: Option<&mut [[f32; L]]>,
     ) {
         let Self { inverse, changes: [first, second], fronts, .. } = self;
@@ -224,9 +224,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
                     let product = matrix.row_times(node, |node| x_ahead[node - c.end]);
                     let before = right.map_or(*r, |right| right[node]);
                     *r = std::array::from_fn(|n| before[n] - product[n]);
-                    if let Some(factors) = factors[0] {
-                        *change = step(node, &x_ahead[node - c.end], r, factors);
-                    }
+                    *change = step(node, &x_ahead[node - c.end], r, factors[0]);
                 });
             };
             let second_stage = || {
@@ -235,9 +233,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
                     let node = b.start + n;
                     let product = matrix.row_times(node, |node| first_done[node]);
                     *r = std::array::from_fn(|n| r[n] - product[n]);
-                    if let Some(factors) = factors[1] {
-                        *change = step(node, &first_done[node], r, factors);
-                    }
+                    *change = step(node, &first_done[node], r, factors[1]);
                 });
             };
             let third_stage = || {
@@ -246,7 +242,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
                     let node = c.start + n;
                     let product = matrix.row_times(node, |node| second_done[node]);
                     *r = std::array::from_fn(|n| r[n] - product[n]);
-                    let last = factors[2].map(|factors| step(node, &second_done[node], r, factors));
+                    let last = last.map(|factors| step(node, &second_done[node], r, factors));
                     for n in 0..L {
                         x[n] = x[n] + first_done[node][n] + second_done[node][n];
                         x[n] += last.map_or(0.0, |last| last[n]);
