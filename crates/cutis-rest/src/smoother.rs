@@ -75,6 +75,13 @@ pub(crate) struct Smoother<const B: usize, const L: usize> {
     fronts: Fronts<4>,
 }
 
+/// The factors of the changes after three products, for the change before and for the residual.
+#[derive(Clone, Copy)]
+struct Factors {
+    first: [(f32, f32); 2],
+    last: Option<(f32, f32)>,
+}
+
 impl<const B: usize, const L: usize> Smoother<B, L> {
     pub fn new(matrix: &impl Operator<B, L>) -> Self {
         let nodes = matrix.nodes();
@@ -167,7 +174,8 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         let [(_, first), second, third] = self.factors();
         let rows = x.par_iter_mut().zip(&*residual).zip(&self.inverse).with_min_len(ROWS);
         rows.for_each(|((x, r), inverse)| *x = times(inverse, r).map(|step| first * step));
-        self.steps(matrix, None, x, residual, ([second, third], None), None);
+        let factors = Factors { first: [second, third], last: None };
+        self.steps(matrix, None, x, residual, factors, None);
     }
 
     /// Smooths an approximation `x`. `residual` is memory for the residual. Writes the matrix times
@@ -181,7 +189,8 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         product: Option<&mut [[f32; L]]>,
     ) {
         let [first, second, third] = self.factors();
-        self.steps(matrix, Some(right), x, residual, ([first, second], Some(third)), product);
+        let factors = Factors { first: [first, second], last: Some(third) };
+        self.steps(matrix, Some(right), x, residual, factors, product);
     }
 
     /// Three products with the matrix, and a change of `x` after each of the first two, and also
@@ -197,7 +206,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         right: Option<&[[f32; L]]>,
         x: &mut [[f32; L]],
         residual: &mut [[f32; L]],
-        (factors, last): ([(f32, f32); 2], Option<(f32, f32)>),
+        Factors { first: factors, last }: Factors,
         mut product: Option<&mut [[f32; L]]>,
     ) {
         let Self { inverse, changes: [first, second], fronts, .. } = self;
