@@ -7,7 +7,7 @@ use crate::{Clock, Formulation, Settings};
 #[non_exhaustive]
 pub enum SolverError {
     /// A setting is out of range.
-    #[error("{key} is {value}; expected {expected}")]
+    #[error("{key} is {}; expected {expected}", short(*value))]
     Setting {
         /// Name of the setting.
         key: &'static str,
@@ -188,6 +188,11 @@ pub enum SolverError {
         /// Time of the present state, in seconds.
         time_s: f64,
     },
+}
+
+/// A number as text: a large one with an exponent, in place of hundreds of digits.
+fn short(value: f64) -> String {
+    if value.abs() < 1e16 { value.to_string() } else { format!("{value:e}") }
 }
 
 impl SolverError {

@@ -184,6 +184,8 @@ fn descent_refuses_a_gravity_that_overflows() {
         other => other.is_some(),
     };
     assert!(is_refused(found::<f32>(-1e30)) && is_refused(found::<f64>(1e300)));
+    let message = found::<f64>(1e300).unwrap().to_string();
+    assert!(message.starts_with("gravity_m_s2 is 1e300; expected"), "{message}");
     assert_eq!((found::<f32>(-9.81), found::<f64>(-1e30)), (None, None));
 }
 
