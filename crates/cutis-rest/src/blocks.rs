@@ -145,6 +145,7 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         // Two sums, so that an addition does not wait for the one before.
         let mut sums = [[0.0; L]; 2];
         for place in self.pattern.places(row) {
+            // A block of 36 numbers lies in two or three lines of the cache.
             prefetch(&self.values, R * C * place + AHEAD);
             prefetch(&self.values, R * C * place + AHEAD + 16);
             let x = x(self.pattern.columns[place] as usize);

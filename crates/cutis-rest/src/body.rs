@@ -130,8 +130,7 @@ impl Body {
         let weights = free.iter().map(weight).collect();
         let mut kinds = Vec::new();
         let mut incidences = Vec::new();
-        for kind in system.kinds() {
-            let tuples = Tuples { vertices: kind.indices(), arity: kind.arity() };
+        for (kind, &tuples) in system.kinds().iter().zip(&tuples) {
             let incidence = Incidence::new(tuples, start.len())?;
             kinds.push(elements(Arc::new(kind.clone()), &start, &free, &place, &incidence)?);
             incidences.push(incidence);
