@@ -16,3 +16,19 @@ pub fn prefetch<T>(slice: &[T], index: usize) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (slice, index);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::prefetch;
+
+    #[test]
+    fn any_index_may_be_named() {
+        let numbers = vec![1.0f32, 2.0, 3.0];
+        for index in [0, 2, 3, usize::MAX] {
+            prefetch(&numbers, index);
+            prefetch(&numbers[..0], index);
+            prefetch(&[(); 3], index);
+        }
+        assert_eq!(numbers, [1.0, 2.0, 3.0]);
+    }
+}
