@@ -160,3 +160,22 @@ fn only_named_outputs_are_written() {
     // Checkpoints are written only on request.
     assert_eq!(run(&[("output", "{}"), ("run.checkpoint_every", "1")]).names(), ["checkpoint.bin"]);
 }
+
+/// A search for the state of rest takes no steps. Control: a scene with a frame has all of it.
+#[test]
+fn a_search_for_rest_prepares_no_frames() {
+    let with = |frames: u32| {
+        let run = format!("{{ frames = {frames}, until = 'rest' }}");
+        plan(&scene(SMALL, &[("solver.formulation", "vbd"), ("run", &run)]))
+    };
+    let (rest, frame) = (with(0), with(1));
+    for part in ["incidences", "teams"] {
+        assert_eq!(bytes(&rest, part), None);
+        assert!(bytes(&frame, part).is_some_and(|bytes| bytes > 0), "{part}");
+    }
+    assert!(rest.colors.is_empty() && !frame.colors.is_empty());
+    assert_eq!((rest.projections, frame.projections > 0), (0, true));
+    assert!(says(&rest.left_out, "groups of colors") && !says(&frame.left_out, "groups of colors"));
+    assert_eq!(rest.costs.time, "not measured: the run has no frames");
+    assert!(frame.costs.ms_per_frame().is_some());
+}

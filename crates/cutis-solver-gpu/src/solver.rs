@@ -59,7 +59,8 @@ impl Constraints {
     fn new(gpu: &Gpu, body: &DeviceBody, simulation: &Simulation<f32>) -> Result<Self, GpuError> {
         let kind = |set: &cutis_solver::Kind<f32>| DeviceKind::new(gpu, body, &**set, simulation.settings());
         Ok(match simulation.method() {
-            Method::Project(_) => {
+            // A body that only rests never comes here: it has a solver of its own.
+            Method::Project(_) | Method::Rest => {
                 Self::Projected(simulation.system().kinds().iter().map(kind).collect::<Result<_, _>>()?)
             }
             Method::Descend(descent) => Self::Descent(DescentKernels::new(gpu, body, simulation, descent)?),

@@ -208,18 +208,23 @@ impl<T: Scalar> Descent<T> {
     /// compliance of zero, and [`SolverError::Groups`] if two vertices of a group share a
     /// constraint.
     pub fn new(system: &System<T>, settings: &Settings) -> Result<Self, SolverError> {
-        check_gravity::<T>(settings)?;
+        Self::check(system, settings)?;
         let incidences = Self::incidences_of(system)?;
         let groups = groups_of(system, &tuples_of(system.kinds()), &incidences)?;
         Ok(Self { groups, incidences, teams: Teams::default(), step: DescentStep::new(settings) })
     }
 
-    /// Returns the constraints at each vertex, for each kind, if the forces of all kinds are
-    /// defined.
+    /// Checks that vertex block descent can solve `system`.
+    ///
+    /// # Errors
+    /// The errors of [`Descent::new`], except those of the groups.
+    pub fn check(system: &System<T>, settings: &Settings) -> Result<(), SolverError> {
+        check_gravity::<T>(settings)?;
+        system.kinds().iter().try_for_each(check_compliances)
+    }
+
+    /// Returns the constraints at each vertex, for each kind.
     pub(crate) fn incidences_of(system: &System<T>) -> Result<Vec<Incidence>, SolverError> {
-        for kind in system.kinds() {
-            check_compliances(kind)?;
-        }
         let count = system.vertices().len();
         let tuples = tuples_of(system.kinds());
         let incidences = tuples.iter().map(|&kind| Incidence::new(kind, count)).collect::<Result<_, _>>();

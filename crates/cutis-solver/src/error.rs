@@ -178,6 +178,9 @@ pub enum SolverError {
         /// Time of the present state, in seconds.
         time_s: f64,
     },
+    /// Frames of a [`Resting`](crate::Resting) body.
+    #[error("this body only rests: it was not prepared for frames")]
+    Resting,
     /// The device of a backend failed. The host keeps the last state that it read, at `time_s`.
     #[error("the {backend} backend stopped: {reason}; the last known state is that at {time_s} s")]
     Device {

@@ -68,6 +68,42 @@ pub enum Method<T: Scalar> {
     Project(Step<T>),
     /// Moves one vertex after the other (vertex block descent).
     Descend(Box<Descent<T>>),
+    /// Takes no steps, see [`Resting`](crate::Resting).
+    Rest,
+}
+
+impl<T: Scalar> Method<T> {
+    /// The schedule of a frame.
+    fn schedule(&self, system: &System<T>, settings: &Settings) -> Schedule {
+        match self {
+            Self::Project(_) => Schedule::new(&system.kinds, settings),
+            Self::Descend(descent) => Schedule::of_vertices(descent.groups(), settings),
+            Self::Rest => Schedule::new::<T>(&[], settings),
+        }
+    }
+}
+
+/// Checks the settings, and that the stiffness of each kind fits them.
+fn check<T: Scalar>(system: &System<T>, settings: &Settings) -> Result<(), SolverError> {
+    settings.validate()?;
+    for kind in &system.kinds {
+        let (found, expected) = (kind.stiffness().formulation(), settings.formulation);
+        if !accepts(found, expected) {
+            return Err(SolverError::Formulation { kind: kind.name(), found, expected });
+        }
+    }
+    Ok(())
+}
+
+/// The inverse square of a substep in 1/s².
+fn inverse_h_squared<T: Scalar>(settings: &Settings) -> Result<T, SolverError> {
+    let h = settings.substep_s();
+    let inverse = T::constant(1.0 / (h * h));
+    if T::constant(h) > T::zero() && inverse.is_finite() {
+        return Ok(inverse);
+    }
+    let expected = "a substep whose inverse square is finite in the number type";
+    Err(SolverError::Setting { key: "dt_s / substeps", value: h, expected })
 }
 
 impl<T: Scalar> Simulation<T> {
@@ -80,31 +116,34 @@ impl<T: Scalar> Simulation<T> {
     /// Returns [`SolverError::Setting`] for a setting out of range, [`SolverError::Formulation`]
     /// for a kind whose stiffness is for another formulation, and the errors of [`Descent::new`].
     pub fn new(system: System<T>, settings: Settings) -> Result<Self, SolverError> {
-        settings.validate()?;
-        for kind in &system.kinds {
-            let (found, expected) = (kind.stiffness().formulation(), settings.formulation);
-            if !accepts(found, expected) {
-                return Err(SolverError::Formulation { kind: kind.name(), found, expected });
-            }
-        }
-        let length = |kind: &dyn ConstraintSet<T>| if settings.keeps_multipliers() { kind.len() } else { 0 };
-        let multipliers = system.kinds.iter().map(|kind| vec![T::zero(); length(&**kind)]).collect();
-        let h = settings.substep_s();
-        let inverse_h_squared = T::constant(1.0 / (h * h));
-        if !(T::constant(h) > T::zero() && inverse_h_squared.is_finite()) {
-            let expected = "a substep whose inverse square is finite in the number type";
-            return Err(SolverError::Setting { key: "dt_s / substeps", value: h, expected });
-        }
+        check(&system, &settings)?;
+        let inverse_h_squared = inverse_h_squared(&settings)?;
         let method = match settings.formulation {
             Formulation::Pbd => Method::Project(Step::Pbd),
             Formulation::Xpbd => Method::Project(Step::Xpbd { inverse_h_squared }),
             Formulation::Vbd => Method::Descend(Box::new(Descent::new(&system, &settings)?)),
         };
-        Ok(Self {
-            schedule: match &method {
-                Method::Project(_) => Schedule::new(&system.kinds, &settings),
-                Method::Descend(descent) => Schedule::of_vertices(descent.groups(), &settings),
-            },
+        let length = |kind: &dyn ConstraintSet<T>| if settings.keeps_multipliers() { kind.len() } else { 0 };
+        let multipliers = system.kinds.iter().map(|kind| vec![T::zero(); length(&**kind)]).collect();
+        Ok(Self::with(system, settings, method, multipliers))
+    }
+
+    /// Holds `system` without steps. Nothing is prepared for them: no groups, no multipliers.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`], except for errors of the groups.
+    pub(crate) fn resting(system: System<T>, settings: Settings) -> Result<Self, SolverError> {
+        check(&system, &settings)?;
+        inverse_h_squared::<T>(&settings)?;
+        if settings.formulation == Formulation::Vbd {
+            Descent::check(&system, &settings)?;
+        }
+        Ok(Self::with(system, settings, Method::Rest, Vec::new()))
+    }
+
+    fn with(system: System<T>, settings: Settings, method: Method<T>, multipliers: Vec<Vec<T>>) -> Self {
+        Self {
+            schedule: method.schedule(&system, &settings),
             integrator: Integrator::new(&settings),
             method,
             multipliers,
@@ -112,7 +151,7 @@ impl<T: Scalar> Simulation<T> {
             columns: None,
             settings,
             clock: Clock::default(),
-        })
+        }
     }
 
     /// Finds teams for vertex block descent with SIMD lanes, see [`Descent::find_teams`]. Other
@@ -164,11 +203,11 @@ impl<T: Scalar> Simulation<T> {
         &self.integrator
     }
 
-    /// Returns the parameters of a projection, or `None` in vertex block descent.
+    /// Returns the parameters of a projection, or `None` if constraints are not projected.
     pub fn projection_step(&self) -> Option<Step<T>> {
         match &self.method {
             Method::Project(step) => Some(*step),
-            Method::Descend(_) => None,
+            Method::Descend(_) | Method::Rest => None,
         }
     }
 
@@ -209,7 +248,7 @@ impl<T: Scalar> Simulation<T> {
     /// Returns the memory of the teams of vertex block descent in bytes, 0 without teams.
     pub fn team_bytes(&self) -> usize {
         match &self.method {
-            Method::Project(_) => 0,
+            Method::Project(_) | Method::Rest => 0,
             Method::Descend(descent) => descent.team_bytes(),
         }
     }
@@ -217,7 +256,7 @@ impl<T: Scalar> Simulation<T> {
     /// Returns the memory of the incidences of vertex block descent in bytes, 0 for other methods.
     pub fn incidence_bytes(&self) -> usize {
         match &self.method {
-            Method::Project(_) => 0,
+            Method::Project(_) | Method::Rest => 0,
             Method::Descend(descent) => descent.bytes(),
         }
     }
@@ -228,8 +267,11 @@ impl<T: Scalar> Simulation<T> {
     /// # Errors
     /// Returns [`SolverError::NotFinite`] as soon as a position is not finite after a substep. The
     /// state is then that at the start of this substep, with all velocities zero, and can be
-    /// stepped again.
+    /// stepped again. Returns [`SolverError::Resting`] for frames of a body that only rests.
     pub fn run(&mut self, frames: usize, execute: &impl Execute<T>) -> Result<(), SolverError> {
+        if frames > 0 && matches!(self.method, Method::Rest) {
+            return Err(SolverError::Resting);
+        }
         let mut started = false;
         let end = self.clock.frame.saturating_add(frames as u64);
         while self.clock.frame < end {
@@ -280,22 +322,21 @@ impl<T: Scalar> Simulation<T> {
     /// stepped.
     pub fn change(&mut self, change: &Change<T>) -> Result<(), SolverError> {
         let moved: Vec<bool> = match &self.method {
-            Method::Project(_) => Vec::new(),
+            Method::Project(_) | Method::Rest => Vec::new(),
             Method::Descend(_) => {
                 self.system.vertices.iter().map(|vertex| vertex.inverse_mass() > T::zero()).collect()
             }
         };
         self.system.change(change)?;
-        self.schedule = match &mut self.method {
-            Method::Project(_) => Schedule::new(&self.system.kinds, &self.settings),
-            Method::Descend(descent) => {
-                descent.change(&self.system, change, &moved)?;
-                Schedule::of_vertices(descent.groups(), &self.settings)
-            }
-        };
-        if self.settings.keeps_multipliers() {
-            for (number, kind) in &change.kinds {
-                self.multipliers[*number] = vec![T::zero(); kind.len()];
+        if let Method::Descend(descent) = &mut self.method {
+            descent.change(&self.system, change, &moved)?;
+        }
+        self.schedule = self.method.schedule(&self.system, &self.settings);
+        for (number, kind) in &change.kinds {
+            if let Some(multipliers) = self.multipliers.get_mut(*number)
+                && self.settings.keeps_multipliers()
+            {
+                *multipliers = vec![T::zero(); kind.len()];
             }
         }
         Ok(())
@@ -306,7 +347,7 @@ impl<T: Scalar> Simulation<T> {
     fn begin_substep(&mut self, after_another: bool, execute: &impl Execute<T>) {
         match (after_another, &self.method) {
             (true, Method::Project(_)) => self.run_pass(VertexPass::FinishAndPredict, execute),
-            (true, Method::Descend(_)) => {
+            (true, _) => {
                 self.run_pass(VertexPass::Finish, execute);
                 self.run_pass(VertexPass::Predict, execute);
             }
@@ -370,6 +411,7 @@ impl<T: Scalar> Simulation<T> {
                         execute.descend(VertexColor { system: &mut self.system, descent, pass });
                     }
                 }
+                Method::Rest => {}
             }
         }
     }

@@ -3,4 +3,5 @@
 mod change;
 mod descent;
 mod loads;
+mod resting;
 mod validation;

@@ -110,7 +110,7 @@ impl Body {
     fn descent(&self) -> Result<&Descent<f32>, Failure> {
         match self.simulation.method() {
             Method::Descend(descent) => Ok(descent),
-            Method::Project(_) => bail!("the body is projected"),
+            Method::Project(_) | Method::Rest => bail!("vertex block descent does not move the body"),
         }
     }
 

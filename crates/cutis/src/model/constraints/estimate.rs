@@ -11,7 +11,7 @@ pub(crate) struct CostEstimate {
     /// Memory of the solver on the host by part, equal to its
     /// [`Solver::bytes`](cutis_solver::Solver::bytes).
     pub(crate) memory: Vec<MemoryPart>,
-    /// The groups of vertex block descent; none with another formulation.
+    /// The groups of vertex block descent; none with another formulation, or without steps.
     descent: Option<Descent<f32>>,
 }
 
@@ -37,6 +37,18 @@ impl CostEstimate {
         }
         add("incidences", descent.as_ref().map_or(0, Descent::bytes));
         Ok(Self { memory, descent })
+    }
+
+    /// Estimates a system that takes no steps.
+    ///
+    /// # Errors
+    /// [`SolverError`] for a system that vertex block descent refuses.
+    pub(crate) fn at_rest(system: &System<f32>, settings: &Settings) -> Result<Self, SolverError> {
+        if settings.formulation == Formulation::Vbd {
+            Descent::check(system, settings)?;
+        }
+        let memory = system.bytes().iter().map(MemoryPart::from).collect();
+        Ok(Self { memory, descent: None })
     }
 
     /// Adds the memory of teams or columns, which only the threaded solver has.

@@ -30,6 +30,7 @@ pub(crate) use estimate::CostEstimate;
 use hooks::Hooks;
 pub(super) use kinds::contact::fill_default;
 use solver_run::SolverRun;
+use start::StartedSolver;
 pub(crate) use start::{device_memory, start};
 use threads::Threads;
 use wound::GrowingWound;
@@ -74,12 +75,19 @@ pub(super) fn validate(scene: &Scene, check: &Check<'_>) -> Result<(), Error> {
 impl Model for ConstraintModel {
     fn costs(&self, input: &ModelInput<'_>, request: Request) -> Result<ModelCosts, Error> {
         let (system, settings, scene) = (&self.system, &self.settings, input.scene);
-        let mut estimate =
-            CostEstimate::of(system, settings).map_err(|e| input.file.blame("solver")(Error::Solver(e)))?;
-        let work = estimate.work(system, settings, scene.run.frames);
-        let backend = request.settle(input.file, &scene.solver, &work)?;
-        estimate.add_threaded(&backend, system);
+        let blame = || input.file.blame("solver");
+        let (estimate, backend, projections) = if scene.run.frames == 0 {
+            let backend = request.settle_on_cpu(&scene.solver, "auto: the run has no frames");
+            (CostEstimate::at_rest(system, settings).map_err(blame())?, backend, 0)
+        } else {
+            let mut estimate = CostEstimate::of(system, settings).map_err(blame())?;
+            let work = estimate.work(system, settings, scene.run.frames);
+            let backend = request.settle(input.file, &scene.solver, &work)?;
+            estimate.add_threaded(&backend, system);
+            (estimate, backend, work.projections)
+        };
         let (colors, colorings) = match estimate.vertex_colors() {
+            _ if scene.run.frames == 0 => Default::default(),
             Some(number) => {
                 let vertices = || StepProfile::DESCENT.to_owned();
                 let closed_form = (vertices(), Coloring::ClosedForm);
@@ -99,7 +107,10 @@ impl Model for ConstraintModel {
         warnings.extend(unfinished_sutures(scene));
         warnings.extend(input.body.growing.iter().flat_map(|cuts| unfinished_cuts(scene, cuts)));
         Ok(ModelCosts {
-            device_memory: device_memory(&backend, system, settings),
+            device_memory: match scene.run.frames {
+                0 => Vec::new(),
+                _ => device_memory(&backend, system, settings),
+            },
             backend,
             sizes: Sizes {
                 lip_pairs: scene.constraints.lip_pairs(input.body),
@@ -108,7 +119,7 @@ impl Model for ConstraintModel {
             colors,
             colorings,
             memory: estimate.memory,
-            projections: work.projections,
+            projections,
             left_out: left_out(scene),
             warnings,
         })
@@ -121,6 +132,9 @@ impl Model for ConstraintModel {
         costs: CostReport,
         clock: &mut Clock<'_>,
     ) -> Result<CostReport, Error> {
+        if input.scene.run.frames == 0 {
+            return Ok(CostReport { time: "not measured: the run has no frames".into(), ..costs });
+        }
         let measure = |_: &dyn Progress| measure::substeps(backend, self.system, self.settings, costs);
         clock.stage("time a substep", 0, measure).map_err(input.file.blame("solver"))
     }
@@ -132,7 +146,10 @@ impl Model for ConstraintModel {
         clock: &mut Clock<'_>,
     ) -> Result<Started<'a>, Error> {
         let Self { system, settings, wound, threads, hooks, .. } = *self;
-        let (solver, device) = if backend.on_gpu() {
+        let (solver, device) = if input.scene.run.frames == 0 {
+            let solver = StartedSolver::resting(system, settings).map_err(input.file.blame("solver"))?;
+            (solver, backend.open().map_err(input.file.blame("solver.backend"))?)
+        } else if backend.on_gpu() {
             let start = |_: &dyn Progress| start(backend, system, settings);
             clock.stage_on("gpu", "start the GPU", 0, start).map_err(input.file.blame("solver.backend"))?
         } else {
@@ -155,7 +172,9 @@ fn left_out(scene: &Scene) -> Vec<String> {
         lines
             .push("depth: no material depends on the depth below the skin, so it is not computed".to_owned());
     }
-    if scene.solver.iterations == 1 {
+    if scene.run.frames == 0 {
+        lines.push("groups of colors: no frame needs them".to_owned());
+    } else if scene.solver.iterations == 1 {
         lines.push("multipliers: one iteration per substep needs none stored".to_owned());
     }
     lines

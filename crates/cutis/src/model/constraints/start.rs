@@ -1,6 +1,7 @@
-//! Puts a system into a backend: the reference solver, the CPU or a GPU.
+//! Puts a system into a backend: the reference solver, the CPU or a GPU, or none for a search
+//! for its state of rest.
 
-use cutis_solver::{Settings, Solver, SolverReference, System};
+use cutis_solver::{Resting, Settings, Solver, SolverError, SolverReference, System};
 use cutis_solver_cpu::SolverCpu;
 #[cfg(feature = "gpu")]
 use cutis_solver_gpu::{GpuSolverError, SolverGpu};
@@ -17,6 +18,11 @@ pub(crate) enum StartedSolver {
 }
 
 impl StartedSolver {
+    /// A solver that only holds the body, for a search for its state of rest. It runs on the host.
+    pub(crate) fn resting(system: System<f32>, settings: Settings) -> Result<Self, SolverError> {
+        Ok(Self::Host(Box::new(Resting::new(system, settings)?)))
+    }
+
     pub(crate) fn solver(&mut self) -> &mut dyn Solver<f32> {
         match self {
             Self::Host(solver) => &mut **solver,
