@@ -91,17 +91,20 @@ impl<T: Scalar> System<T> {
 
     /// Returns the force of all constraints on each vertex at the present positions, in N.
     ///
-    /// The sum has the operations and the order of vertex block descent. With the negative of the
-    /// result as the load, vertex block descent therefore moves no vertex, not by one bit.
+    /// The sum at each vertex has the operations and the order of vertex block descent. With the
+    /// negative of the result as the load, vertex block descent therefore moves no vertex, not by
+    /// one bit.
     ///
     /// # Errors
-    /// Returns the errors of [`Descent::new`](crate::Descent::new) for a kind whose forces are not defined: a PBD
-    /// stiffness, or a compliance of zero.
+    /// Returns the errors of [`Descent::new`](crate::Descent::new) for a kind whose forces are not
+    /// defined: a PBD stiffness, or a compliance of zero.
     pub fn constraint_forces(&self) -> Result<Vec<Vector3<T>>, SolverError> {
-        let indices: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        let mut forces = vec![VertexForce::none(); indices.len()];
-        add_forces(&self.kinds, &self.vertices, &indices, &mut forces)?;
-        Ok(forces.iter().map(|force| force.force).collect())
+        let mut forces = vec![Vector3::zeros(); self.vertices.len()];
+        for kind in &self.kinds {
+            check_compliances(kind)?;
+            kind.add_forces(&self.vertices, &mut forces);
+        }
+        Ok(forces)
     }
 }
 

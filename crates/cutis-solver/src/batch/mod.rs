@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use cutis_coloring::{Groups, Incidence};
 use cutis_constraints::{Constraint, Scalar, SimdLevel};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use crate::colored::{SharedStore, SharedVertices};
 use crate::teams::TeamConstraints;
@@ -63,6 +63,9 @@ pub trait Project<T: Scalar> {
     fn project_shared(&self, level: SimdLevel, chunk: ConstraintChunk<'_, T, SharedStore<'_, T>>);
     /// Adds the forces of this kind on each vertex, one vertex after the other.
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>);
+    /// Adds the force of each constraint to all of its vertices, one constraint after the other.
+    /// Each vertex gets the same sum as from `vertex_forces`.
+    fn add_forces(&self, vertices: &[Vertex<T>], forces: &mut [Vector3<T>]);
     /// Adds the forces with SIMD lanes while other threads move other vertices. No thread may
     /// move a vertex that shares a constraint with a vertex of this chunk.
     fn vertex_forces_shared(&self, level: SimdLevel, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>);

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use cutis_constraints::{Constraint, LaneTask, Lanes, Params, Scalar, SimdLevel};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::runs::{QUAD, ROW};
 use super::{Batch, ConstraintChunk, LaneAccess, MAX_LANES, Project, Store, TeamForces, VertexChunk};
@@ -276,6 +276,10 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
         for (&vertex, force) in chunk.indices.iter().zip(chunk.forces) {
             self.force_scalar(chunk.incidence.of(vertex), &chunk.vertices, force);
         }
+    }
+
+    fn add_forces(&self, vertices: &[Vertex<T>], forces: &mut [Vector3<T>]) {
+        self.add_constraint_forces(vertices, forces);
     }
 
     fn vertex_forces_shared(&self, level: SimdLevel, chunk: VertexChunk<'_, T, SharedVertices<'_, T>>) {

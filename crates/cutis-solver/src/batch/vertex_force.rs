@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::{Batch, Load, MAX_LANES};
 use crate::teams::{TEAM, TeamConstraints};
-use crate::{Values, VertexForce};
+use crate::{Values, Vertex, VertexForce};
 
 impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
     /// Adds the forces of constraints on one vertex, in ascending order. Each entry of `entries`
@@ -18,6 +18,19 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             let x = self.indices[k].map(|i| load.load(i).position());
             let eval = C::eval(&x, &self.params[k]);
             force.add(eval.c, &eval.grad[corner], stiffness.at(k), C::rest_size(&self.params[k]));
+        }
+    }
+
+    /// Adds the force of each constraint to its vertices. The places of a vertex ascend with the
+    /// constraints, so that every sum has the bits of [`force_scalar`](Self::force_scalar).
+    pub(super) fn add_constraint_forces(&self, vertices: &[Vertex<T>], forces: &mut [Vector3<T>]) {
+        let compliances = self.stiffness.values();
+        for (k, (tuple, params)) in self.indices.iter().zip(&self.params).enumerate() {
+            let eval = C::eval(&tuple.map(|i| vertices[i as usize].position()), params);
+            let stiffness = T::one() / compliances.at(k);
+            for (&vertex, gradient) in tuple.iter().zip(&eval.grad) {
+                forces[vertex as usize] -= gradient * stiffness * eval.c;
+            }
         }
     }
 
