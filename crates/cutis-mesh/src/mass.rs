@@ -39,11 +39,12 @@ impl TetMesh {
         (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
         let mut shares = vec![0f64; whole];
         for tet in &self.tets[..self.whole_tets()] {
+            let (volume, odd) = (self.volume(tet), self.odd_corners(tet));
             for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
                 let (low, high) = (tet[a].min(tet[b]), tet[a].max(tet[b]));
                 let own = starts[low as usize]..starts[low as usize + 1];
                 if let Some(edge) = own.clone().find(|&edge| self.edges[edge][1] == high) {
-                    shares[edge] += self.edge_share(tet, [a, b]);
+                    shares[edge] += volume * self.part_of_edge(odd, [a, b]);
                 }
             }
         }
@@ -53,15 +54,24 @@ impl TetMesh {
 
     /// The share in m³ of a tet's volume that belongs to the edge between two of its corners.
     pub(crate) fn edge_share(&self, tet: &[u32; 4], edge: [usize; 2]) -> f64 {
-        let is_odd = |corner: usize| self.point(tet[corner]).iter().sum::<usize>() & 1 == 1;
+        self.volume(tet) * self.part_of_edge(self.odd_corners(tet), edge)
+    }
+
+    /// The part of a tet's volume that belongs to the edge between two of its corners. `odd` are
+    /// its [odd corners](Self::odd_corners).
+    fn part_of_edge(&self, odd: [bool; 4], edge: [usize; 2]) -> f64 {
         // In `five` only a tet at a corner has an odd point, and its edges along the axes meet
         // there.
-        let share = match self.lattice.split() {
-            Split::Five if edge.into_iter().any(is_odd) => 1.0 / 10.0,
-            Split::Five if (0..4).any(is_odd) => 7.0 / 30.0,
+        match self.lattice.split() {
+            Split::Five if edge.into_iter().any(|corner| odd[corner]) => 1.0 / 10.0,
+            Split::Five if odd.contains(&true) => 7.0 / 30.0,
             Split::Five | Split::Kuhn6 => 1.0 / 6.0,
-        };
-        self.volume(tet) * share
+        }
+    }
+
+    /// The corners of a tet whose lattice coordinates have an odd sum.
+    fn odd_corners(&self, tet: &[u32; 4]) -> [bool; 4] {
+        tet.map(|corner| self.point(corner).iter().sum::<usize>() & 1 == 1)
     }
 
     /// Lumped mass of each vertex in kg: one quarter of the mass of each tet around it. The density

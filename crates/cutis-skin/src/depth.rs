@@ -10,6 +10,9 @@ use crate::{BodySkin, SkinError};
 /// Marks points that the search has not reached.
 const NONE: u32 = u32::MAX;
 
+/// Number of points in a neighborhood.
+const AROUND: usize = 27;
+
 /// Distance in mm from each vertex of the body to the nearest skin triangle, along a straight line.
 ///
 /// The result has one value per lattice point, in grid order. It is infinite at points that are not
@@ -137,14 +140,17 @@ fn best_around(skin: &BodySkin<'_>, facets: &Facets<'_>, nearest: &[u32], point:
 fn nearest_facet(skin: &BodySkin<'_>, facets: &Facets<'_>, nearest: &[u32], point: usize) -> f64 {
     let at = skin.mm(point as u32);
     let mut distance = (at - facets.positions_mm[nearest[point] as usize]).norm();
-    let mut last = NONE;
+    // The vertices that were met. Most of them are met several times.
+    let (mut met, mut count) = ([NONE; AROUND], 0);
     for_neighbors(skin.lattice().grid(), point, |other| {
         let vertex = nearest[other];
-        if vertex != NONE && vertex != last {
-            last = vertex;
-            if (at - facets.positions_mm[vertex as usize]).norm() <= distance.hypot(facets.corner_mm) {
-                distance = distance.min(facets.distance_around(vertex as usize, at));
-            }
+        if vertex == NONE || met[..count].contains(&vertex) {
+            return;
+        }
+        met[count] = vertex;
+        count += 1;
+        if (at - facets.positions_mm[vertex as usize]).norm() <= distance.hypot(facets.corner_mm) {
+            distance = distance.min(facets.distance_around(vertex as usize, at));
         }
     });
     distance

@@ -4,6 +4,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod around;
 mod blur;
 mod body_skin;
 mod depth;

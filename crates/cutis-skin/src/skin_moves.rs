@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::BodySkin;
+use crate::around::largest_around;
 use crate::blur::Blurred;
 use crate::vertices::SkinVertices;
 
@@ -105,23 +106,16 @@ impl SkinMoves {
 /// The share of tissue at each lattice point.
 fn tissue_shares(skin: &BodySkin<'_>) -> Vec<f32> {
     let grid = skin.lattice().grid();
-    // The HU of the tissue at a point. None if no vertex of the body is there or next to it.
-    let tissue_hu = |point: usize| {
-        let at = grid.point(point);
-        let around = (0..27).filter_map(|n: usize| {
-            let other = [at[0] + n % 3, at[1] + n / 3 % 3, at[2] + n / 9].map(|c| c.wrapping_sub(1));
-            let other = (0..3).all(|axis| other[axis] < grid.shape[axis]).then(|| grid.index(other))?;
-            skin.vertices()[other].then(|| skin.hu()[other])
-        });
-        let [low, high] = TISSUE_HU;
-        around.reduce(f32::max).map(|hu| hu.max(low).min(high))
-    };
+    let in_body = |(point, hu): (usize, &f32)| if skin.vertices()[point] { *hu } else { f32::NEG_INFINITY };
+    let largest = largest_around(skin.hu().par_iter().enumerate().map(in_body).collect(), grid.shape);
+    let [low, high] = TISSUE_HU;
     let share = |point: usize| {
         // The HU outside the body may be NaN.
         let above_air = (skin.hu()[point] - AIR_HU).max(0.0);
         let most = if skin.vertices()[point] { 1.0 } else { 0.5 };
-        match above_air > 0.0 {
-            true => tissue_hu(point).map_or(0.0, |tissue| (above_air / (tissue - AIR_HU)).min(most)),
+        // Nothing if no vertex of the body is here or next to here.
+        match above_air > 0.0 && largest[point] > f32::NEG_INFINITY {
+            true => (above_air / (largest[point].max(low).min(high) - AIR_HU)).min(most),
             false => 0.0,
         }
     };
