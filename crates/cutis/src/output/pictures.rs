@@ -69,60 +69,86 @@ pub(super) fn draw(
     stages: &mut Stages,
     progress: &dyn Progress,
 ) -> Result<Pictures, Error> {
-    let DeformedBody { body, ct, scene, .. } = *deformed;
-    let air_below_hu = scene.tissue.air_below_hu;
-    let before = warp.cut_at_rest(ct, stages, progress)?;
-    let depth = match warp.walls_mm() {
-        Some(walls_mm) => Some(depths(ct, air_below_hu, walls_mm, warp, stages, progress)?),
-        None => None,
-    };
+    let before = warp.cut_at_rest(deformed.ct, stages, progress)?;
+    let volumes = BeforeAfter { before: &before, after, place: WoundPlace::of(deformed.body) };
+    let (slices, skins) = rayon::join(
+        || draw_slices(deformed, &volumes),
+        || draw_skins(deformed, &volumes, warp, stages, progress),
+    );
+    let ((across, slices), mut drawn) = (slices?, skins?);
+    drawn.insert(2, (RunFolder::slice, SLICE, true, across));
+    let figures = drawn.par_iter().map(figure).collect::<Result<_, _>>()?;
+    Ok(Pictures { figures, slices })
+}
 
-    let place = WoundPlace::of(body);
-    let focus = place.as_ref().map(|place| place.slice);
+/// What the pictures show.
+struct BeforeAfter<'a> {
+    before: &'a Volume,
+    after: &'a Volume,
+    /// The wound. None if the scene cuts nothing.
+    place: Option<WoundPlace>,
+}
+
+/// Draws the slice across the wound before and after, and the slices for the report.
+fn draw_slices(
+    deformed: &DeformedBody<'_>,
+    shown: &BeforeAfter<'_>,
+) -> Result<(Image, Vec<SlicePair>), Error> {
+    let (body, place) = (deformed.body, shown.place.as_ref());
     let (start, end) = (body.skin_at_start(), body.whole_skin(deformed.positions));
-    let contour = |(positions, triangles), color| Contour {
-        origin_mm: body.mesh.frame.origin_mm,
-        positions,
-        triangles,
-        color,
+    let skins = [(&start.0[..], &start.1[..]), (&end.0[..], &end.1[..])];
+    let contour = |n: usize| {
+        let (positions, triangles) = skins[n];
+        Contour { origin_mm: body.mesh.frame.origin_mm, positions, triangles, color: COLORS[n] }
     };
-    let rest = contour((&start.0, &start.1), COLORS[0]);
-    let moved = contour((&end.0, &end.1), COLORS[1]);
-    let (plane, middle_mm) = match &place {
+    let (plane, middle_mm) = match place {
         Some(place) => (place.plane_across(), place.middle_mm),
         None => (Plane::Axial, body.mesh.frame.origin_mm.into()),
     };
-    let cross = |volume: &Volume, contours: &[Contour<'_>]| {
+    let across = |volume: &Volume, contours: &[Contour<'_>]| {
         let view = SliceView {
             contours,
-            focus,
+            focus: place.map(|place| place.slice),
             edge_gray: EDGE_GRAY,
             long_side: Some(PIXELS),
             ..SliceView::new(plane, position(plane, middle_mm))
         };
-        Ok::<_, Error>(slice(volume, &view)?)
+        slice(volume, &view)
     };
-    let before_slice = cross(&before, &[rest])?;
-    let after_slice = cross(after, &[rest, moved])?;
-    let slices = side_by_side(&[(&before_slice, "before"), (&after_slice, "after")])?;
-
-    let skins = [(&start.0[..], &start.1[..]), (&end.0[..], &end.1[..])];
-    let slices_of_planes = match scene.output.report {
-        true => slices::pairs([&before, after], skins, COLORS, &body.mesh.frame, place.as_ref())?,
+    let before = across(shown.before, &[contour(0)])?;
+    let after = across(shown.after, &[contour(0), contour(1)])?;
+    let both = side_by_side(&[(&before, "before"), (&after, "after")])?;
+    let of_planes = match deformed.scene.output.report {
+        true => slices::pairs([shown.before, shown.after], skins, COLORS, &body.mesh.frame, place)?,
         false => Vec::new(),
     };
+    Ok((both, of_planes))
+}
 
+/// Draws the skin before and after, and the lines of tension of a membrane.
+fn draw_skins(
+    deformed: &DeformedBody<'_>,
+    shown: &BeforeAfter<'_>,
+    warp: &BodyWarp,
+    stages: &mut Stages,
+    progress: &dyn Progress,
+) -> Result<Vec<Drawn>, Error> {
+    let DeformedBody { body, ct, scene, .. } = *deformed;
+    let (before, place) = (shown.before, shown.place.as_ref());
+    let air_below_hu = scene.tissue.air_below_hu;
+    let depth = warp.walls_mm().map(|walls_mm| depths(ct, air_below_hu, walls_mm, warp, stages, progress));
+    let (depth_before, depth_after) = depth.transpose()?.unzip();
     let view = View {
         width: PIXELS,
         height: PIXELS,
-        focus: place.as_ref().map(|place| place.close_up),
-        depth: depth.as_ref().map(|(at_rest, _)| at_rest),
+        focus: place.map(|place| place.close_up),
+        depth: depth_before.as_ref(),
         threshold_hu: air_below_hu,
-        ..View::new(place.as_ref().map_or(Side::Anterior, |place| Side::From(place.outward)))
+        ..View::new(place.map_or(Side::Anterior, |place| Side::From(place.outward)))
     };
     // The picture of the lines has the same skin. It is drawn without letters, which the lines
     // would cross.
-    let skin = stages.raymarch(&before, &View { annotate: false, ..view })?;
+    let skin = stages.raymarch(before, &View { annotate: false, ..view })?;
     let mut skin_before = skin.clone();
     let closed = closed_cuts(body);
     let caption_before = match closed.is_empty() {
@@ -131,25 +157,22 @@ pub(super) fn draw(
     };
     if !closed.is_empty() {
         let label = if closed.len() == 1 { "path of the cut" } else { "paths of the cuts" };
-        draw_paths(&mut skin_before, &before, &view, &SkinPaths { paths_mm: &closed, color: PATH, label })?;
+        draw_paths(&mut skin_before, before, &view, &SkinPaths { paths_mm: &closed, color: PATH, label })?;
     }
-    draw_annotations(&mut skin_before, &before, &view)?;
-    let depth_after = depth.as_ref().map(|(_, deformed)| deformed);
-    let skin_after = stages.raymarch(after, &View { depth: depth_after, ..view })?;
+    draw_annotations(&mut skin_before, before, &view)?;
+    let skin_after = stages.raymarch(shown.after, &View { depth: depth_after.as_ref(), ..view })?;
     let mut drawn: Vec<Drawn> = vec![
         (RunFolder::before, caption_before, false, skin_before),
         (RunFolder::after, "After", false, skin_after),
-        (RunFolder::slice, SLICE, true, slices),
     ];
     if body.membrane.as_ref().is_some_and(Membrane::has_lines) {
         let mut picture = skin;
-        add_lines(&mut picture, body, scene, &before, &view)?;
+        add_lines(&mut picture, body, scene, before, &view)?;
         let caption = "Lines of tension in the scan: the skin is tightest along them. They are faint where the \
                        direction counts little";
         drawn.push((RunFolder::tension, caption, false, picture));
     }
-    let figures = drawn.par_iter().map(figure).collect::<Result<_, _>>()?;
-    Ok(Pictures { figures, slices: slices_of_planes })
+    Ok(drawn)
 }
 
 /// The paths of the incisions without a width, which cannot be seen before they open, world mm.
