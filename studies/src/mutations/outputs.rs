@@ -23,7 +23,7 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: before.png shows the deformed body",
         "crates/cutis/src/output/pictures.rs",
-        "stages.raymarch(&before, &View { annotate: false, ..view })?",
+        "stages.raymarch(before, &View { annotate: false, ..view })?",
         "stages.raymarch(after, &View { annotate: false, ..view })?",
     ),
     mutation(
