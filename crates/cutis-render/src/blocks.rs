@@ -35,23 +35,35 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Finds the blocks by visiting all voxels in parallel.
-    pub fn new(field: &Field<'_>, threshold_hu: f32) -> Self {
+    /// Finds the blocks that meet a box of continuous indices, by visiting their voxels in
+    /// parallel. All others count as mixed.
+    pub fn new(field: &Field<'_>, threshold_hu: f32, within: &[Range<f64>; 3]) -> Self {
         let voxels = field.shape();
         let shape = voxels.map(|n| (n - 1).div_ceil(SIDE).max(1));
+        let within: [Range<usize>; 3] = std::array::from_fn(|axis| {
+            let Range { start, end } = within[axis];
+            let last = (voxels[axis] - 1) as f64;
+            let block = |at: f64| (clamp(at, last) as usize / SIDE).min(shape[axis] - 1);
+            if start <= end && end >= 0.0 && start <= last { block(start)..block(end) + 1 } else { 0..0 }
+        });
+        let columns = voxels_of(&within[0], voxels[0]);
         let mut blocks = vec![Block::Mixed; shape.iter().product()];
         blocks.par_chunks_mut(shape[0]).enumerate().for_each(|(number, blocks)| {
-            let [rows, slices] = [(number % shape[1], 1), (number / shape[1], 2)]
-                .map(|(block, axis)| span(block, voxels[axis]));
-            let first = field.row(rows.start, slices.start);
+            let [j, k] = [number % shape[1], number / shape[1]];
+            if !(within[1].contains(&j) && within[2].contains(&k)) {
+                return;
+            }
+            let [rows, slices] = [span(j, voxels[1]), span(k, voxels[2])];
+            let first = &field.row(rows.start, slices.start)[columns.clone()];
             let (mut low, mut high) = (first.to_vec(), first.to_vec());
             for (k, j) in slices.flat_map(|k| rows.clone().map(move |j| (k, j))) {
-                for ((low, high), &stored) in low.iter_mut().zip(&mut high).zip(field.row(j, k)) {
+                let row = &field.row(j, k)[columns.clone()];
+                for ((low, high), &stored) in low.iter_mut().zip(&mut high).zip(row) {
                     (*low, *high) = (stored.min(*low), stored.max(*high));
                 }
             }
-            for (block_i, block) in blocks.iter_mut().enumerate() {
-                let columns = span(block_i, voxels[0]);
+            for (n, block) in blocks[within[0].clone()].iter_mut().enumerate() {
+                let columns = span(n, columns.len());
                 let low = low[columns.clone()].iter().fold(i16::MAX, |least, &stored| least.min(stored));
                 let high = high[columns].iter().fold(i16::MIN, |most, &stored| most.max(stored));
                 // HU rise or fall with the stored values.
@@ -124,6 +136,11 @@ fn span(block: usize, voxels: usize) -> Range<usize> {
     block * SIDE..(block * SIDE + SIDE + 1).min(voxels)
 }
 
+/// The voxels of some blocks along one axis.
+fn voxels_of(blocks: &Range<usize>, voxels: usize) -> Range<usize> {
+    if blocks.is_empty() { 0..0 } else { blocks.start * SIDE..span(blocks.end - 1, voxels).end }
+}
+
 #[inline]
 fn number(shape: [usize; 3], [i, j, k]: [usize; 3]) -> usize {
     i + shape[0] * (j + shape[1] * k)
@@ -148,7 +165,7 @@ mod tests {
             };
             let volume = Volume::new(grid, (0..grid.len()).map(stored).collect(), slope, 0.0).unwrap();
             let (field, threshold) = (Field::new(&volume), -200.0);
-            let blocks = Blocks::new(&field, threshold);
+            let blocks = Blocks::new(&field, threshold, &shape.map(|n| 0.0..n as f64));
             let mut counts = [0; 3];
             let mut random = Random::new(9);
             for _ in 0..2000 {
@@ -176,6 +193,35 @@ mod tests {
                 }
             }
             assert!(counts[0] > 0 && counts[1] > 0, "{counts:?} of {shape:?}");
+        }
+    }
+
+    /// Blocks that meet the box are as they are without it, and the others are mixed.
+    #[test]
+    fn only_blocks_within_a_box_are_found() {
+        let mut random = Random::new(3);
+        let grid = Grid { shape: [21, 18, 40], affine: Affine::from_spacing([1.0; 3], [0.0; 3]).unwrap() };
+        let stored = |v: usize| {
+            let noise = if random.below(20) == 0 { 700 } else { 0 };
+            noise - if grid.point(v)[2] < 20 { 700 } else { 0 }
+        };
+        let volume = Volume::new(grid, (0..grid.len()).map(stored).collect(), 1.0, 0.0).unwrap();
+        let field = Field::new(&volume);
+        let of = |within: [Range<f64>; 3]| Blocks::new(&field, -200.0, &within).blocks;
+        let all = of(grid.shape.map(|n| -1.0..n as f64));
+        let shape = grid.shape.map(|n| (n - 1).div_ceil(SIDE));
+        for (within, expected) in [
+            ([3.0..9.5, -4.0..5.0, 11.0..90.0], [1..5, 0..3, 5..20]),
+            ([20.0..20.0, 17.0..30.0, 0.0..0.5], [9..10, 8..9, 0..1]),
+            ([2.0..3.0, 2.0..3.0, 40.0..50.0], [0..0, 0..0, 0..0]),
+            ([2.0..3.0, -9.0..-1.0, 0.0..50.0], [0..0, 0..0, 0..0]),
+            ([f64::INFINITY..f64::NEG_INFINITY, 0.0..9.0, 0.0..9.0], [0..0, 0..0, 0..0]),
+        ] {
+            for (n, (&found, &known)) in of(within.clone()).iter().zip(&all).enumerate() {
+                let at = [n % shape[0], n / shape[0] % shape[1], n / shape[0] / shape[1]];
+                let inside = (0..3).all(|axis| expected[axis].contains(&at[axis]));
+                assert_eq!(found, if inside { known } else { Block::Mixed }, "{at:?} within {within:?}");
+            }
         }
     }
 }

@@ -68,7 +68,7 @@ pub struct Marcher<'a> {
 
 impl<'a> Marcher<'a> {
     pub fn new(field: &'a Field<'a>, rays: &'a Rays<'a>, threshold_hu: f32) -> Self {
-        Self { field, rays, blocks: Blocks::new(field, threshold_hu), threshold_hu }
+        Self { field, rays, blocks: Blocks::new(field, threshold_hu, &rays.bounds()), threshold_hu }
     }
 
     /// The first point of a ray at or above the threshold.

@@ -1,5 +1,7 @@
 //! The parallel rays of a picture, from where they enter the volume to where they leave it.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::annotate::frame;
@@ -26,6 +28,8 @@ pub struct Rays<'a> {
     planes: Vec<(Vector3<f64>, f64)>,
     /// Upper limit of the steps of a ray.
     most: f64,
+    /// Reach of the ambient occlusion along each index axis.
+    reach: Vector3<f64>,
 }
 
 /// The part of a ray that is within the volume.
@@ -55,7 +59,9 @@ impl<'a> Rays<'a> {
         let half = size.map(|length| length as f64 / 2.0);
         let steps_per_index = step.map(|x| if x == 0.0 { 0.0 } else { 1.0 / x });
         let most = longest as f64 / STEP;
-        Self { field, axes: *axes, center_mm, half, pixel_mm, step, steps_per_index, planes, most }
+        let index_per_mm = field.index_per_mm();
+        let reach = Vector3::from_fn(|axis, _| index_per_mm.row(axis).norm() * view.occlusion_mm);
+        Self { field, axes: *axes, center_mm, half, pixel_mm, step, steps_per_index, planes, most, reach }
     }
 
     /// The ray through a position of the picture, in pixels from its top left corner. `None` if it
@@ -83,6 +89,29 @@ impl<'a> Rays<'a> {
         Some(Ray { origin, start, length: (end - start).min(self.most) })
     }
 
+    /// A box of continuous indices that holds the picture's rays inside the volume, and what the
+    /// ambient occlusion looks at around them. Its ranges are reversed if there are none.
+    pub fn bounds(&self) -> [Range<f64>; 3] {
+        let [w, h] = self.half.map(|half| half * self.pixel_mm);
+        let corners = [(-w, -h), (w, -h), (-w, h), (w, h)]
+            .map(|(u, v)| self.field.to_index(self.center_mm + self.axes.right * u + self.axes.up * v));
+        let (low, high) =
+            corners.iter().fold((corners[0], corners[0]), |(low, high), p| (low.inf(p), high.sup(p)));
+        // Steps between which any of the rays is inside the volume.
+        let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
+        let ends = self.field.shape().map(|n| n as f64 - 1.0);
+        for axis in (0..3).filter(|&axis| self.step[axis] != 0.0) {
+            let steps = [-high[axis], ends[axis] - low[axis]].map(|way| way / self.step[axis]);
+            (first, last) = (first.max(steps[0].min(steps[1])), last.min(steps[0].max(steps[1])));
+        }
+        std::array::from_fn(|axis| {
+            let ways = [first * self.step[axis], last * self.step[axis]];
+            let margin = self.reach[axis] + 2.0;
+            let [start, end] = [low[axis] + ways[0].min(ways[1]), high[axis] + ways[0].max(ways[1])];
+            if first <= last { start - margin..end + margin } else { f64::INFINITY..f64::NEG_INFINITY }
+        })
+    }
+
     /// Position of a point in the picture, in pixels from its top left corner.
     pub fn pixel_of(&self, mm: Point3<f64>) -> [f64; 2] {
         let from_center = (mm - self.center_mm) / self.pixel_mm;
@@ -93,5 +122,50 @@ impl<'a> Rays<'a> {
     #[inline]
     pub fn at(&self, ray: &Ray, n: f64) -> Point3<f64> {
         ray.origin + self.step * (ray.start + n)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cutis_test_kit::Random;
+    use cutis_volume::{Affine, Grid, Volume};
+
+    use super::*;
+    use crate::{Focus, Side};
+
+    /// All rays of a picture are within its bounds. Those of a close-up are a part of the volume.
+    #[test]
+    fn rays_stay_within_their_bounds() {
+        let affine = Affine::from_spacing([0.7, 1.0, 2.5], [-10.0, 4.0, 30.0]).unwrap();
+        let grid = Grid { shape: [50, 40, 30], affine };
+        let volume = Volume::new(grid, vec![0; grid.len()], 1.0, 0.0).unwrap();
+        let field = Field::new(&volume);
+        let mut random = Random::new(6);
+        let mut number = |low: f64, high: f64| low + (high - low) * random.below(10_000) as f64 / 1e4;
+        let (mut inside, mut smaller) = (0, 0);
+        for n in 0..60 {
+            let mut direction: [f64; 3] = std::array::from_fn(|_| number(-1.0, 1.0));
+            if n < 6 {
+                direction = [0.0; 3];
+                direction[n % 3] = if n < 3 { 1.0 } else { -1.0 };
+            }
+            let center_mm = [number(-30.0, 40.0), number(-10.0, 60.0), number(0.0, 130.0)];
+            let focus = (n % 4 > 0).then(|| Focus { center_mm, size_mm: number(1.0, 60.0) });
+            let view =
+                View { width: 30, height: 20, focus, occlusion_mm: 0.0, ..View::new(Side::From(direction)) };
+            let rays = Rays::new(&field, &view, &Axes::new(view.side).unwrap());
+            let bounds = rays.bounds();
+            let all = (0..=30).flat_map(|x| (0..=20).map(move |y| [f64::from(x), f64::from(y)]));
+            for ray in all.filter_map(|place| rays.through(place)) {
+                for part in 0..=8 {
+                    let at = rays.at(&ray, ray.length * f64::from(part) / 8.0);
+                    let within = (0..3).all(|axis| bounds[axis].contains(&at[axis]));
+                    assert!(within, "{at} is not within {bounds:?} from {direction:?} at {focus:?}");
+                    inside += 1;
+                }
+            }
+            smaller += usize::from((0..3).any(|axis| bounds[axis].end - bounds[axis].start < 20.0));
+        }
+        assert!(inside > 1000 && smaller > 10, "the control: {inside} places, {smaller} small boxes");
     }
 }
