@@ -24,7 +24,7 @@ pub const OUTPUTS: &[Mutation] = &[
         "pictures: before.png shows the deformed body",
         "crates/cutis/src/output/pictures.rs",
         "stages.raymarch(before, &View { annotate: false, ..view })?",
-        "stages.raymarch(after, &View { annotate: false, ..view })?",
+        "stages.raymarch(shown.after, &View { annotate: false, ..view })?",
     ),
     mutation(
         Outputs,
@@ -86,8 +86,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: the slice before shows the deformed CT",
         "crates/cutis/src/output/pictures.rs",
-        "cross(&before, &[rest])",
-        "cross(after, &[rest])",
+        "across(shown.before, &[contour(0)])",
+        "across(shown.after, &[contour(0)])",
     ),
     mutation(
         Outputs,
@@ -184,8 +184,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: the line of the deformed skin has the color of the skin at rest",
         "crates/cutis/src/output/pictures.rs",
-        "(&end.0, &end.1), COLORS[1]",
-        "(&end.0, &end.1), COLORS[0]",
+        "triangles, color: COLORS[n] }",
+        "triangles, color: COLORS[0] }",
     ),
     mutation(
         Outputs,
@@ -198,8 +198,8 @@ pub const OUTPUTS: &[Mutation] = &[
         Outputs,
         "pictures: the captions of the slices are exchanged",
         "crates/cutis/src/output/pictures.rs",
-        "(&before_slice, \"before\"), (&after_slice, \"after\")",
-        "(&before_slice, \"after\"), (&after_slice, \"before\")",
+        "(&before, \"before\"), (&after, \"after\")",
+        "(&before, \"after\"), (&after, \"before\")",
     ),
     mutation(
         Outputs,
