@@ -30,9 +30,10 @@ pub fn side_by_side(pictures: &[(&Image, &str)]) -> Result<Image, RenderError> {
         whole.fill(left..left + image.width, 0..band, BAND, 1.0);
         let start = left + (image.width / 2).saturating_sub(text_width(caption, scale) / 2);
         whole.text(start, 3 * scale, caption, scale, INK);
-        let rows = whole.rgb.chunks_exact_mut(3 * width).skip(band);
-        for (to, from) in rows.zip(image.rgb.chunks_exact(3 * image.width)) {
-            to[3 * left..][..from.len()].copy_from_slice(from);
+        let length = 3 * image.width;
+        let rows = whole.rgb.chunks_exact_mut(3 * width).skip(band).take(image.height);
+        for (y, to) in rows.enumerate() {
+            to[3 * left..][..length].copy_from_slice(&image.rgb[y * length..][..length]);
         }
         left += image.width + gap;
     }

@@ -46,7 +46,8 @@ impl<'a> Rays<'a> {
     pub fn new(field: &'a Field<'a>, view: &View<'_>, axes: &Axes) -> Self {
         let size = [view.width, view.height];
         let (center_mm, pixel_mm) = frame(axes, &field.corners_mm(), view.focus, size);
-        let per_mm = field.index_per_mm() * -axes.toward;
+        let index_per_mm = field.index_per_mm();
+        let per_mm = index_per_mm * -axes.toward;
         let step = per_mm * (STEP / per_mm.amax());
         let mut planes = Vec::new();
         for axis in 0..3 {
@@ -59,7 +60,6 @@ impl<'a> Rays<'a> {
         let half = size.map(|length| length as f64 / 2.0);
         let steps_per_index = step.map(|x| if x == 0.0 { 0.0 } else { 1.0 / x });
         let most = longest as f64 / STEP;
-        let index_per_mm = field.index_per_mm();
         let reach = Vector3::from_fn(|axis, _| index_per_mm.row(axis).norm() * view.occlusion_mm);
         Self { field, axes: *axes, center_mm, half, pixel_mm, step, steps_per_index, planes, most, reach }
     }
