@@ -11,7 +11,7 @@ use cutis_volume::Volume;
 use rayon::prelude::*;
 
 use crate::annotate::annotate;
-use crate::expose::expose;
+use crate::expose::{expose, first_spacing};
 use crate::field::Field;
 use crate::rays::Rays;
 use crate::shade::{BACKGROUND, Light, Shader, decode};
@@ -99,7 +99,8 @@ impl<'a> GpuRaymarcher<'a> {
         let (kernel, depth) = self.kernels.of(&self.gpu, view.depth)?;
         self.scene.look(&self.gpu, &ViewUniform::new(self.volume, view, &rays, &shader))?;
         let background = decode(BACKGROUND);
-        expose(&mut image, view.samples, |places| {
+        let spacing = first_spacing(rays.pixel_mm, field.finest_mm());
+        expose(&mut image, view.samples, spacing, |places| {
             let starts: Vec<_> = places.par_iter().map(|&place| start(&rays, place)).collect();
             let found = self.scene.trace(&self.gpu, kernel, depth, &starts)?;
             let light = |&[r, g, b, n]: &[f32; 4]| if n < 0.0 { background } else { Light::new(r, g, b) };

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::annotate::annotate;
 use crate::blocks::Blocks;
-use crate::expose::expose;
+use crate::expose::{expose, first_spacing};
 use crate::field::Field;
 use crate::rays::{Ray, Rays};
 use crate::shade::{BACKGROUND, Shader, decode};
@@ -39,7 +39,8 @@ pub fn raymarch(volume: &Volume, view: &View<'_>) -> Result<Image, RenderError> 
         let hit = rays.through(place).and_then(|ray| marcher.cast(&ray));
         hit.map_or_else(|| decode(BACKGROUND), |hit| shader.color(&hit, &marcher.blocks))
     };
-    expose(&mut image, view.samples, |places| Ok(places.par_iter().map(light).collect()))?;
+    let spacing = first_spacing(rays.pixel_mm, field.finest_mm());
+    expose(&mut image, view.samples, spacing, |places| Ok(places.par_iter().map(light).collect()))?;
     if view.annotate {
         annotate(&mut image, &axes, rays.pixel_mm);
     }
