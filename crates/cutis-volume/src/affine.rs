@@ -1,14 +1,16 @@
 //! The affine map from voxel index to RAS+ world millimeters.
 
-use nalgebra::{Matrix4, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::VolumeError;
 
 /// An invertible affine map from continuous voxel index `(i, j, k)` to RAS+ world millimeters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
-    to_mm: Matrix4<f64>,
-    to_index: Matrix4<f64>,
+    /// World mm per index step, and the world position of index (0, 0, 0).
+    to_mm: (Matrix3<f64>, Vector3<f64>),
+    /// Index steps per mm, and the index of the world's origin.
+    to_index: (Matrix3<f64>, Vector3<f64>),
 }
 
 impl Affine {
@@ -18,10 +20,12 @@ impl Affine {
     /// [`VolumeError::SingularAffine`] if a value is not finite, the last row is not `0 0 0 1`, or
     /// the matrix is not invertible.
     pub fn from_rows(rows: [[f64; 4]; 4]) -> Result<Self, VolumeError> {
-        let to_mm = Matrix4::from_fn(|r, c| rows[r][c]);
-        let finite = to_mm.iter().all(|v| v.is_finite()) && rows[3] == [0.0, 0.0, 0.0, 1.0];
-        match to_mm.try_inverse().filter(|inverse| finite && inverse.iter().all(|v| v.is_finite())) {
-            Some(to_index) => Ok(Self { to_mm, to_index }),
+        let finite = rows.iter().flatten().all(|v| v.is_finite()) && rows[3] == [0.0, 0.0, 0.0, 1.0];
+        let steps = Matrix3::from_fn(|r, c| rows[r][c]);
+        let origin = Vector3::from_fn(|r, _| rows[r][3]);
+        let inverse = steps.try_inverse().filter(|_| finite).map(|inverse| (inverse, -(inverse * origin)));
+        match inverse.filter(|(linear, offset)| linear.iter().chain(offset).all(|v| v.is_finite())) {
+            Some(to_index) => Ok(Self { to_mm: (steps, origin), to_index }),
             None => Err(VolumeError::SingularAffine { rows: Box::new(rows) }),
         }
     }
@@ -39,22 +43,28 @@ impl Affine {
 
     /// The four rows of the homogeneous matrix that maps index to mm.
     pub fn rows(&self) -> [[f64; 4]; 4] {
-        std::array::from_fn(|r| std::array::from_fn(|c| self.to_mm[(r, c)]))
+        let (steps, origin) = &self.to_mm;
+        let row = |r: usize| [steps[(r, 0)], steps[(r, 1)], steps[(r, 2)], origin[r]];
+        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
     }
 
     /// World position of a continuous index in mm.
+    #[inline]
     pub fn to_mm(&self, index: Point3<f64>) -> Point3<f64> {
-        self.to_mm.transform_point(&index)
+        let (steps, origin) = &self.to_mm;
+        Point3::from(steps * index.coords + origin)
     }
 
     /// Continuous index of a world position in mm.
+    #[inline]
     pub fn to_index(&self, mm: Point3<f64>) -> Point3<f64> {
-        self.to_index.transform_point(&mm)
+        let (steps, origin) = &self.to_index;
+        Point3::from(steps * mm.coords + origin)
     }
 
     /// The step in mm from one voxel to the next along an index axis (column `axis` of the matrix).
     pub fn step_mm(&self, axis: usize) -> Vector3<f64> {
-        self.to_mm.fixed_view::<3, 1>(0, axis).into_owned()
+        self.to_mm.0.column(axis).into_owned()
     }
 
     /// Lengths of the three index steps in mm.
@@ -64,7 +74,7 @@ impl Affine {
 
     /// Signed volume of one voxel in mm³. It is negative if the index axes are left-handed.
     pub fn voxel_volume_mm3(&self) -> f64 {
-        self.to_mm.fixed_view::<3, 3>(0, 0).determinant()
+        self.to_mm.0.determinant()
     }
 
     /// Largest |cosine| between two index axes: 0 if all are perpendicular.
