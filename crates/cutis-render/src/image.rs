@@ -7,6 +7,10 @@ use cutis_volume::PartialFile;
 
 use crate::RenderError;
 
+/// Level of compression, from 0 to 9. Pictures of skin and slices are 8 to 10 % larger than with
+/// level 6, and take half the time.
+const DEFLATE_LEVEL: u8 = 5;
+
 /// A color: red, green, blue.
 pub type Rgb = [u8; 3];
 
@@ -89,6 +93,8 @@ impl Image {
         let mut encoder = png::Encoder::new(&mut bytes, side(self.width)?, side(self.height)?);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_deflate_compression(png::DeflateCompression::Level(DEFLATE_LEVEL));
+        encoder.set_filter(png::Filter::Adaptive);
         encoder.write_header()?.write_image_data(&self.rgb)?;
         Ok(bytes)
     }
