@@ -37,31 +37,20 @@ pub fn expose(
     mut light_at: impl FnMut(&[[f64; 2]]) -> Result<Vec<Light>, RenderError>,
 ) -> Result<(), RenderError> {
     let (width, height) = (image.width, image.height);
-    let mut one_ray_each = |image: &mut Image, pixels: &[usize]| {
+    let mut one_ray_each = |image: &mut Image, pixels: &[[usize; 2]]| {
         for pixels in pixels.chunks(BATCH) {
-            let place = |&pixel: &usize| [(pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5];
-            let places: Vec<_> = pixels.iter().map(place).collect();
+            let places: Vec<_> = pixels.iter().map(|pixel| pixel.map(|at| at as f64 + 0.5)).collect();
             for (pixel, light) in pixels.iter().zip(light_at(&places)?) {
-                image.rgb[3 * pixel..][..3].copy_from_slice(&encode(light));
+                set(image, *pixel, encode(light));
             }
         }
         Ok::<(), RenderError>(())
     };
-    let every = |step: usize| {
-        let row = move |y: usize| (0..width).step_by(step).map(move |x| x + width * y);
-        (0..height).step_by(step).flat_map(row)
-    };
-    one_ray_each(image, &every(spacing).collect::<Vec<_>>())?;
+    let first = (0..height).step_by(spacing).flat_map(|y| (0..width).step_by(spacing).map(move |x| [x, y]));
+    one_ray_each(image, &first.collect::<Vec<_>>())?;
     let mut known = spacing;
     while known > 1 {
-        let mut rough = Vec::new();
-        let is_new = |pixel: &usize| pixel % width % known != 0 || pixel / width % known != 0;
-        for pixel in every(known / 2).filter(is_new) {
-            match smooth(image, pixel, known) {
-                Some(color) => image.rgb[3 * pixel..][..3].copy_from_slice(&color),
-                None => rough.push(pixel),
-            }
-        }
+        let rough = fill_smooth_parts(image, known);
         one_ray_each(image, &rough)?;
         known /= 2;
     }
@@ -87,11 +76,33 @@ pub fn expose(
     Ok(())
 }
 
+fn set(image: &mut Image, [x, y]: [usize; 2], color: Rgb) {
+    let first = 3 * (x + y * image.width);
+    image.rgb[first..][..3].copy_from_slice(&color);
+}
+
+/// Halves the distance `known` between the pixels with a color, where the picture is smooth. Returns
+/// the pixels that are still without one.
+fn fill_smooth_parts(image: &mut Image, known: usize) -> Vec<[usize; 2]> {
+    let (step, width, before) = (known / 2, image.width, image.clone());
+    let fill_row = |(n, rows): (usize, &mut [u8])| {
+        let (y, mut rough) = (n * step, Vec::new());
+        let is_new = |x: &usize| (x | y) & (known - 1) != 0;
+        for x in (0..width).step_by(step).filter(is_new) {
+            match smooth(&before, [x, y], known) {
+                Some(color) => rows[3 * x..][..3].copy_from_slice(&color),
+                None => rough.push([x, y]),
+            }
+        }
+        rough
+    };
+    image.rgb.par_chunks_mut(3 * width * step).enumerate().flat_map_iter(fill_row).collect()
+}
+
 /// The mean of the pixels around a pixel whose column and row are multiples of `spacing`. `None` if
 /// they are not nearly equal, or if one is outside the picture.
-fn smooth(image: &Image, pixel: usize, spacing: usize) -> Option<Rgb> {
-    let (x, y) = (pixel % image.width, pixel / image.width);
-    let ends = |at: usize| [at / spacing * spacing, at.next_multiple_of(spacing)];
+fn smooth(image: &Image, [x, y]: [usize; 2], spacing: usize) -> Option<Rgb> {
+    let ends = |at: usize| [at & !(spacing - 1), (at + spacing - 1) & !(spacing - 1)];
     let mut around = [[0; 3]; 4];
     for (n, color) in around.iter_mut().enumerate() {
         *color = image.pixel(ends(x)[n % 2], ends(y)[n / 2])?;

@@ -11,6 +11,12 @@ use crate::RenderError;
 /// level 6, and take half the time.
 const DEFLATE_LEVEL: u8 = 5;
 
+/// The nearest byte to a value. `f32::round` would be a call on processors without SSE4.1.
+#[inline]
+pub fn to_byte(value: f32) -> u8 {
+    (value + 0.5) as u8
+}
+
 /// A color: red, green, blue.
 pub type Rgb = [u8; 3];
 
@@ -56,7 +62,7 @@ impl Image {
         if let Some(at) = self.offset(x, y) {
             for (channel, new) in self.rgb[at..at + 3].iter_mut().zip(color) {
                 let old = f32::from(*channel);
-                *channel = (old + (f32::from(new) - old) * opacity.clamp(0.0, 1.0)).round() as u8;
+                *channel = to_byte(old + (f32::from(new) - old) * opacity.clamp(0.0, 1.0));
             }
         }
     }

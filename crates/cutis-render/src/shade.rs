@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::blocks::{Block, Blocks};
 use crate::field::Field;
+use crate::image::to_byte;
 use crate::raymarch::Hit;
 use crate::{Axes, Rgb, View};
 
@@ -178,5 +179,5 @@ pub fn decode(color: Rgb) -> Light {
 
 /// Stored color of linear light.
 pub fn encode(light: Light) -> Rgb {
-    light.map(|c| (c.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8).into()
+    light.map(|c| to_byte(c.clamp(0.0, 1.0).sqrt() * 255.0)).into()
 }

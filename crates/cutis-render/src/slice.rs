@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::annotate::{annotate, extent, frame};
 use crate::contour::Contour;
 use crate::field::Field;
+use crate::image::to_byte;
 use crate::view::Focus;
 use crate::{Axes, Image, RenderError, Side};
 
@@ -108,7 +109,7 @@ impl SliceView<'_> {
         let low = self.level_hu - self.window_hu / 2.0;
         let part = ((hu - low) / self.window_hu).clamp(0.0, 1.0);
         let below = if low > AIR_HU { ((hu - AIR_HU) / (low - AIR_HU)).clamp(0.0, 1.0) } else { 1.0 };
-        ((self.edge_gray * below + (1.0 - self.edge_gray) * part) * 255.0).round() as u8
+        to_byte((self.edge_gray * below + (1.0 - self.edge_gray) * part) * 255.0)
     }
 }
 
