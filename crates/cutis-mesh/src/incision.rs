@@ -164,6 +164,18 @@ impl Cut {
         slits.chain(pockets).chain(pieces).fold(f64::INFINITY, f64::min) * 1000.0
     }
 
+    /// True if a rest position (local meters) continues an incision beyond one of its ends, within
+    /// `reach_mm` along it and to its sides.
+    pub fn is_beyond_an_end(&self, position: Point3<f32>, reach_mm: f64) -> bool {
+        let reach = reach_mm / 1000.0;
+        self.incisions().any(|slits| {
+            let [first, last] = [&slits[0], &slits[slits.len() - 1]];
+            let [start, end] = [first, last].map(|slit| slit.coordinates(position.cast()));
+            let beyond = [(-start.along, start.lateral), (end.along - last.length(), end.lateral)];
+            beyond.iter().any(|&(past, lateral)| past > 0.0 && past <= reach && lateral.abs() <= reach)
+        })
+    }
+
     /// True if the line between two rest positions passes through the middle surface of a slit with
     /// a width.
     pub(crate) fn crosses(&self, a: Point3<f32>, b: Point3<f32>) -> bool {

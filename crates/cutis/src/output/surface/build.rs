@@ -7,6 +7,7 @@ use cutis_render::tissue_color;
 use cutis_volume::Volume;
 use nalgebra::Point3;
 
+use super::ends::Ends;
 use super::reduce::reduce;
 use super::walls::{nodes_of, walls};
 use super::{MOST_POINTS, Surface};
@@ -39,6 +40,7 @@ impl Surface {
         let nodes = body.mesh.positions.len();
         let fixed = nodes + body.inactive_skin.positions.len();
         let edges = body.severed.as_ref().map_or(&[][..], |severed| &severed.skin_pieces.points);
+        let ends = Ends::new(body);
         let mut builder = Builder::default();
         let mut numbers = vec![NONE; positions.len()];
         for triangle in triangles {
@@ -49,6 +51,7 @@ impl Surface {
                         v if v < nodes => Some(Embedded::node(v as u32)),
                         v => v.checked_sub(fixed).map(|edge| edges[edge]),
                     };
+                    let embedded = embedded.map(|point| ends.close(point));
                     let shown = Shown { rest: positions[v as usize], embedded, on_skin: true };
                     *number = builder.point(shown);
                 }
@@ -58,7 +61,7 @@ impl Surface {
             builder.triangles.push(triangle);
         }
         drop((positions, numbers));
-        for wall in walls(body) {
+        for wall in walls(body, &ends) {
             let shown = |point: Embedded| Shown {
                 rest: point.at(&body.mesh.positions),
                 embedded: Some(point),

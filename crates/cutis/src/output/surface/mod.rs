@@ -3,6 +3,7 @@
 
 mod build;
 mod encode;
+mod ends;
 mod recorder;
 mod reduce;
 mod walls;

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use cutis_mesh::sever::Embedded;
 use nalgebra::Point3;
 
+use super::ends::Ends;
 use crate::body::Body;
 
 /// The faces of a positively oriented tet. Seen from outside, their corners turn to the left.
@@ -24,7 +25,7 @@ struct Side {
 ///
 /// Two tets, or parts of tets, meet at a face in the scan. The face is a wall where they do not
 /// follow the same nodes, and where one of them was taken out.
-pub(super) fn walls(body: &Body) -> Vec<[Embedded; 3]> {
+pub(super) fn walls(body: &Body, ends: &Ends<'_>) -> Vec<[Embedded; 3]> {
     let mesh = &body.mesh;
     let (whole, copies) = mesh.tets.split_at(mesh.whole_tets());
     let mut near = vec![false; mesh.positions.len()];
@@ -40,8 +41,8 @@ pub(super) fn walls(body: &Body) -> Vec<[Embedded; 3]> {
     if let Some(severed) = &body.severed {
         let nodes = mesh.positions.len();
         let corner = |v: u32| match (v as usize).checked_sub(nodes) {
-            Some(point) => severed.tet_pieces.points[point],
-            None => Embedded::node(v),
+            Some(point) => ends.close(severed.tet_pieces.points[point]),
+            None => ends.close(Embedded::node(v)),
         };
         severed.tet_pieces.simplices.iter().for_each(|tet| faces.add(tet.map(corner), false));
         severed.taken_out.iter().flatten().for_each(|tet| faces.add(tet.map(corner), true));
