@@ -16,9 +16,9 @@ const SMOOTH: usize = 4;
 /// Distance in pixels between the first rays of a picture: 4 where that is at most a voxel, else 2.
 /// A surface from interpolated voxels has no detail that is much finer than a voxel.
 ///
-/// Few colors differ from those with a ray for each pixel. With a distance of 4, in close-ups of the
-/// phantom and of its wound, 0.01 % of the pixels or less by more than 4, and none by more than 13.
-/// With 2, in a picture of the whole, 0.07 % by more than 4, and none by more than 9.
+/// Few colors differ from those with a ray for each pixel. With a distance of 4, in close-ups of
+/// the phantom and of its wound, 0.01 % of the pixels or less by more than 4, and none by more than
+/// 13. With 2, in a picture of the whole, 0.07 % by more than 4, and none by more than 9.
 pub fn first_spacing(pixel_mm: f64, voxel_mm: f64) -> usize {
     if 4.0 * pixel_mm <= voxel_mm { 4 } else { 2 }
 }
@@ -81,8 +81,8 @@ fn set(image: &mut Image, [x, y]: [usize; 2], color: Rgb) {
     image.rgb[first..][..3].copy_from_slice(&color);
 }
 
-/// Halves the distance `known` between the pixels with a color, where the picture is smooth. Returns
-/// the pixels that are still without one.
+/// Halves the distance `known` between the pixels with a color, where the picture is smooth.
+/// Returns the pixels that are still without one.
 fn fill_smooth_parts(image: &mut Image, known: usize) -> Vec<[usize; 2]> {
     let (step, width, before) = (known / 2, image.width, image.clone());
     let fill_row = |(n, rows): (usize, &mut [u8])| {
