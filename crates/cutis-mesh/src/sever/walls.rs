@@ -4,6 +4,8 @@
 //! distances is zero. Neighboring tets share the distances of their common corners, so the wall is
 //! continuous.
 
+use std::cmp::Ordering;
+
 use super::components::count;
 
 /// Barycentric coordinates in a tet.
@@ -152,6 +154,9 @@ fn weighted(distances: &[f32; 4], point: &Barycentric) -> f64 {
 
 /// Divides a simplex where the interpolated distance is zero. It halves an edge whose ends are on
 /// different sides at its zero, until there is none.
+///
+/// The order of edges and of their ends depends on the coordinates only. So pieces of a tet that
+/// share a face divide it in the same way and with the same bits.
 fn divide<const N: usize>(
     piece: [Barycentric; N],
     distances: &[f32; 4],
@@ -166,8 +171,11 @@ fn divide_at<const N: usize>(
     values: [f64; N],
     done: &mut dyn FnMut([Barycentric; N]),
 ) {
-    let crossing =
-        (0..N).flat_map(|a| (a + 1..N).map(move |b| (a, b))).find(|&(a, b)| values[a] * values[b] < 0.0);
+    // Corners of a tet come before points on its edges, in the order of their numbers.
+    let mut order: [usize; N] = std::array::from_fn(|n| n);
+    order.sort_by(|&a, &b| piece[b].partial_cmp(&piece[a]).unwrap_or(Ordering::Equal));
+    let pairs = (0..N).flat_map(|a| (a + 1..N).map(move |b| (a, b)));
+    let crossing = pairs.map(|(a, b)| (order[a], order[b])).find(|&(a, b)| values[a] * values[b] < 0.0);
     let Some((a, b)) = crossing else { return done(piece) };
     let part = values[a] / (values[a] - values[b]);
     let zero = std::array::from_fn(|axis| (1.0 - part) * piece[a][axis] + part * piece[b][axis]);
@@ -187,6 +195,7 @@ fn determinant(rows: &[Barycentric; 4]) -> f64 {
 mod tests {
     use super::*;
     use crate::sever::components::parts_of;
+    use cutis_test_kit::Random;
 
     fn walls<'a>(distances: &'a [[f32; 4]], severed: u8) -> Walls<'a> {
         Walls { distances, parts: parts_of(severed), kept: 15, piece: None }
@@ -219,6 +228,35 @@ mod tests {
             }
         }
         assert!((volumes[0] - inside / all).abs() < 5e-3, "{volumes:?}, {}", inside / all);
+    }
+
+    /// Each face of a piece is that of another piece, with the same bits, or in a face of the tet.
+    #[test]
+    fn pieces_of_several_walls_fit_each_other() {
+        use std::collections::HashMap;
+        let mut random = Random::new(4);
+        let (mut inner, mut most) = (0, 0);
+        for _ in 0..300 {
+            let distances: [[f32; 4]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| random.below(2000) as f32 - 999.5));
+            let mut faces: HashMap<[[u64; 4]; 3], usize> = HashMap::new();
+            let mut pieces = 0;
+            let unit = |n: usize| std::array::from_fn(|axis| f64::from(u8::from(axis == n)));
+            walls(&distances, 0b11_1111).pieces([unit(0), unit(1), unit(2), unit(3)], |_, piece| {
+                pieces += 1;
+                for opposite in 0..4 {
+                    let face = [1, 2, 3].map(|step| piece[(opposite + step) % 4]);
+                    if !(0..4).any(|axis| face.iter().all(|corner| corner[axis] == 0.0)) {
+                        let mut key = face.map(|corner| corner.map(f64::to_bits));
+                        key.sort_unstable();
+                        *faces.entry(key).or_default() += 1;
+                    }
+                }
+            });
+            assert!(faces.values().all(|&count| count == 2), "{distances:?}: {pieces} pieces");
+            (inner, most) = (inner + faces.len(), most.max(pieces));
+        }
+        assert!(inner > 10_000 && most > 30, "the control: {inner} faces, up to {most} pieces");
     }
 
     #[test]
