@@ -10,10 +10,11 @@ const ON_THE_WALL: f64 = 0.05;
 /// Largest distance beyond an end, in lattice steps, at which tets are divided.
 const REACH: f64 = 2.0;
 
-/// Points without the part of a wound beyond the ends of its incisions.
+/// Closes wounds beyond the ends of their incisions.
 ///
-/// The last tets of an incision are divided over their whole length, so that they open up to a step
-/// beyond its end. There both sides of the wall get the motion of the undivided tet, and are one.
+/// The last tets of an incision are divided over their whole length, so they open up to a step
+/// beyond its end. There the points on both sides of the wall follow the undivided tet, and so they
+/// stay together.
 pub(super) struct Ends<'a> {
     body: &'a Body,
     /// Number of the first virtual node.
@@ -31,7 +32,8 @@ impl<'a> Ends<'a> {
         Self { body, first_virtual, virtual_nodes, step_mm: mesh.lattice.longest_step_mm() }
     }
 
-    /// The point as it is shown.
+    /// The point as it is shown: beyond an end it follows the vertices of the mesh, not their
+    /// copies.
     pub(super) fn close(&self, point: Embedded) -> Embedded {
         let place = |node: u32| (node as usize).checked_sub(self.first_virtual);
         let is_copy = point.nodes.iter().any(|&node| place(node).is_some());
