@@ -172,6 +172,13 @@ mod tests {
     }
 
     #[test]
+    fn the_first_rays_are_at_most_a_voxel_apart_or_two_pixels() {
+        for (pixel_mm, spacing) in [(0.01, 4), (0.1875, 4), (0.19, 2), (3.0, 2)] {
+            assert_eq!(first_spacing(pixel_mm, 0.75), spacing, "{pixel_mm} mm");
+        }
+    }
+
+    #[test]
     fn a_picture_of_one_pixel_gets_its_ray() {
         for spacing in [1, 2, 4] {
             assert_eq!(picture(1, 1, spacing).1, 1);
