@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::beside::fill_and_take;
 use super::convert::{Converter, VoxelType};
 use super::source::{PORTION, Source};
 use crate::{Affine, Grid, Loaded, Volume, VolumeError};
@@ -102,12 +103,12 @@ pub(crate) fn decode_raw(source: &mut Source<'_>, layout: &Layout) -> Result<Vec
     Ok(bytes)
 }
 
-/// Calls `visit(portion, reserve)` with the bytes of whole voxels. `reserve` is the number of
-/// voxels for which there should be memory from now on, if it has grown.
+/// Calls `visit(portion, reserve)` with the bytes of whole voxels, on a second thread. `reserve` is
+/// the number of voxels for which there should be memory from now on, if it has grown.
 fn each_portion(
     source: &mut Source<'_>,
     layout: &Layout,
-    mut visit: impl FnMut(&[u8], Option<usize>) -> Result<(), VolumeError>,
+    visit: impl FnMut(&[u8], Option<usize>) -> Result<(), VolumeError> + Send,
 ) -> Result<(), VolumeError> {
     let &Layout { shape, dtype, .. } = layout;
     let too_large = || VolumeError::TooLarge { path: source.path.clone(), shape };
@@ -116,28 +117,29 @@ fn each_portion(
     let voxels = usize::try_from(count).map_err(|_| too_large())?;
     source.expect(layout.offset, bytes)?;
     source.skip_to(layout.offset, bytes)?;
-    let mut reserved = 0usize;
-    let mut buffer = vec![0; PORTION.min(bytes as usize)];
-    let mut done = 0u64;
-    while done < bytes {
-        let wanted = PORTION.min((bytes - done) as usize);
-        let got = source.fill(&mut buffer[..wanted])?;
+    let path = source.path.clone();
+    let (mut done, mut reserved) = (0, 0);
+    let fill = |portion: &mut Vec<u8>| {
+        if done == bytes {
+            return Ok(None);
+        }
+        portion.resize(PORTION.min((bytes - done) as usize), 0);
+        let got = source.fill(portion)?;
         done += got as u64;
-        if got < wanted {
+        if got < portion.len() {
             let path = source.path.clone();
             return Err(VolumeError::Truncated { path, expected_bytes: bytes, found_bytes: done });
         }
         let received = (done / dtype.bytes() as u64) as usize;
-        let mut reserve = None;
-        if received > reserved {
-            // The size of an uncompressed file is known to suffice. For a compressed file, the
-            // reserved memory grows with the voxels received, so that a header with wrong sizes
-            // cannot make the program allocate too much.
-            reserved =
-                if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
-            reserve = Some(reserved);
+        if received <= reserved {
+            return Ok(Some(None));
         }
-        visit(&buffer[..wanted], reserve)?;
-    }
-    Ok(())
+        // The size of an uncompressed file is known to suffice. For a compressed file, the reserved
+        // memory grows with the voxels received, so that a header with wrong sizes cannot make the
+        // program allocate too much.
+        reserved =
+            if source.compressed { (4 * received).max(source.len as usize).min(voxels) } else { voxels };
+        Ok(Some(Some(reserved)))
+    };
+    fill_and_take(&path, fill, visit)
 }

@@ -1,5 +1,6 @@
 //! What the file formats share: bytes of a file, voxels of any real type, and compression.
 
+mod beside;
 mod convert;
 mod data_file;
 mod decode;
