@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::beside::fill_and_take;
 use super::convert::{Converter, VoxelType};
+use super::second_thread::fill_and_take;
 use super::source::{PORTION, Source};
 use crate::{Affine, Grid, Loaded, Volume, VolumeError};
 

@@ -1,11 +1,11 @@
 //! What the file formats share: bytes of a file, voxels of any real type, and compression.
 
-mod beside;
 mod convert;
 mod data_file;
 mod decode;
 mod gzip;
 mod put;
+mod second_thread;
 mod source;
 mod text;
 
