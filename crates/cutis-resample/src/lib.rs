@@ -60,6 +60,7 @@ mod motion;
 mod partial_volume;
 mod prepared;
 mod raster;
+mod reaching;
 mod report;
 mod resampler;
 mod rows;
@@ -71,6 +72,7 @@ mod spans;
 mod tet_map;
 mod tile;
 mod tiling;
+mod voxel_set;
 mod wall_means;
 mod warp;
 

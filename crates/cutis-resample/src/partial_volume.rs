@@ -4,13 +4,12 @@
 //! as a flight of stairs. Here the voxels that a wall crosses take the mean over points within the
 //! voxel instead.
 
-use std::ops::Range;
-
 use cutis_volume::Volume;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::space::IndexSpace;
+use crate::voxel_set::{Spans, VoxelSet};
 use crate::wall_means::WallMeans;
 use crate::{ResampleError, Warp};
 
@@ -54,15 +53,12 @@ pub fn blend_walls(
     let space = IndexSpace::new(&grid.affine, warp.origin_mm, [warp.rest, warp.deformed]);
     let walls = Walls { volume, warp, space: &space, shape: grid.shape };
     let moved = at_walls.par_iter().any(|&tet| warp.tet_moved(tet as usize));
-    let voxels = if moved { walls.voxels_at(at_walls) } else { Vec::new() };
-    if voxels.is_empty() {
-        return Ok((resampled, 0));
-    }
-    let blended = WallMeans::new(&walls, &voxels).values(&voxels);
+    let Some(voxels) = moved.then(|| walls.voxels_at(at_walls)).flatten() else { return Ok((resampled, 0)) };
+    let blended = WallMeans::new(&walls, &voxels).values();
     let (slope, intercept) = (resampled.slope(), resampled.intercept());
     let mut values = resampled.into_voxels();
     for &(voxel, value) in &blended {
-        values[voxel as usize] = value;
+        values[voxel] = value;
     }
     Ok((Volume::new(grid, values, slope, intercept)?, blended.len()))
 }
@@ -75,58 +71,13 @@ pub struct Walls<'a> {
     pub shape: [usize; 3],
 }
 
-/// A voxel, as a position in a list, and a tet that may reach it.
-pub type Pair = (u32, u32);
-
 impl Walls<'_> {
-    /// The voxels that some tets reach, in ascending order.
-    fn voxels_at(&self, tets: &[u32]) -> Vec<u64> {
-        let mut voxels: Vec<u64> = tets
-            .par_iter()
-            .filter(|tet| !self.has_burst(&self.warp.tets[**tet as usize]))
-            .flat_map_iter(|&tet| {
-                let mut found = Vec::new();
-                self.rows(&self.corners(self.warp.deformed, &self.warp.tets[tet as usize]), |first, end| {
-                    found.extend(first..end);
-                });
-                found
-            })
-            .collect();
-        voxels.par_sort_unstable();
-        voxels.dedup();
-        voxels
-    }
-
-    /// The tets that may reach each of some voxels, by voxel and tet in ascending order.
-    pub fn pairs(
-        &self,
-        voxels: &[u64],
-        positions: &[Point3<f32>],
-        tets: &[[u32; 4]],
-        counts: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Vec<Pair> {
-        let slice = (self.shape[0] * self.shape[1]) as u64;
-        let [first, last] = [voxels[0], voxels[voxels.len() - 1]].map(|voxel| (voxel / slice) as f64);
-        let mut pairs: Vec<Pair> = tets
-            .par_iter()
-            .enumerate()
-            .filter(|(_, tet)| {
-                let slices = tet.map(|v| self.space.slice(positions[v as usize]));
-                slices.iter().any(|&z| z >= first - 1.0) && slices.iter().any(|&z| z <= last + 1.0)
-            })
-            .filter(|(tet, _)| counts(*tet))
-            .flat_map_iter(|(tet, vertices)| {
-                let mut found = Vec::new();
-                self.rows(&self.corners(positions, vertices), |first, end| {
-                    let from = voxels.partition_point(|&voxel| voxel < first);
-                    let listed = voxels[from..].iter().take_while(|&&voxel| voxel < end);
-                    found.extend(listed.enumerate().map(|(n, _)| ((from + n) as u32, tet as u32)));
-                });
-                found
-            })
-            .collect();
-        pairs.par_sort_unstable();
-        pairs
+    /// The voxels whose cubes touch the boxes around some tets. `None` if there are none.
+    fn voxels_at(&self, tets: &[u32]) -> Option<VoxelSet> {
+        let tets =
+            tets.par_iter().map(|&tet| &self.warp.tets[tet as usize]).filter(|tet| !self.has_burst(tet));
+        let boxes: Vec<_> = tets.map(|tet| self.spans(&self.corners(self.warp.deformed, tet))).collect();
+        VoxelSet::new(&boxes)
     }
 
     /// Whether the box around a deformed tet has too many voxels to list them.
@@ -139,7 +90,7 @@ impl Walls<'_> {
     }
 
     /// The columns, rows and slices of the voxels whose cubes touch the box around a tet.
-    fn spans(&self, corners: &[Point3<f64>; 4]) -> [Range<usize>; 3] {
+    pub fn spans(&self, corners: &[Point3<f64>; 4]) -> Spans {
         std::array::from_fn(|axis| {
             let values = corners.map(|corner| corner[axis]);
             let low = values.into_iter().fold(f64::INFINITY, f64::min);
@@ -148,27 +99,6 @@ impl Walls<'_> {
             let first = (low - 0.5).ceil().clamp(0.0, end) as usize;
             first..((high + 0.5).floor() + 1.0).clamp(0.0, end) as usize
         })
-    }
-
-    /// Calls `visit(first, end)` for each row of the voxels of [`spans`](Self::spans).
-    fn rows(&self, corners: &[Point3<f64>; 4], mut visit: impl FnMut(u64, u64)) {
-        let [columns, rows, _] = self.shape;
-        let [along, across, slices] = self.spans(corners);
-        if along.is_empty() {
-            return;
-        }
-        for k in slices {
-            for j in across.clone() {
-                let row = ((k * rows + j) * columns) as u64;
-                visit(row + along.start as u64, row + along.end as u64);
-            }
-        }
-    }
-
-    /// Column, row and slice of a voxel.
-    pub fn point(&self, voxel: u64) -> [usize; 3] {
-        let (voxel, [columns, rows, _]) = (voxel as usize, self.shape);
-        [voxel % columns, voxel / columns % rows, voxel / (columns * rows)]
     }
 
     pub fn corners(&self, positions: &[Point3<f32>], tet: &[u32; 4]) -> [Point3<f64>; 4] {

@@ -16,10 +16,8 @@ pub struct Prepared {
 pub type CornersOf<'a> = &'a (dyn Fn(u32) -> [Point3<f64>; 4] + Sync);
 
 impl Prepared {
-    /// Prepares tets that may occur several times, with their corners where they are looked up.
-    pub fn new(mut tets: Vec<u32>, tolerance: f64, corners: CornersOf<'_>) -> Self {
-        tets.par_sort_unstable();
-        tets.dedup();
+    /// Prepares tets in ascending order, with their corners where they are looked up.
+    pub fn new(tets: Vec<u32>, tolerance: f64, corners: CornersOf<'_>) -> Self {
         let raster = |tets: &[u32]| Rasters::new(&gather(tets, corners), tolerance);
         let groups = tets.par_chunks(GROUP).map(raster).collect();
         Self { tets, groups }
@@ -34,11 +32,6 @@ impl Prepared {
     /// The numbers of the tets, in ascending order.
     pub fn numbers(&self) -> &[u32] {
         &self.tets
-    }
-
-    /// The place of a tet in the list, or where it would be.
-    pub fn slot(&self, tet: u32) -> usize {
-        self.tets.partition_point(|&other| other < tet)
     }
 
     /// The tet at a place in the list. `None` if it has no volume.

@@ -1,13 +1,14 @@
 //! The mean over points within each voxel that a wall crosses.
 
 use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::partial_volume::{Pair, Walls};
-use crate::prepared::Prepared;
+use crate::partial_volume::Walls;
 use crate::raster::{GROUP, RestMaps, TetRaster};
+use crate::reaching::{Reaching, half_cube};
 use crate::sample::{scanned_range, stored_air, trilinear};
+use crate::voxel_set::{VoxelSet, bits};
 
 /// Number of points within a voxel: the bits of a mask.
 const POINTS: usize = u64::BITS as usize;
@@ -24,6 +25,8 @@ type Places = [[f64; POINTS]; 3];
 /// What the means of some voxels need.
 pub struct WallMeans<'a> {
     walls: &'a Walls<'a>,
+    /// Column, row and slice of each voxel.
+    voxels: Vec<[usize; 3]>,
     /// The deformed tets, and their maps to the rest shapes.
     held: Reaching,
     to_rest: Vec<RestMaps>,
@@ -36,40 +39,37 @@ pub struct WallMeans<'a> {
     points: [Vector3<f64>; POINTS],
 }
 
-/// Tets, and pairs of a voxel and a tet that may reach it: places in the lists of both.
-struct Reaching {
-    pairs: Vec<Pair>,
-    tets: Prepared,
-}
-
 impl<'a> WallMeans<'a> {
     /// Prepares the tets that may reach the voxels.
-    pub fn new(walls: &'a Walls<'a>, voxels: &[u64]) -> Self {
+    pub fn new(walls: &'a Walls<'a>, set: &VoxelSet) -> Self {
         let Walls { volume, warp, .. } = *walls;
+        let voxels: Vec<_> = set.voxels().collect();
         let reaching = |positions, tets, counts: &(dyn Fn(usize) -> bool + Sync)| {
-            Reaching::new(walls, voxels, positions, tets, counts)
+            Reaching::new(walls, set, voxels.len(), positions, tets, counts)
         };
+        let (held, moved) = rayon::join(
+            || reaching(warp.deformed, warp.tets, &|tet| !walls.has_burst(&warp.tets[tet])),
+            || reaching(warp.rest, warp.tets, &|tet| warp.tet_moved(tet)),
+        );
+        let removed = reaching(warp.rest, warp.removed, &|_| true);
         let air = stored_air(volume);
-        let held = reaching(warp.deformed, warp.tets, &|tet| !walls.has_burst(&warp.tets[tet]));
         Self {
             walls,
             to_rest: held.tets.rest_maps(&|tet| walls.corners(warp.rest, &warp.tets[tet as usize])),
             is_moved: held.tets.numbers().iter().map(|&tet| warp.tet_moved(tet as usize)).collect(),
             held,
-            left: [
-                reaching(warp.rest, warp.tets, &|tet| warp.tet_moved(tet)),
-                reaching(warp.rest, warp.removed, &|_| true),
-            ],
+            left: [moved, removed],
             air,
             scanned: scanned_range(volume, air),
             points: points(),
+            voxels,
         }
     }
 
-    /// The new values of those of the voxels that walls cross.
-    pub fn values(&self, voxels: &[u64]) -> Vec<(u64, i16)> {
+    /// The voxels that walls cross, as indices into the volume, and their new values.
+    pub fn values(&self) -> Vec<(usize, i16)> {
         let level = SimdLevel::best();
-        let parts = voxels.par_chunks(PART).enumerate().flat_map_iter(|(part, voxels)| {
+        let parts = self.voxels.par_chunks(PART).enumerate().flat_map_iter(|(part, voxels)| {
             let mut found = Vec::new();
             f32::in_lanes(level, Part { means: self, first: part * PART, voxels, found: &mut found });
             found
@@ -78,9 +78,10 @@ impl<'a> WallMeans<'a> {
     }
 
     /// The new value of a voxel. `None` if no wall crosses it. `at` is its place in the list.
+    /// `owners` is memory.
     #[inline(always)]
-    fn value(&self, at: usize, voxel: u64) -> Option<i16> {
-        let center = self.walls.point(voxel).map(|index| index as f64);
+    fn value(&self, at: usize, voxel: [usize; 3], owners: &mut Vec<(usize, u64)>) -> Option<i16> {
+        let center = voxel.map(|index| index as f64);
         let mut places = [[0.0; POINTS]; 3];
         for axis in 0..3 {
             let last = (self.walls.shape[axis] - 1) as f64;
@@ -88,35 +89,42 @@ impl<'a> WallMeans<'a> {
                 places[axis][n] = (center[axis] + self.points[n][axis]).min(last).max(0.0);
             }
         }
-        let place = |n: usize| [places[0][n], places[1][n], places[2][n]];
-        let (mut covered, mut sum) = (0_u64, 0.0);
-        for &(_, slot) in self.held.of(at) {
+        let center = Vector3::from(center);
+        let mut covered = 0_u64;
+        owners.clear();
+        for &slot in self.held.of(at) {
             let slot = slot as usize;
             let Some(raster) = self.held.tets.raster(slot) else { continue };
-            let own = self.inside(raster, &places) & !covered;
-            for n in bits(own) {
-                let point = place(n);
-                sum += self.sample(if self.is_moved[slot] {
-                    self.to_rest[slot / GROUP].at(slot % GROUP, point)
-                } else {
-                    point
-                });
+            let own = self.inside(raster, &center, &places) & !covered;
+            if own != 0 {
+                owners.push((slot, own));
+                covered |= own;
             }
-            covered |= own;
             if covered == u64::MAX {
                 return None;
             }
         }
         let mut empty = 0;
         for left in &self.left {
-            for &(_, slot) in left.of(at) {
+            for &slot in left.of(at) {
                 if let Some(raster) = left.tets.raster(slot as usize) {
-                    empty |= self.inside(raster, &places) & !covered;
+                    empty |= self.inside(raster, &center, &places) & !covered;
                 }
             }
         }
         if empty == 0 {
             return None;
+        }
+        let place = |n: usize| [places[0][n], places[1][n], places[2][n]];
+        let mut sum = 0.0;
+        for &(slot, own) in &*owners {
+            for point in bits(own).map(place) {
+                sum += self.sample(if self.is_moved[slot] {
+                    self.to_rest[slot / GROUP].at(slot % GROUP, point)
+                } else {
+                    point
+                });
+            }
         }
         sum += f64::from(empty.count_ones()) * f64::from(self.air);
         sum += bits(!(covered | empty)).map(|n| self.sample(place(n))).sum::<f64>();
@@ -128,13 +136,17 @@ impl<'a> WallMeans<'a> {
         f64::from(trilinear(self.walls.volume.voxels(), self.walls.shape, self.scanned, place))
     }
 
-    /// The points in a tet, as bits.
+    /// The points of the voxel around `center` that a tet holds, as bits.
     #[inline(always)]
-    fn inside(&self, raster: TetRaster<'_>, [x, y, z]: &Places) -> u64 {
+    fn inside(&self, raster: TetRaster<'_>, center: &Vector3<f64>, [x, y, z]: &Places) -> u64 {
         let mut held = u64::MAX;
         for corner in 0..4 {
             let (gradient, constant) = (raster.gradient_of(corner), raster.constant_of(corner));
             let lowest = -self.walls.space.tolerance * gradient.norm();
+            if constant + gradient.dot(center) - half_cube(&gradient) >= lowest {
+                // All points of the voxel are on the inner side of this face.
+                continue;
+            }
             let mut bits = 0;
             for n in 0..POINTS {
                 let along = (gradient.x * x[n] + gradient.y * y[n]) + gradient.z * z[n];
@@ -149,44 +161,22 @@ impl<'a> WallMeans<'a> {
     }
 }
 
-impl Reaching {
-    fn new(
-        walls: &Walls<'_>,
-        voxels: &[u64],
-        positions: &[Point3<f32>],
-        tets: &[[u32; 4]],
-        counts: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Self {
-        let mut pairs = walls.pairs(voxels, positions, tets, counts);
-        let numbers = pairs.par_iter().map(|&(_, tet)| tet).collect();
-        let corners = |tet: u32| walls.corners(positions, &tets[tet as usize]);
-        let tets = Prepared::new(numbers, walls.space.tolerance, &corners);
-        pairs.par_iter_mut().for_each(|(_, tet)| *tet = tets.slot(*tet) as u32);
-        Self { pairs, tets }
-    }
-
-    /// The pairs of one voxel.
-    fn of(&self, voxel: usize) -> &[Pair] {
-        let from = self.pairs.partition_point(|&(at, _)| (at as usize) < voxel);
-        let count = self.pairs[from..].iter().take_while(|&&(at, _)| at as usize == voxel).count();
-        &self.pairs[from..from + count]
-    }
-}
-
 /// Finds the new values of some voxels. `first` is the place of the first one in the list.
 struct Part<'a> {
     means: &'a WallMeans<'a>,
     first: usize,
-    voxels: &'a [u64],
-    found: &'a mut Vec<(u64, i16)>,
+    voxels: &'a [[usize; 3]],
+    found: &'a mut Vec<(usize, i16)>,
 }
 
 impl LaneTask<f32> for Part<'_> {
     #[inline(always)]
     fn run<L: Lanes<f32>>(self) {
-        for (n, &voxel) in self.voxels.iter().enumerate() {
-            if let Some(value) = self.means.value(self.first + n, voxel) {
-                self.found.push((voxel, value));
+        let [columns, rows, _] = self.means.walls.shape;
+        let mut owners = Vec::new();
+        for (n, &[i, j, k]) in self.voxels.iter().enumerate() {
+            if let Some(value) = self.means.value(self.first + n, [i, j, k], &mut owners) {
+                self.found.push(((k * rows + j) * columns + i, value));
             }
         }
     }
@@ -196,15 +186,6 @@ impl LaneTask<f32> for Part<'_> {
 fn points() -> [Vector3<f64>; POINTS] {
     let level = |n: usize| ((n % POINTS) as f64 + 0.5) / POINTS as f64 - 0.5;
     std::array::from_fn(|n| Vector3::from(GENERATORS.map(|generator| level(n * generator))))
-}
-
-/// The numbers of the bits that are set, in ascending order.
-fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
-        mask &= mask.wrapping_sub(1);
-        bit
-    })
 }
 
 #[cfg(test)]
@@ -245,12 +226,5 @@ mod tests {
         assert!(worst < 0.12 && mean < 0.019, "worst {worst}, root mean square {mean}");
         let corner: Vec<_> = points.iter().map(|point| point * 0.8).collect();
         assert!(errors(&corner).1 > 0.025, "the control, points too near to the center");
-    }
-
-    #[test]
-    fn bits_are_listed_in_ascending_order() {
-        assert_eq!(bits(0b1010_0001).collect::<Vec<_>>(), [0, 5, 7]);
-        assert_eq!(bits(0).count(), 0);
-        assert_eq!(bits(u64::MAX).count(), 64);
     }
 }
