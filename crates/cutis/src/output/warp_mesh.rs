@@ -4,6 +4,7 @@ use cutis_mesh::sever::{Embedded, Pieces};
 use cutis_mesh::{MeshError, Shell};
 use cutis_resample::Warp;
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use crate::body::Body;
 
@@ -55,12 +56,7 @@ impl WarpMesh {
         };
         let blades = || 0..shell.taken_out.len();
         let kept = || blades().filter(|&blade| !at_end[blade]).map(tets_of);
-        let body_tets: Vec<[u32; 4]> = mesh.tets[..mesh.whole_tets()]
-            .iter()
-            .copied()
-            .chain(walls.simplices.iter().map(behind))
-            .chain(kept().flat_map(|(in_body, _)| in_body))
-            .collect();
+        let in_pieces = walls.simplices.iter().map(behind).chain(kept().flat_map(|(in_body, _)| in_body));
         let around = shell.tets.iter().copied().chain(shell.pieces.simplices.iter().map(in_shell));
         let around = around.chain(kept().flat_map(|(_, in_shell)| in_shell));
         let out = |first: bool| {
@@ -73,16 +69,20 @@ impl WarpMesh {
         removed.extend(out(false));
         let points: Vec<Embedded> = walls.points.iter().chain(&shell.pieces.points).copied().collect();
         let at_rest = further(&shell, &points, &mesh.positions, &mesh.positions);
-        let (divided, whole) = (mesh.tets[mesh.whole_tets()..].as_flattened(), body_tets.len());
-        let tets: Vec<[u32; 4]> = body_tets.into_iter().chain(around).collect();
-        let cut = tets[mesh.whole_tets()..whole].iter().chain(&tets[whole + shell.tets.len()..]);
+        let (undivided, divided) = mesh.tets.split_at(mesh.whole_tets());
+        let mut tets = Vec::with_capacity(mesh.tets.len() + shell.tets.len());
+        tets.extend_from_slice(undivided);
+        tets.extend(in_pieces);
+        let body_tets = tets.len();
+        tets.extend(around);
+        let cut = tets[undivided.len()..body_tets].iter().chain(&tets[body_tets + shell.tets.len()..]);
         let mut on_walls = vec![false; mesh.positions.len() + at_rest.len()];
-        divided.iter().chain(cut.flatten()).for_each(|&v| on_walls[v as usize] = true);
-        let reaches = |tet: u32| tets[tet as usize].iter().any(|&v| on_walls[v as usize]);
-        let at_walls = (0..tets.len() as u32).filter(|&tet| reaches(tet)).collect();
+        divided.iter().chain(cut).flatten().for_each(|&v| on_walls[v as usize] = true);
+        let reaches = |tet: &u32| tets[*tet as usize].iter().any(|&v| on_walls[v as usize]);
+        let at_walls = (0..tets.len() as u32).into_par_iter().filter(reaches).collect();
         Ok(Self {
             origin_mm: mesh.frame.origin_mm,
-            body_tets: whole,
+            body_tets,
             at_walls,
             tets,
             rest: [mesh.positions.as_slice(), &at_rest].concat(),
