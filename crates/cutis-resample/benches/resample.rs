@@ -1,11 +1,12 @@
 //! A volume of 256³ voxels through a lattice of 1.5 million tets on one thread: with all tets
 //! moving, with a ball of 100 mm of moving tets, and with none moving. A new output each time, and
-//! updates of a kept output between two states.
+//! updates of a kept output between two states. Last the voxels at the walls of a cut through the
+//! ball.
 
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
-use cutis_resample::{Resampler, Warp, resample};
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use cutis_resample::{Resampler, Warp, blend_walls, resample};
 use cutis_test_kit::{Kuhn, Random};
 use cutis_volume::{Affine, Grid, Volume};
 use nalgebra::{Point3, Vector3};
@@ -58,6 +59,39 @@ fn bench(criterion: &mut Criterion) {
             });
         });
     }
+    // The tets across the middle plane of the ball are removed, and one side moves.
+    let in_ball = |p: &Point3<f32>| (p - center).norm() < 0.05;
+    let is_cut = |tet: &[u32; 4]| {
+        let corners = tet.map(|v| rest[v as usize]);
+        let right = corners.iter().filter(|p| p.x > center.x).count();
+        corners.iter().all(in_ball) && (1..4).contains(&right)
+    };
+    let (removed, kept): (Vec<[u32; 4]>, Vec<[u32; 4]>) = tets.iter().partition(|tet| is_cut(tet));
+    let opened = |p: &Point3<f32>| {
+        let by = if in_ball(p) && p.x > center.x { 2e-3 } else { 0.0 };
+        p + Vector3::new(by, 0.0, 0.0)
+    };
+    let deformed: Vec<_> = rest.iter().map(opened).collect();
+    let mut on_walls = vec![false; rest.len()];
+    removed.iter().flatten().for_each(|&v| on_walls[v as usize] = true);
+    let at_wall = |&tet: &u32| kept[tet as usize].iter().any(|&v| on_walls[v as usize]);
+    let at_walls: Vec<u32> = (0..kept.len() as u32).filter(at_wall).collect();
+    let warp = Warp {
+        origin_mm,
+        rest: &rest,
+        deformed: &deformed,
+        tets: &kept,
+        body_tets: kept.len(),
+        removed: &removed,
+    };
+    let (sharp, _) = resample(&volume, &warp, &|_, _| {}).expect("valid warp");
+    let (_, blended) = blend_walls(&volume, &warp, &at_walls, sharp.clone()).expect("valid walls");
+    assert!(blended > 1000, "the walls cross {blended} voxels");
+    group.bench_function("walls of a cut", |b| {
+        let walls =
+            |sharp| pool.install(|| blend_walls(&volume, &warp, &at_walls, sharp).expect("valid walls"));
+        b.iter_batched(|| sharp.clone(), walls, BatchSize::LargeInput);
+    });
     group.finish();
 }
 
