@@ -10,7 +10,7 @@ use crate::voxel_set::VoxelSet;
 
 /// Tets, and for each voxel of a set those that may hold a part of its cube.
 pub struct Reaching {
-    /// The tets that may hold a part of any of the voxels.
+    /// The tets near the box around the voxels.
     pub tets: Prepared,
     /// The slots in `tets` of the tets of one voxel after another, in ascending order.
     slots: Vec<u32>,
@@ -23,7 +23,6 @@ impl Reaching {
     pub fn new(
         walls: &Walls<'_>,
         voxels: &VoxelSet,
-        count: usize,
         positions: &[Point3<f32>],
         tets: &[[u32; 4]],
         counts: &(dyn Fn(usize) -> bool + Sync),
@@ -55,7 +54,7 @@ impl Reaching {
             pairs
         });
         let groups: Vec<Vec<(u32, u32)>> = groups.collect();
-        let (slots, offsets) = by_voxel(&groups, count);
+        let (slots, offsets) = by_voxel(&groups, voxels.len());
         Self { tets, slots, offsets }
     }
 

@@ -50,6 +50,11 @@ impl VoxelSet {
         &self.bounds
     }
 
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        self.before[self.words.len()]
+    }
+
     /// Column, row and slice of each voxel, in the order of their places.
     pub fn voxels(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
         let [columns, rows, slices] = &self.bounds;
@@ -134,6 +139,7 @@ mod tests {
                 continue;
             };
             assert_eq!(set.voxels().collect::<Vec<_>>(), expected);
+            assert_eq!(set.len(), expected.len());
             let [j, k] = [span(14), span(11)].map(|span| span.start);
             let columns = span(200);
             let found: Vec<_> = set.in_row(j, k, &columns).collect();

@@ -43,9 +43,8 @@ impl<'a> WallMeans<'a> {
     /// Prepares the tets that may reach the voxels.
     pub fn new(walls: &'a Walls<'a>, set: &VoxelSet) -> Self {
         let Walls { volume, warp, .. } = *walls;
-        let voxels: Vec<_> = set.voxels().collect();
         let reaching = |positions, tets, counts: &(dyn Fn(usize) -> bool + Sync)| {
-            Reaching::new(walls, set, voxels.len(), positions, tets, counts)
+            Reaching::new(walls, set, positions, tets, counts)
         };
         let (held, moved) = rayon::join(
             || reaching(warp.deformed, warp.tets, &|tet| !walls.has_burst(&warp.tets[tet])),
@@ -62,7 +61,7 @@ impl<'a> WallMeans<'a> {
             air,
             scanned: scanned_range(volume, air),
             points: points(),
-            voxels,
+            voxels: set.voxels().collect(),
         }
     }
 

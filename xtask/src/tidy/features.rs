@@ -50,7 +50,7 @@ pub fn switched_off(metadata: &Value) -> Result<Vec<Finding>> {
     Ok(findings)
 }
 
-/// Whether an id such as `path+file:///work/crates/a#0.1.0` or `…/folder#a@0.1.0` is that of a
+/// Whether an id such as `path+file:///folder/a#0.1.0` or `…/folder#a@0.1.0` is that of a
 /// package.
 fn is_package(id: &str, name: &str) -> bool {
     let (place, version) = id.rsplit_once('#').unwrap_or((id, ""));
