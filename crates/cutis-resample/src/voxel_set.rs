@@ -123,6 +123,7 @@ mod tests {
             let start = random.below(most);
             start..start + random.below(1 + most / 2)
         };
+        let mut found = 0;
         for round in 0..50 {
             let boxes: Vec<Spans> = (0..round % 5).map(|_| [span(150), span(9), span(7)]).collect();
             let is_in = |[i, j, k]: [usize; 3]| {
@@ -140,13 +141,16 @@ mod tests {
             };
             assert_eq!(set.voxels().collect::<Vec<_>>(), expected);
             assert_eq!(set.len(), expected.len());
-            let [j, k] = [span(14), span(11)].map(|span| span.start);
-            let columns = span(200);
-            let found: Vec<_> = set.in_row(j, k, &columns).collect();
-            let in_row = expected.iter().enumerate();
-            let in_row = in_row.filter(|(_, at)| columns.contains(&at[0]) && [at[1], at[2]] == [j, k]);
-            assert_eq!(found, in_row.map(|(place, at)| (place, at[0])).collect::<Vec<_>>());
+            let columns = span(150);
+            for (j, k) in (0..15).flat_map(|j| (0..12).map(move |k| (j, k))) {
+                let in_row = expected.iter().enumerate();
+                let in_row = in_row.filter(|(_, at)| columns.contains(&at[0]) && [at[1], at[2]] == [j, k]);
+                let in_row: Vec<_> = in_row.map(|(place, at)| (place, at[0])).collect();
+                assert_eq!(set.in_row(j, k, &columns).collect::<Vec<_>>(), in_row);
+                found += in_row.len();
+            }
         }
+        assert!(found > 1000, "{found}");
     }
 
     #[test]
