@@ -2,9 +2,9 @@
 //!
 //! A constraint declares `struct Params` (scalars only) and
 //! `fn eval(x: array<vec3f, N>, p: Params) -> Eval`. It may call `exact` and `exact3`, and set
-//! `inverse_reach_squared` and `unit_gradients`. It must not declare the names of a joined source:
-//! `N`, `Eval`, `hidden_zero`, `inverse_reach_squared`, `unit_gradients`, `exact`, `exact3`,
-//! `Settings`, `is_finite`, `quotient_or_zero`, `multiplier_change`, `multiplier_of`,
+//! `inverse_reach_squared`, `unit_gradients`, `along` and `along_length`. It must not declare the
+//! names of a joined source: these four, `N`, `Eval`, `hidden_zero`, `exact`, `exact3`,
+//! `Settings`, `is_finite`, `quotient_or_zero`, `multiplier_fraction`, `multiplier_of`,
 //! `keep_multiplier`, `stiffness_of`, `vertices`, `settings`, `VertexForce`, `VertexEntries`,
 //! `forces`, `shape`, `entries`, `ranges`, `tuples`, `params`, `stiffness`, `multipliers`,
 //! `points`, `found`, `inverse_rest_size`, `workgroup_sums`, `sums` and the entry points.

@@ -81,12 +81,12 @@ impl fmt::Display for Alteration {
 }
 
 /// Returns the source of a constraint whose `eval` ends with `statements`, which may change
-/// `found`.
+/// `found`. A projection then reads the gradients in `found`.
 pub(crate) fn wrapped(constraint: &str, statements: &str) -> String {
     let original = renamed(constraint, "eval", "unaltered_eval");
     format!(
         "{original}\nfn eval(x: array<vec3f, N>, p: Params) -> Eval {{\n    var found = unaltered_eval(x, p);\n    \
-         {statements}\n    return found;\n}}\n"
+         unit_gradients = false;\n    {statements}\n    return found;\n}}\n"
     )
 }
 
@@ -130,7 +130,6 @@ impl Choice for WrongGradient {
 impl<C: Constraint<N>, A: Choice, const N: usize> Constraint<N> for Altered<C, A> {
     const NAME: &'static str = C::NAME;
     const WGSL: &'static str = C::WGSL;
-    const UNIT_GRADIENTS: bool = C::UNIT_GRADIENTS;
     type Params<T: Real> = C::Params<T>;
     type Material = C::Material;
 

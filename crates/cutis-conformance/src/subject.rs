@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use cutis_constraints::{Constraint, Eval, Params, Scalar};
+use cutis_constraints::{Constraint, Eval, Params, Scalar, UnitGradients};
 use nalgebra::Point3;
 
 use crate::random::Random;
@@ -155,6 +155,11 @@ impl<const N: usize> Case<N> {
     /// Returns the value and gradients, computed in the number type `T`.
     pub fn eval<C: Constraint<N>, T: Scalar>(&self) -> Eval<T, N> {
         C::eval(&self.positions(), &self.params::<C, T>())
+    }
+
+    /// Returns the gradients of length 1, if the constraint has such gradients.
+    pub(crate) fn unit_gradients<C: Constraint<N>, T: Scalar>(&self) -> Option<UnitGradients<T, N>> {
+        C::unit_gradients(&self.positions(), &self.params::<C, T>())
     }
 
     /// Returns the reference size for errors of the value: the larger of the rest size and the

@@ -16,6 +16,32 @@ pub struct Eval<T, const N: usize> {
     pub grad: [Vector3<T>; N],
 }
 
+/// Value and gradient of a constraint whose gradients have the length 1, before the division that
+/// gives them this length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitGradients<T, const N: usize> {
+    /// `C(x)`, as in [`Eval`].
+    pub c: T,
+    /// Vectors in the directions of the gradients. All have the same length.
+    pub along: [Vector3<T>; N],
+    /// The length of these vectors. Where it is 0, the gradients are undefined.
+    pub length: T,
+}
+
+impl<T: Real, const N: usize> UnitGradients<T, N> {
+    /// Divides by the length. The gradients are 0 where the length is.
+    #[inline(always)]
+    pub fn eval(self) -> Eval<T, N> {
+        let zero = T::zero();
+        let inverse = (T::one() / self.length).select(self.length.simd_gt(zero), zero);
+        let mut grad = self.along;
+        for i in 0..N {
+            grad[i] *= inverse;
+        }
+        Eval { c: self.c, grad }
+    }
+}
+
 /// The parameters of one constraint: a flat array of `K` scalars. Storage, upload to a GPU and SIMD
 /// lanes therefore need no derive, no padding rule and no `unsafe`.
 pub trait Params<T>: Copy + Debug + Send + Sync + PartialEq + AsRef<[T]> {
@@ -103,8 +129,9 @@ impl<T: Copy + Debug + Send + Sync + PartialEq + Zero, const K: usize> Params<T>
 ///   it out in both languages, or pass the terms through `exact` (a scalar) or `exact3` (a vector).
 ///   These functions return their argument and no optimizer can see through them.
 /// - If the type implements [`inverse_reach_squared`](Constraint::inverse_reach_squared), `eval`
-///   sets the private variable of that name. With
-///   [`UNIT_GRADIENTS`](Constraint::UNIT_GRADIENTS), `eval` sets `unit_gradients = true`.
+///   sets the private variable of that name. If it implements
+///   [`unit_gradients`](Constraint::unit_gradients), `eval` sets `unit_gradients = true`, and the
+///   vectors and their length in the private variables `along` and `along_length`.
 ///
 /// The test battery in the crate `cutis-conformance` compares the two languages.
 ///
@@ -144,10 +171,6 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     const NAME: &'static str;
     /// `struct Params` and `fn eval` in WGSL: the twin of [`eval`](Self::eval).
     const WGSL: &'static str;
-    /// True if all gradients have the length 1 or, where they are undefined, all are 0, so that
-    /// nothing moves. False by default. A projection then takes `Σ w|∇C|²` as `Σ w`, which saves
-    /// time.
-    const UNIT_GRADIENTS: bool = false;
     /// The scalars of one constraint, `[T; K]`.
     type Params<T: Real>: Params<T>;
     /// Material values that the caller chooses when a constraint is built from its rest shape, such
@@ -157,6 +180,15 @@ pub trait Constraint<const N: usize>: Send + Sync + 'static {
     fn from_rest<T: Real>(x: &[Point3<T>; N], material: &Self::Material) -> Self::Params<T>;
     /// Returns `C` and `∇C` at `x` (positions in meters).
     fn eval<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Eval<T, N>;
+    /// Returns `C` and `∇C` at `x` if all gradients have the length 1 wherever they are defined.
+    /// `None` by default. [`eval`](Self::eval) is then the [`eval`](UnitGradients::eval) of the
+    /// result. A projection takes `Σ w|∇C|²` as `Σ w` and divides once, by `length·Σ w`, which
+    /// saves time. It has no [limit](Self::inverse_reach_squared).
+    #[inline(always)]
+    fn unit_gradients<T: Real>(x: &[Point3<T>; N], params: &Self::Params<T>) -> Option<UnitGradients<T, N>> {
+        let _ = (x, params);
+        None
+    }
     /// Returns `1/r²` in 1/m², where `r` is the longest distance that a projection may move along
     /// the gradient at `x`. `None` means no limit, and is the default.
     ///

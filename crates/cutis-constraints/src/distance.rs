@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::{Constraint, Eval, Real};
+use crate::{Constraint, Eval, Real, UnitGradients};
 
 /// A constraint that keeps the length of an edge.
 ///
@@ -34,7 +34,6 @@ impl Default for DistanceMaterial {
 impl Constraint<2> for Distance {
     const NAME: &'static str = "distance";
     const WGSL: &'static str = cutis_shaders::constraints::DISTANCE;
-    const UNIT_GRADIENTS: bool = true;
     type Params<T: Real> = [T; 1];
     type Material = DistanceMaterial;
 
@@ -44,16 +43,24 @@ impl Constraint<2> for Distance {
     }
 
     #[inline(always)]
-    fn eval<T: Real>([x1, x2]: &[Point3<T>; 2], &[rest_length]: &[T; 1]) -> Eval<T, 2> {
-        let d = x1 - x2;
-        let length = d.dot(&d).simd_sqrt();
-        let zero = T::zero();
-        let inverse = (T::one() / length).select(length.simd_gt(zero), zero);
-        let direction = d * inverse;
-        Eval { c: length - rest_length, grad: [direction, -direction] }
+    fn eval<T: Real>(x: &[Point3<T>; 2], params: &[T; 1]) -> Eval<T, 2> {
+        difference(x, params).eval()
+    }
+
+    #[inline(always)]
+    fn unit_gradients<T: Real>(x: &[Point3<T>; 2], params: &[T; 1]) -> Option<UnitGradients<T, 2>> {
+        Some(difference(x, params))
     }
 
     fn rest_size<T: Real>(&[rest_length]: &[T; 1]) -> T {
         rest_length
     }
+}
+
+/// The gradients are along the difference of the points.
+#[inline(always)]
+fn difference<T: Real>([x1, x2]: &[Point3<T>; 2], &[rest_length]: &[T; 1]) -> UnitGradients<T, 2> {
+    let d = x1 - x2;
+    let length = d.dot(&d).simd_sqrt();
+    UnitGradients { c: length - rest_length, along: [d, -d], length }
 }

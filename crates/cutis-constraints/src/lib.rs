@@ -55,7 +55,7 @@ mod thread;
 mod triangle;
 mod volume;
 
-pub use constraint::{Constraint, Eval, Params};
+pub use constraint::{Constraint, Eval, Params, UnitGradients};
 pub use distance::{Distance, DistanceMaterial};
 pub use lanes::{LaneTask, Lanes, SimdLevel};
 pub use lip_adhesion::LipAdhesion;

@@ -1,6 +1,6 @@
 //! The projection of one constraint. Every CPU backend runs this function.
 
-use cutis_constraints::{Constraint, Real};
+use cutis_constraints::{Constraint, Real, UnitGradients};
 use nalgebra::{Point3, Vector3, convert};
 use simba::simd::SimdBool;
 
@@ -8,10 +8,16 @@ use crate::Step;
 
 /// A formula for the multiplier of a constraint's gradients.
 pub trait Rule<T: Real>: Copy + Send + Sync {
-    /// Returns `Δλ` for the value `c`, the weighted square of the gradients `Σ w|∇C|²`, the
-    /// stiffness of the constraint and its accumulated multiplier. The result is zero where the
-    /// quotient is undefined or overflows.
-    fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T;
+    /// Returns numerator and denominator of `Δλ` for the value `c`, the weighted square of the
+    /// gradients `Σ w|∇C|²`, the stiffness of the constraint and its accumulated multiplier.
+    fn fraction(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> (T, T);
+
+    /// Returns `Δλ`. It is zero where the quotient is undefined or overflows.
+    #[inline(always)]
+    fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T {
+        let (numerator, denominator) = self.fraction(c, weighted_square, stiffness, multiplier);
+        quotient_or_zero(numerator, denominator)
+    }
 }
 
 /// The PBD formula `Δλ = −s·C / Σ w|∇C|²` (Müller et al. 2007, eqs. 8–9) with the stiffness `s`.
@@ -28,27 +34,27 @@ pub struct Xpbd<T> {
 
 impl<T: Real> Rule<T> for Pbd {
     #[inline(always)]
-    fn multiplier(self, c: T, weighted_square: T, stiffness: T, _multiplier: T) -> T {
-        quotient_or_zero(-(stiffness * c), weighted_square)
+    fn fraction(self, c: T, weighted_square: T, stiffness: T, _multiplier: T) -> (T, T) {
+        (-(stiffness * c), weighted_square)
     }
 }
 
 impl<T: Real> Rule<T> for Xpbd<T> {
     #[inline(always)]
-    fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T {
+    fn fraction(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> (T, T) {
         let compliance = stiffness * self.inverse_h_squared;
-        quotient_or_zero(-c - compliance * multiplier, weighted_square + compliance)
+        (-c - compliance * multiplier, weighted_square + compliance)
     }
 }
 
 /// Chooses the formula at run time, so that the loops over constraints are compiled once for both.
 impl<T: Real> Rule<T> for Step<T> {
     #[inline(always)]
-    fn multiplier(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> T {
+    fn fraction(self, c: T, weighted_square: T, stiffness: T, multiplier: T) -> (T, T) {
         match self {
-            Self::Pbd => Pbd.multiplier(c, weighted_square, stiffness, multiplier),
+            Self::Pbd => Pbd.fraction(c, weighted_square, stiffness, multiplier),
             Self::Xpbd { inverse_h_squared } => {
-                Xpbd { inverse_h_squared }.multiplier(c, weighted_square, stiffness, multiplier)
+                Xpbd { inverse_h_squared }.fraction(c, weighted_square, stiffness, multiplier)
             }
         }
     }
@@ -95,10 +101,21 @@ pub fn project<C: Constraint<N>, const N: usize, T: Real, R: Rule<T>>(
     stiffness: T,
     multiplier: T,
 ) -> Projection<T, N> {
+    if let Some(UnitGradients { c, along, length }) = C::unit_gradients(x, params) {
+        let mut weight = w[0];
+        for i in 1..N {
+            weight += w[i];
+        }
+        let (numerator, denominator) = rule.fraction(c, weight, stiffness, multiplier);
+        // Δλ divided by the length of the vectors.
+        let factor = quotient_or_zero(numerator, denominator * length);
+        let corrections = std::array::from_fn(|i| along[i] * (w[i] * factor));
+        return Projection { corrections, multiplier: factor * length };
+    }
     let eval = C::eval(x, params);
     let mut weighted_square: T = convert(0.0);
     for i in 0..N {
-        let part = if C::UNIT_GRADIENTS { w[i] } else { w[i] * eval.grad[i].dot(&eval.grad[i]) };
+        let part = w[i] * eval.grad[i].dot(&eval.grad[i]);
         weighted_square = if i == 0 { part } else { weighted_square + part };
     }
     if !C::is_in_reach(eval.c, params).all()

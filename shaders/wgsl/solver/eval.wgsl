@@ -9,8 +9,11 @@ struct Eval {
 // means no limit.
 var<private> inverse_reach_squared: f32;
 
-// True if every gradient has the length 1 or 0. An `eval` may set it.
+// True if every gradient has the length 1 wherever it is defined. An `eval` may set it. It then
+// also sets vectors in the directions of the gradients, and their length.
 var<private> unit_gradients: bool;
+var<private> along: array<vec3f, N>;
+var<private> along_length: f32;
 
 // Always zero, but compilers cannot know it: entry points set it to 1 if there are no constraints.
 var<private> hidden_zero: u32;

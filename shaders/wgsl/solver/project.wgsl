@@ -22,7 +22,11 @@ fn project(@builtin(global_invocation_id) id: vec3u) {
     hidden_zero = select(0u, 1u, arrayLength(&tuples) == 0u);
     var found = eval(x, params[k]);
     for (var i = 0u; i < N; i++) {
-        found.grad[i] = exact3(found.grad[i]);
+        if (unit_gradients) {
+            found.grad[i] = exact3(along[i]);
+        } else {
+            found.grad[i] = exact3(found.grad[i]);
+        }
     }
     var weighted_square = 0.0;
     for (var i = 0u; i < N; i++) {
@@ -35,8 +39,10 @@ fn project(@builtin(global_invocation_id) id: vec3u) {
     }
     weighted_square = max(weighted_square, lightest * (found.c * inverse_reach_squared * found.c));
     let multiplier = multiplier_of(k);
-    let change = multiplier_change(found.c, weighted_square, stiffness_of(k), multiplier);
-    keep_multiplier(k, multiplier + change);
+    let fraction = multiplier_fraction(found.c, weighted_square, stiffness_of(k), multiplier);
+    let length = select(1.0, along_length, unit_gradients);
+    let change = quotient_or_zero(fraction.x, fraction.y * length);
+    keep_multiplier(k, multiplier + exact(change * length));
     for (var i = 0u; i < N; i++) {
         vertices[tuple[i]] = vec4f(x[i] + found.grad[i] * (w[i] * change), w[i]);
     }

@@ -110,6 +110,13 @@ pub const MUTATIONS: &[Mutation] = &[
     ),
     mutation(
         Conformance,
+        "distance, WGSL: both vectors along the gradients point the same way",
+        "shaders/wgsl/constraints/distance.wgsl",
+        "(d, -d)",
+        "(d, d)",
+    ),
+    mutation(
+        Conformance,
         "distance, WGSL: sign of the rest length",
         "shaders/wgsl/constraints/distance.wgsl",
         "length - p.rest_length",
@@ -204,8 +211,8 @@ pub const MUTATIONS: &[Mutation] = &[
         Conformance,
         "distance, Rust: both gradients point the same way",
         "crates/cutis-constraints/src/distance.rs",
-        "[direction, -direction]",
-        "[direction, direction]",
+        "[d, -d]",
+        "[d, d]",
     ),
     mutation(
         Conformance,

@@ -23,9 +23,9 @@ pub const STABILITY: &[Mutation] = &[
     mutation(
         Stability,
         "the guard of coincident points is left out, Rust",
-        "crates/cutis-constraints/src/distance.rs",
-        ".select(length.simd_gt(zero), zero)",
-        ".select(length.simd_ge(zero), zero)",
+        "crates/cutis-constraints/src/constraint.rs",
+        ".select(self.length.simd_gt(zero), zero)",
+        ".select(self.length.simd_ge(zero), zero)",
     ),
     mutation(
         Stability,

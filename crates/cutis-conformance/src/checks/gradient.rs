@@ -1,6 +1,6 @@
 //! Check: the gradient is the derivative of the value.
 
-use cutis_constraints::{Constraint, Eval};
+use cutis_constraints::{Constraint, Eval, UnitGradients};
 use nalgebra::Vector3;
 
 use crate::alteration::{Alteration, FACTOR};
@@ -15,7 +15,7 @@ const STEP: f64 = 1e-4;
 /// The gradient agrees with central finite differences of fourth order in `f64` to 1e-6 of its own
 /// length.
 ///
-/// Gradients with [`Constraint::UNIT_GRADIENTS`] have the length 1.
+/// [`Constraint::unit_gradients`] gives the same gradients, and they have the length 1.
 ///
 /// For a constraint with [`direction_only`](Subject::direction_only), only the directions are
 /// compared. Controls: each gradient off by 1e-3, and swapped neighbors, must be noticed.
@@ -35,20 +35,33 @@ pub fn gradient<C: Constraint<N>, const N: usize>(subject: &Subject<C, N>) -> Re
     for alteration in alterations.filter(|_| N > 1 || !subject.direction_only) {
         report.control(alteration, error(&|eval| alteration.apply(eval)), 100.0 * BOUND);
     }
-    if C::UNIT_GRADIENTS {
-        unit_gradients::<C, N>(&cases, &mut report);
-    }
+    unit_gradients::<C, N>(&cases, &mut report);
     report
 }
 
-/// Every gradient has the length that [`Constraint::UNIT_GRADIENTS`] promises. Control: lengths off
-/// by 1e-3.
+/// The result of [`Constraint::unit_gradients`], if there is one, has the value and the gradients
+/// of `eval`, and its vectors have the length that it gives. Control: a length off by 1e-3.
 fn unit_gradients<C: Constraint<N>, const N: usize>(cases: &[Case<N>], report: &mut Report) {
-    let lengths = cases.iter().flat_map(|case| case.eval::<C, f64>().grad.map(|g| g.norm()));
-    let lengths: Vec<f64> = lengths.filter(|&length| length != 0.0).collect();
-    let error = |factor: f64| lengths.iter().map(|length| (length * factor - 1.0).abs()).fold(0.0, largest);
-    report.at_most("lengths of unit gradients, minus 1", error(1.0), BOUND);
-    report.control("lengths × 1.001", error(FACTOR), 100.0 * BOUND);
+    let pairs: Vec<_> = cases
+        .iter()
+        .filter_map(|case| Some((case.eval::<C, f64>(), case.unit_gradients::<C, f64>()?)))
+        .collect();
+    if pairs.is_empty() {
+        return;
+    }
+    let error = |factor: f64| {
+        let of_pair = |(eval, found): &(Eval<f64, N>, UnitGradients<f64, N>)| {
+            let length = found.length * factor;
+            let of_vertex = |(along, grad): (&Vector3<f64>, &Vector3<f64>)| {
+                largest((along / length - grad).norm(), (along.norm() / length - 1.0).abs())
+            };
+            let of_vertices = found.along.iter().zip(&eval.grad).map(of_vertex).fold(0.0, largest);
+            if eval.c == found.c { of_vertices } else { f64::INFINITY }
+        };
+        pairs.iter().filter(|(_, found)| found.length != 0.0).map(of_pair).fold(0.0, largest)
+    };
+    report.at_most("unit gradients against gradients", error(1.0), BOUND);
+    report.control("their length × 1.001", error(FACTOR), 100.0 * BOUND);
 }
 
 /// Returns the central differences of the value in every coordinate.
