@@ -4,9 +4,8 @@
 //! number of vertices, and `Groups::verify` checks that no two constraints of one color share a
 //! vertex. The fields of a batch are private and never change. (2) [`Colored`] borrows the vertices
 //! mutably for its whole lifetime, so that no other code reads or moves them. (3) The chunks are
-//! ranges of one color that do not overlap, and atomic counters that only grow hand out each chunk
-//! once: a counter per share, where the shares are ranges that do not overlap. So two
-//! threads never access the same vertex or the same multiplier. (4) A batch finds the rows of its
+//! ranges of one color that do not overlap, and [`Shares`] hand out each chunk once. So two threads
+//! never access the same vertex or the same multiplier. (4) A batch finds the rows of its
 //! runs by comparison of the checked indices, and reads adjacent vertices only where each of them
 //! is a vertex of a constraint of the chunk. [`Columns`](crate::Columns) have a place for each
 //! vertex.
@@ -30,8 +29,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use cutis_constraints::{LaneTask, Lanes, Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
-use crate::batch::{ConstraintChunk, Load, ROW, Store, TeamForces, VertexChunk};
+use crate::batch::{ConstraintChunk, Load, ROW, RUNS, Store, TeamForces, VertexChunk};
 use crate::loads::load_of;
+use crate::shares::{Shares, chunk};
 use crate::teams::{MOST_NEIGHBORS, Neighborhood, TEAM, TEAM_CHUNK};
 use crate::{ConstraintColor, ConstraintSet, Descent, Kind, Step, System, Vertex, VertexColor, VertexForce};
 
@@ -40,9 +40,6 @@ pub(crate) use shared::{SharedStore, SharedVertices};
 /// Number of constraints of a chunk. Results do not depend on it. Under Miri chunks are small, so
 /// that a tiny body has several.
 const CHUNK: usize = if cfg!(miri) { 8 } else { 1024 };
-
-/// Largest number of shares. More threads than that work on the same shares.
-const MOST_SHARES: usize = 16;
 
 /// Number of vertices of a chunk that are in no team. Results do not depend on it.
 const VERTEX_CHUNK: usize = if cfg!(miri) { 4 } else { 128 };
@@ -74,27 +71,22 @@ const VERTEX_CHUNK: usize = if cfg!(miri) { 4 } else { 128 };
 pub struct Colored<'a, T: Scalar> {
     set: &'a dyn ConstraintSet<T>,
     level: SimdLevel,
-    range: Range<usize>,
     step: Step<T>,
-    /// Number of shares, and for each of them the number of chunks that were handed out.
-    shares: usize,
-    next: [Counter; MOST_SHARES],
+    shares: Shares<RUNS>,
     vertices: SharedStore<'a, T>,
     multipliers: *mut T,
     keeps_multipliers: bool,
     borrow: PhantomData<&'a mut [T]>,
 }
 
-/// A counter with a cache line of its own, so that threads do not wait for each other's counters.
-#[derive(Default)]
-#[repr(align(128))]
-struct Counter(AtomicUsize);
-
 // SAFETY: threads that share a `Colored` can only take distinct chunks, which access distinct
 // vertices and multipliers (see the top of the file). `T` is plain data that any thread may use.
 unsafe impl<T: Scalar> Sync for Colored<'_, T> {}
 
 impl<'a, T: Scalar> Colored<'a, T> {
+    /// Largest number of constraints of a chunk.
+    pub const CHUNK: usize = CHUNK;
+
     /// Prepares a color for `workers` threads, with the SIMD lanes of `level`.
     ///
     /// # Panics
@@ -112,10 +104,9 @@ impl<'a, T: Scalar> Colored<'a, T> {
         Self {
             set,
             level,
-            range,
             step,
-            shares: workers.clamp(1, MOST_SHARES),
-            next: Default::default(),
+            // A share has the same part of the body in each run, and starts with a whole row.
+            shares: Shares::new(set.runs(range), workers, CHUNK, ROW),
             vertices: SharedStore::new(vertices),
             multipliers: multipliers.as_mut_ptr(),
             keeps_multipliers,
@@ -124,19 +115,11 @@ impl<'a, T: Scalar> Colored<'a, T> {
     }
 
     /// Takes a free chunk and projects it. Returns `false` if no chunk is left.
-    ///
-    /// Each worker first takes the chunks of its own share, which is the same part of every color.
-    /// The vertices there stay in the cache of its processor.
     pub fn project_next_chunk(&self, worker: usize) -> bool {
-        let mut shares = (0..self.shares).map(|n| (worker % self.shares + n) % self.shares);
-        let next = |share: usize| {
-            let number = self.next[share].0.fetch_add(1, Ordering::Relaxed);
-            chunk(number, &self.share(share), CHUNK)
-        };
-        let Some(range) = shares.find_map(next) else { return false };
+        let Some(range) = self.shares.next(worker) else { return false };
         let multipliers: &mut [T] = if self.keeps_multipliers {
             // SAFETY: the range lies within the set, and there is one multiplier per constraint of
-            // the set. The counter hands the range out once, so that no other slice overlaps it.
+            // the set. The shares hand the range out once, so that no other slice overlaps it.
             unsafe { std::slice::from_raw_parts_mut(self.multipliers.add(range.start), range.len()) }
         } else {
             &mut []
@@ -146,18 +129,9 @@ impl<'a, T: Scalar> Colored<'a, T> {
         true
     }
 
-    /// The constraints of a share: an equal part of the color, which starts with a whole row.
-    fn share(&self, share: usize) -> Range<usize> {
-        let start = |share: usize| match share == self.shares {
-            true => self.range.end,
-            false => self.range.start + self.range.len() * share / self.shares / ROW * ROW,
-        };
-        start(share)..start(share + 1)
-    }
-
     /// Returns the number of chunks, which is an upper bound of the threads that can help.
     pub fn chunks(&self) -> usize {
-        self.range.len().div_ceil(CHUNK)
+        self.shares.chunks()
     }
 }
 
@@ -328,13 +302,6 @@ fn vector<L: Lanes<T>, T: Scalar>(component: impl Fn(usize, usize) -> T) -> Vect
         L::from_lanes(|lane| component(lane, 1)),
         L::from_lanes(|lane| component(lane, 2)),
     )
-}
-
-/// Chunk `number` of `range`, which has `size` elements, or the rest. `None` after the last one.
-fn chunk(number: usize, range: &Range<usize>, size: usize) -> Option<Range<usize>> {
-    let start = range.start + number.saturating_mul(size).min(range.len());
-    let end = range.end.min(start.saturating_add(size));
-    (start < end).then_some(start..end)
 }
 
 #[cfg(test)]

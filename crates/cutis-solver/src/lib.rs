@@ -66,6 +66,7 @@ mod resting;
 mod schedule;
 mod set;
 mod settings;
+mod shares;
 mod simulation;
 mod solver;
 mod step_profile;

@@ -3,6 +3,7 @@
 
 mod access;
 mod project;
+mod row;
 mod runs;
 mod set;
 mod tiles;
@@ -19,11 +20,12 @@ use crate::colored::{SharedStore, SharedVertices};
 use crate::teams::TeamConstraints;
 use crate::{SolverError, Step, Stiffness, Vertex, VertexForce, VertexStore};
 
+use row::Row;
 use runs::Runs;
 use tiles::Tiles;
 
 pub use access::{LaneAccess, Load, Store};
-pub(crate) use runs::{QUAD, ROW};
+pub(crate) use runs::{QUAD, ROW, RUNS};
 pub use vertex_force::TeamForces;
 
 /// Upper bound of the number of SIMD lanes over all levels and number types.
@@ -61,6 +63,10 @@ pub trait Project<T: Scalar> {
     /// Projects with SIMD lanes while other threads project other constraints. No two constraints
     /// that are projected at the same time may share a vertex.
     fn project_shared(&self, level: SimdLevel, chunk: ConstraintChunk<'_, T, SharedStore<'_, T>>);
+    /// Divides the constraints of a color in one tile by the length of the pieces in which they are
+    /// projected. Each of the ranges is in the order of the body, so that equal parts of all ranges
+    /// are about the same part of the body.
+    fn runs(&self, range: Range<usize>) -> [Range<usize>; RUNS];
     /// Adds the forces of this kind on each vertex, one vertex after the other.
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>);
     /// Adds the force of each constraint to all of its vertices, one constraint after the other.
@@ -82,9 +88,8 @@ pub(crate) struct Batch<C, const N: usize, T, P> {
     offsets: Vec<u32>,
     tiles: Tiles,
     runs: Runs,
-    /// The vertices of the first constraint of each long piece of `runs`, so that loops over pieces
-    /// read less memory.
-    rows: Vec<[u32; N]>,
+    /// The long pieces of `runs`.
+    rows: Vec<Row<N>>,
     indices: Vec<[u32; N]>,
     params: Vec<P>,
     stiffness: Stiffness<T>,
@@ -129,14 +134,16 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             let start = part.start;
             runs::arrange(&mut order[part], start, indices, &mut runs, &mut scratch);
         }
+        let indices: Vec<_> = order.iter().map(|&k| indices[k as usize]).collect();
+        let params: Vec<_> = order.iter().map(|&k| params[k as usize]).collect();
         Ok(Self {
             vertex_count,
             offsets: groups.offsets.clone(),
             tiles,
-            rows: runs.rows(count).map(|place| indices[order[place] as usize]).collect(),
+            rows: row::rows(runs.rows(count), &indices, &params),
             runs,
-            indices: order.iter().map(|&k| indices[k as usize]).collect(),
-            params: order.iter().map(|&k| params[k as usize]).collect(),
+            indices,
+            params,
             stiffness: stiffness.validated(kind, count, &order)?,
             kind: PhantomData,
         })

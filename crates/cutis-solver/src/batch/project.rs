@@ -5,7 +5,7 @@ use std::ops::Range;
 use cutis_constraints::{Constraint, LaneTask, Lanes, Params, Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
-use super::runs::{QUAD, ROW};
+use super::runs::{QUAD, ROW, RUNS};
 use super::{Batch, ConstraintChunk, LaneAccess, MAX_LANES, Project, Store, TeamForces, VertexChunk};
 use crate::colored::{SharedStore, SharedVertices};
 use crate::teams::TeamConstraints;
@@ -105,20 +105,21 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         if range.is_empty() {
             return;
         }
-        let first = self.runs.rows_before(range.start);
-        let rows = self.rows[first..].iter().zip(self.params[range.clone()].chunks(ROW));
+        let rows = &self.rows[self.runs.rows_before(range.start)..];
+        let starts = range.clone().step_by(ROW);
         let same = [T::zero(); ROW];
         let (same, each) = match self.stiffness.values() {
             Values::Uniform(value) => (same.map(|_| *value), &[][..]),
-            Values::Each(values) => (same, &values[range]),
+            Values::Each(values) => (same, &values[range.clone()]),
         };
         let mut each = each.chunks(ROW);
         let mut multipliers = multipliers.chunks_mut(ROW);
-        for (row, params) in rows {
+        for (row, start) in rows.iter().zip(starts) {
+            let params = &self.params[row.params as usize..][..ROW.min(range.end - start)];
             let stiffness = each.next().unwrap_or(&same);
             let multipliers = if KEEPS { multipliers.next().unwrap_or_default() } else { &mut [] };
             for place in (0..params.len()).step_by(L::LANES) {
-                let tuples = &[row.map(|vertex| vertex + 2 * place as u32)];
+                let tuples = &[row.first.map(|vertex| vertex + 2 * place as u32)];
                 let params = &params[place..place + L::LANES];
                 let stiffness = L::from_slice(&stiffness[place..]);
                 let group = Group { tuples, params, stiffness };
@@ -270,6 +271,10 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Project<T> for Batch<C, N, T, 
                 T::in_lanes(level, ProjectTask { batch: self, chunk });
             }
         }
+    }
+
+    fn runs(&self, range: Range<usize>) -> [Range<usize>; RUNS] {
+        self.runs.divide(range)
     }
 
     fn vertex_forces(&self, chunk: VertexChunk<'_, T, &[Vertex<T>]>) {

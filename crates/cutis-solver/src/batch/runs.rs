@@ -15,6 +15,9 @@ pub(crate) const ROW: usize = super::MAX_LANES;
 /// Number of constraints of a short piece, for what is left of a row.
 pub(crate) const QUAD: usize = 4;
 
+/// Largest number of runs of a color in one tile: long pieces, short ones, and the rest.
+pub(crate) const RUNS: usize = 3;
+
 /// Constraints from `start` up to the start of the next run, in pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Run {
@@ -47,6 +50,19 @@ impl Runs {
             0 => (piece, range.start..end),
             place => (1, range.start..end.min(range.start + piece - place)),
         }
+    }
+
+    /// Divides constraints at the ends of runs. A color in one tile has at most [`RUNS`] runs. If
+    /// there are more, the constraints stay together in the first of the ranges.
+    pub(super) fn divide(&self, range: Range<usize>) -> [Range<usize>; RUNS] {
+        let mut start = range.start;
+        let parts = std::array::from_fn(|_| {
+            let end = self.part(start..range.end).1.end;
+            let part = start..end;
+            start = end;
+            part
+        });
+        if start == range.end { parts } else { [range.clone(), range.end..range.end, range.end..range.end] }
     }
 
     /// Returns the number of long pieces before the constraint at `place`, which is in a long
@@ -229,5 +245,22 @@ mod tests {
         assert_eq!(runs.part(104..132), (1, 104..116));
         assert_eq!(runs.part(118..119), (1, 118..119));
         assert_eq!(runs.part(3..120), (1, 3..100), "before the first run");
+    }
+
+    #[test]
+    fn a_color_is_divided_at_the_ends_of_its_runs() {
+        // Rows of 22 constraints: long pieces of 16, short ones of 4 and two others each.
+        let indices = rows::<2>((0..220).map(|k| 60 * (k / 22) + 2 * (k % 22)));
+        let mut order: Vec<u32> = (0..220).collect();
+        let (mut runs, mut scratch) = (Runs::default(), Scratch::default());
+        arrange(&mut order, 0, &indices, &mut runs, &mut scratch);
+        assert_eq!(runs.divide(0..220), [0..160, 160..192, 192..220]);
+        assert_eq!(runs.divide(16..160), [16..160, 160..160, 160..160]);
+        assert_eq!(runs.divide(7..7), [7..7, 7..7, 7..7]);
+        // A second tile, whose runs follow.
+        let mut order: Vec<u32> = (0..220).collect();
+        arrange(&mut order, 220, &indices, &mut runs, &mut scratch);
+        assert_eq!(runs.divide(220..440), [220..380, 380..412, 412..440]);
+        assert_eq!(runs.divide(0..440), [0..440, 440..440, 440..440]);
     }
 }
