@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use cutis_constraints::{Scalar, SimdLevel};
-use cutis_solver::{Colored, ColoredVertices, ConstraintColor, Execute, VertexBlock, VertexColor};
+use cutis_solver::{
+    Colored, ColoredVertices, ConstraintColor, Execute, Simulation, VertexBlock, VertexColor,
+};
 use rayon::prelude::*;
 
 /// Number of vertices that a thread processes at a time.
@@ -17,6 +19,15 @@ const CHUNKS_PER_THREAD: usize = 2;
 pub(crate) struct Parallel {
     pub(crate) threads: usize,
     pub(crate) level: SimdLevel,
+}
+
+/// Whether a second thread would get work in a pass. Otherwise a step is faster without waking one.
+pub(crate) fn is_shared<T: Scalar>(simulation: &Simulation<T>) -> bool {
+    let schedule = simulation.schedule();
+    let largest = schedule.sweeps.iter().map(|sweep| sweep.end - sweep.start).max().unwrap_or(0);
+    largest.div_ceil(Colored::<T>::CHUNK) >= 2 * CHUNKS_PER_THREAD
+        || simulation.system().vertices().len() > BLOCK
+        || !schedule.color_passes.is_empty()
 }
 
 impl<T: Scalar> Execute<T> for Parallel {

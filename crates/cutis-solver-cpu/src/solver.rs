@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::CpuError;
-use crate::parallel::Parallel;
+use crate::parallel::{Parallel, is_shared};
 
 /// Largest accepted number of threads. A larger number is most likely a mistake in the input.
 const MAX_THREADS: usize = 1024;
@@ -52,15 +52,18 @@ impl<T: Scalar> SolverCpu<T> {
         self.threads
     }
 
-    /// Runs frames on the threads of the pool. `wrap` may add timing to the executor.
+    /// Runs frames on the threads of the pool, or on this one if the body is small. `wrap` may add
+    /// timing to the executor.
     fn run<E: Execute<T>>(
         &mut self,
         frames: usize,
         wrap: impl FnOnce(Parallel) -> E + Send,
     ) -> Result<(), SolverError> {
-        let (simulation, threads, level) = (&mut self.simulation, self.threads, self.level);
+        let (simulation, level) = (&mut self.simulation, self.level);
+        let pool = self.pool.as_ref().filter(|_| is_shared(simulation));
+        let threads = if pool.is_some() { self.threads } else { 1 };
         let run = || simulation.run(frames, &wrap(Parallel { threads, level }));
-        match &self.pool {
+        match pool {
             Some(pool) => pool.install(run),
             None => run(),
         }
