@@ -1,9 +1,9 @@
 //! Time of one sweep over all edges and over all tetrahedra of a Kuhn lattice, as constraints per
 //! second, for each number of SIMD lanes that the processor has.
 //!
-//! Run `cargo bench -p cutis-solver-cpu`. With `CUTIS_BENCH_LARGE=1` the lattice has 129×129×76
-//! vertices instead of 65×65×38. The time of a frame includes one sweep and the two passes over the
-//! vertices.
+//! Run `cargo bench -p cutis-solver-cpu`. With `CUTIS_BENCH_SIZE="129 129 76"` the lattice has as
+//! many vertices along its axes instead of 65, 65 and 38. The time of a step includes one sweep and
+//! the two passes over the vertices.
 #![allow(missing_docs)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -12,6 +12,27 @@ use cutis_constraints::{Distance, SimdLevel, Volume};
 use cutis_solver::{Formulation, Settings, Solver, Stiffness, System, SystemBuilder};
 use cutis_solver_cpu::SolverCpu;
 use cutis_test_kit::Kuhn;
+
+/// The lattice, which the variable `CUTIS_BENCH_SIZE` may change: vertices along x, y and z.
+fn lattice() -> Kuhn {
+    let size = std::env::var("CUTIS_BENCH_SIZE").unwrap_or_else(|_| "65 65 38".into());
+    let size: Vec<usize> = size.split(' ').map(|n| n.parse().expect("a number of vertices")).collect();
+    Kuhn::new(size.try_into().expect("three numbers"), 0.1)
+}
+
+/// Settings of position-based dynamics with one iteration. Gravity is weak, so that the body keeps
+/// its shape however many frames are measured.
+fn projection() -> Settings {
+    Settings {
+        formulation: Formulation::Pbd,
+        dt_s: 0.005,
+        substeps: 1,
+        iterations: 1,
+        gravity_m_s2: [0.0, -0.01, 0.0],
+        damping_per_s: 0.0,
+        relaxation: 1.0,
+    }
+}
 
 fn builder(lattice: &Kuhn) -> SystemBuilder<f32> {
     let masses: Vec<f32> = lattice.positions.iter().map(|p| if p.x == 0.0 { 0.0 } else { 1.0 }).collect();
@@ -46,25 +67,15 @@ fn both(lattice: &Kuhn) -> System<f32> {
 }
 
 fn sweeps(criterion: &mut Criterion) {
-    let large = std::env::var_os("CUTIS_BENCH_LARGE").is_some();
-    let lattice = Kuhn::new(if large { [129, 129, 76] } else { [65, 65, 38] }, 0.1);
+    let lattice = lattice();
     type Case = (&'static str, fn(&Kuhn) -> System<f32>, usize);
     let cases: [Case; 2] = [("edges", edges, lattice.edges.len()), ("tets", tets, lattice.tets.len())];
     for (name, system, count) in cases {
         let mut group = criterion.benchmark_group(name);
         group.throughput(Throughput::Elements(count as u64)).sample_size(20);
         for threads in [1, 2] {
-            let settings = Settings {
-                formulation: Formulation::Pbd,
-                dt_s: 0.005,
-                substeps: 1,
-                iterations: 1,
-                gravity_m_s2: [0.0, -9.81, 0.0],
-                damping_per_s: 0.0,
-                relaxation: 1.0,
-            };
             for level in SimdLevel::available() {
-                let solver = SolverCpu::new(system(&lattice), settings, Some(threads));
+                let solver = SolverCpu::new(system(&lattice), projection(), Some(threads));
                 let mut solver = solver.expect("a valid system").with_level(level);
                 let name = format!("{} lanes, threads", level.lanes());
                 group.bench_function(BenchmarkId::new(name, threads), |bencher| {
@@ -76,10 +87,27 @@ fn sweeps(criterion: &mut Criterion) {
     }
 }
 
+/// Time of a frame of five iterations over edges and tetrahedra, as in the comparison with other
+/// programs.
+fn frames(criterion: &mut Criterion) {
+    let lattice = lattice();
+    let mut group = criterion.benchmark_group("frame");
+    group.throughput(Throughput::Elements(lattice.positions.len() as u64)).sample_size(20);
+    for threads in [1, 2] {
+        let settings = Settings { iterations: 5, ..projection() };
+        let edges = with_edges(builder(&lattice), &lattice, Stiffness::pbd(1.0));
+        let system = with_tets(edges, &lattice, Stiffness::pbd(1.0)).build();
+        let mut solver = SolverCpu::new(system, settings, Some(threads)).expect("a valid system");
+        group.bench_function(BenchmarkId::new("threads", threads), |bencher| {
+            bencher.iter(|| solver.step(1).expect("finite"));
+        });
+    }
+    group.finish();
+}
+
 /// Time of one iteration of vertex block descent over edges and tetrahedra, as vertices per second.
 fn descent(criterion: &mut Criterion) {
-    let large = std::env::var_os("CUTIS_BENCH_LARGE").is_some();
-    let lattice = Kuhn::new(if large { [129, 129, 76] } else { [65, 65, 38] }, 0.1);
+    let lattice = lattice();
     let mut group = criterion.benchmark_group("descent");
     group.throughput(Throughput::Elements(lattice.positions.len() as u64)).sample_size(20);
     for threads in [1, 2] {
@@ -102,5 +130,5 @@ fn descent(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, sweeps, descent);
+criterion_group!(benches, sweeps, frames, descent);
 criterion_main!(benches);
