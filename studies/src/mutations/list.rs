@@ -110,13 +110,6 @@ pub const MUTATIONS: &[Mutation] = &[
     ),
     mutation(
         Conformance,
-        "distance, WGSL: both vectors along the gradients point the same way",
-        "shaders/wgsl/constraints/distance.wgsl",
-        "(d, -d)",
-        "(d, d)",
-    ),
-    mutation(
-        Conformance,
         "distance, WGSL: sign of the rest length",
         "shaders/wgsl/constraints/distance.wgsl",
         "length - p.rest_length",
