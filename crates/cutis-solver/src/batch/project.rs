@@ -187,15 +187,7 @@ impl<P, L, const N: usize> Group<'_, P, L, N> {
             sum.write_to(multipliers);
         }
         for_each_corner!(i, N, {
-            // With four corners there are not enough registers for all positions. To read a row
-            // again is faster than to keep it on the stack.
-            let from = if PIECE == ROW && N > 3 {
-                let [a, b, c, _] = vertices.read::<L, N, PIECE>(tuples, i);
-                Point3::new(a, b, c)
-            } else {
-                x[i]
-            };
-            let moved = from + projection.corrections[i];
+            let moved = x[i] + projection.corrections[i];
             vertices.write::<L, N, PIECE>(tuples, i, [moved.x, moved.y, moved.z, w[i]]);
         });
     }
