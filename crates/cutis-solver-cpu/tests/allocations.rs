@@ -105,14 +105,13 @@ fn steps_allocate_nothing_and_memory_is_only_for_parts_in_use() {
     assert_eq!(names, ["vertices", "distance", "columns"]);
 
     // A vertex has 4 + 3 + 3 numbers. A spring has two indices and a length. To these come color
-    // offsets, a few runs of each color, and three numbers for sixteen springs in a row: two
-    // indices and the place of their lengths.
+    // offsets, a few runs of each color, and two indices for sixteen springs in a row.
     let lattice = Kuhn::new([40, 18, 18], 0.1);
     let solver = SolverReference::new(body(false), settings(1)).unwrap();
     let bytes: Vec<usize> = solver.bytes().iter().map(|part| part.bytes).collect();
     assert_eq!(bytes[0], lattice.positions.len() * 40);
     let offsets = solver.simulation().system().kinds()[0].offsets().len();
     let runs = bytes[1] - (lattice.edges.len() * 12 + offsets * 4);
-    let most = offsets * 72 + lattice.edges.len() / 16 * 12;
+    let most = offsets * 72 + lattice.edges.len() / 16 * 8;
     assert!(runs <= most, "{runs} bytes for {offsets} colors");
 }

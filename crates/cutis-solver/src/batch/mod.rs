@@ -3,7 +3,6 @@
 
 mod access;
 mod project;
-mod row;
 mod runs;
 mod set;
 mod tiles;
@@ -20,7 +19,6 @@ use crate::colored::{SharedStore, SharedVertices};
 use crate::teams::TeamConstraints;
 use crate::{SolverError, Step, Stiffness, Vertex, VertexForce, VertexStore};
 
-use row::Row;
 use runs::Runs;
 use tiles::Tiles;
 
@@ -88,8 +86,9 @@ pub(crate) struct Batch<C, const N: usize, T, P> {
     offsets: Vec<u32>,
     tiles: Tiles,
     runs: Runs,
-    /// The long pieces of `runs`.
-    rows: Vec<Row<N>>,
+    /// The vertices of the first constraint of each long piece of `runs`, so that loops over pieces
+    /// read less memory.
+    rows: Vec<[u32; N]>,
     indices: Vec<[u32; N]>,
     params: Vec<P>,
     stiffness: Stiffness<T>,
@@ -134,16 +133,14 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
             let start = part.start;
             runs::arrange(&mut order[part], start, indices, &mut runs, &mut scratch);
         }
-        let indices: Vec<_> = order.iter().map(|&k| indices[k as usize]).collect();
-        let params: Vec<_> = order.iter().map(|&k| params[k as usize]).collect();
         Ok(Self {
             vertex_count,
             offsets: groups.offsets.clone(),
             tiles,
-            rows: row::rows(runs.rows(count), &indices, &params),
+            rows: runs.rows(count).map(|place| indices[order[place] as usize]).collect(),
             runs,
-            indices,
-            params,
+            indices: order.iter().map(|&k| indices[k as usize]).collect(),
+            params: order.iter().map(|&k| params[k as usize]).collect(),
             stiffness: stiffness.validated(kind, count, &order)?,
             kind: PhantomData,
         })

@@ -105,21 +105,20 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
         if range.is_empty() {
             return;
         }
-        let rows = &self.rows[self.runs.rows_before(range.start)..];
-        let starts = range.clone().step_by(ROW);
+        let first = self.runs.rows_before(range.start);
+        let rows = self.rows[first..].iter().zip(self.params[range.clone()].chunks(ROW));
         let same = [T::zero(); ROW];
         let (same, each) = match self.stiffness.values() {
             Values::Uniform(value) => (same.map(|_| *value), &[][..]),
-            Values::Each(values) => (same, &values[range.clone()]),
+            Values::Each(values) => (same, &values[range]),
         };
         let mut each = each.chunks(ROW);
         let mut multipliers = multipliers.chunks_mut(ROW);
-        for (row, start) in rows.iter().zip(starts) {
-            let params = &self.params[row.params as usize..][..ROW.min(range.end - start)];
+        for (row, params) in rows {
             let stiffness = each.next().unwrap_or(&same);
             let multipliers = if KEEPS { multipliers.next().unwrap_or_default() } else { &mut [] };
             for place in (0..params.len()).step_by(L::LANES) {
-                let tuples = &[row.first.map(|vertex| vertex + 2 * place as u32)];
+                let tuples = &[row.map(|vertex| vertex + 2 * place as u32)];
                 let params = &params[place..place + L::LANES];
                 let stiffness = L::from_slice(&stiffness[place..]);
                 let group = Group { tuples, params, stiffness };
