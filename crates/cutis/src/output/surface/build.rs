@@ -8,6 +8,7 @@ use cutis_volume::Volume;
 use nalgebra::Point3;
 
 use super::ends::Ends;
+use super::places::Places;
 use super::reduce::reduce;
 use super::walls::{nodes_of, walls};
 use super::{MOST_POINTS, Surface};
@@ -25,9 +26,9 @@ struct Shown {
     on_skin: bool,
 }
 
-/// What makes two points one: the nodes that they follow, in order, the bits of their position, and
-/// whether they are on the skin. So a lip has an edge, and its two sides are two points.
-type Key = ([u32; 4], [u32; 3], bool);
+/// What makes two points one: the nodes that they follow, in order, their place, and whether they
+/// are on the skin. So a lip has an edge, and its two sides are two points.
+type Key = ([u32; 4], u32, bool);
 
 impl Surface {
     /// The surface of a body with a skin, with at most [`MOST_POINTS`] points. None without a skin.
@@ -41,7 +42,12 @@ impl Surface {
         let fixed = nodes + body.inactive_skin.positions.len();
         let edges = body.severed.as_ref().map_or(&[][..], |severed| &severed.skin_pieces.points);
         let ends = Ends::new(body);
-        let mut builder = Builder::default();
+        let mut builder = Builder {
+            places: Places::new(body.mesh.lattice.longest_step_mm()),
+            points: Vec::new(),
+            triangles: Vec::new(),
+            known: HashMap::new(),
+        };
         let mut numbers = vec![NONE; positions.len()];
         for triangle in triangles {
             let corner = |v: u32| {
@@ -61,7 +67,7 @@ impl Surface {
             builder.triangles.push(triangle);
         }
         drop((positions, numbers));
-        for wall in walls(body, &ends) {
+        for wall in walls(body, &ends, &mut builder.places) {
             let shown = |point: Embedded| Shown {
                 rest: point.at(&body.mesh.positions),
                 embedded: Some(point),
@@ -78,8 +84,8 @@ impl Surface {
     }
 }
 
-#[derive(Default)]
 struct Builder {
+    places: Places,
     points: Vec<Shown>,
     triangles: Vec<[u32; 3]>,
     known: HashMap<Key, u32>,
@@ -92,7 +98,7 @@ impl Builder {
         let followed = point.embedded.iter().flat_map(nodes_of);
         nodes.iter_mut().zip(followed).for_each(|(node, followed)| *node = followed);
         nodes.sort_unstable();
-        let key = (nodes, <[f32; 3]>::from(point.rest).map(f32::to_bits), point.on_skin);
+        let key = (nodes, self.places.number(point.rest), point.on_skin);
         let next = self.points.len() as u32;
         let number = *self.known.entry(key).or_insert(next);
         if number == next {

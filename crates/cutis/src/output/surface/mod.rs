@@ -4,8 +4,10 @@
 mod build;
 mod encode;
 mod ends;
+mod places;
 mod recorder;
 mod reduce;
+mod unmatched;
 mod walls;
 
 use cutis_mesh::sever::Embedded;
