@@ -44,8 +44,9 @@ pub(super) fn result(report: &Report, rows: &[FrameRow]) -> String {
         let [initial, last, mid] = [initial_mm, final_mm, mid_mm].map(|&mm| fixed(mm, 2));
         let _ = write!(
             text,
-            "{name} opened from <b>{initial} mm</b> to <b>{last} mm</b> (mean distance of the lips; {mid} mm in \
-             the middle).<br>"
+            "{name} {} from <b>{initial} mm</b> to <b>{last} mm</b> (mean distance of the lips; {mid} mm in \
+             the middle).<br>",
+            opened_or_closed(*initial_mm, *final_mm)
         );
     }
     if report.wounds.is_empty() {
@@ -62,6 +63,11 @@ pub(super) fn result(report: &Report, rows: &[FrameRow]) -> String {
         let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&line)));
     }
     text
+}
+
+/// What a wound did, by its opening at the start and at the end. Sutures close it.
+fn opened_or_closed(initial_mm: f64, final_mm: f64) -> &'static str {
+    if final_mm < initial_mm { "closed" } else { "opened" }
 }
 
 /// The section of a wound: incisions come before excisions.
@@ -124,4 +130,16 @@ pub(super) fn computation(report: &Report) -> String {
         let _ = write!(text, "<p>{}.</p>", escape(&capitalized(&line)));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wound_that_became_narrower_has_closed() {
+        assert_eq!(opened_or_closed(9.4, 6.89), "closed");
+        assert_eq!(opened_or_closed(0.0, 6.89), "opened");
+        assert_eq!(opened_or_closed(0.0, 0.0), "opened");
+    }
 }
