@@ -3,7 +3,7 @@
 //! Two cuts that meet in a tet may divide one of its faces otherwise than the next tet does. There
 //! the tissue on the other side is looked up at the center of each face.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use cutis_mesh::sever::Embedded;
 use nalgebra::{Point3, Vector3};
@@ -90,7 +90,8 @@ impl<'a> Face<'a> {
 
 /// Whether two points of faces, each with the shares of its corners, follow the same nodes alike.
 fn moves_alike(a: (&Side, [f64; 3]), b: (&Side, [f64; 3])) -> bool {
-    let mut weights: HashMap<u32, f64> = HashMap::new();
+    // In the order of the nodes, so that the sum is always the same.
+    let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
     for ((side, shares), sign) in [(a, 1.0), (b, -1.0)] {
         for (corner, share) in side.corners.iter().zip(shares) {
             for (node, weight) in corner.nodes.into_iter().zip(corner.weights) {
