@@ -48,7 +48,7 @@ pub(crate) struct Pending {
 impl Search<'_> {
     /// Moves along a direction: by the full step if the energy falls, or if it may rise once, and
     /// otherwise by a part of it.
-    pub(crate) fn advance(&self, direction: &[Vector3<f64>]) -> Option<Moved> {
+    pub(crate) fn advance(&mut self, direction: &[Vector3<f64>]) -> Option<Moved> {
         let slope = -dot(&self.state.forces, direction);
         if !(slope < 0.0 && slope.is_finite()) {
             return None;
@@ -82,13 +82,14 @@ impl Search<'_> {
     }
 
     /// The first placement along a direction that is low enough. `tried` is not.
-    fn line_search(&self, direction: &[Vector3<f64>], mut tried: Moved) -> Option<Moved> {
+    fn line_search(&mut self, direction: &[Vector3<f64>], mut tried: Moved) -> Option<Moved> {
         while tried.length >= SHORTEST {
             let Moved { length, change, slope, .. } = tried;
             // The minimum of the parabola through the known values, within bounds.
             let parabola = -0.5 * slope * length * length / (change - slope * length);
             let within = (0.1 * length)..=(0.5 * length);
             let length = if within.contains(&parabola) { parabola } else { 0.3 * length };
+            self.spare = tried.state.x;
             tried = self.moved(direction, length, slope);
             if self.is_lower(&tried) {
                 return Some(tried);
@@ -97,8 +98,9 @@ impl Search<'_> {
         None
     }
 
-    fn moved(&self, direction: &[Vector3<f64>], length: f64, slope: f64) -> Moved {
-        let state = self.body.moved(&self.state, direction, length);
+    fn moved(&mut self, direction: &[Vector3<f64>], length: f64, slope: f64) -> Moved {
+        let memory = std::mem::take(&mut self.spare);
+        let state = self.body.moved(&self.state, direction, length, memory);
         let change = self.body.difference(&self.state, &state);
         let end_slope = -dot(&state.forces, direction);
         Moved { state, length, change, slope, end_slope, rises: false }

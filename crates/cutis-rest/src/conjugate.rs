@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::blocks::ROWS;
 use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
-use crate::vectors::{PART, add, dot};
+use crate::vectors::{PART, Vector, add, dot};
 
 /// An approximate solution.
 pub(crate) struct Solution {
@@ -15,6 +15,19 @@ pub(crate) struct Solution {
     pub cycles: usize,
     /// Whether a direction was found along which the matrix is not positive.
     pub indefinite: bool,
+}
+
+/// Memory of [`solve`], which is used again in each step.
+#[derive(Default)]
+pub(crate) struct Vectors {
+    x: Vector<4>,
+    residual: Vector<4>,
+    /// The preconditioned residual, and the matrix times it.
+    z: Vector<4>,
+    z_product: Vector<4>,
+    direction: Vector<4>,
+    /// The matrix times the direction.
+    product: Vector<4>,
 }
 
 /// Solves `matrix · x = right` until the residual, in the norm of the preconditioner, is
@@ -31,46 +44,49 @@ pub(crate) fn solve(
     right: &[Vector3<f64>],
     tolerance: f64,
     most_cycles: usize,
+    vectors: &mut Vectors,
 ) -> Solution {
-    let largest = right.iter().map(Vector3::amax).fold(0.0, f64::max);
-    let zero = vec![[0.0f32; 4]; right.len()];
-    let (mut x, mut z, mut z_product) = (zero.clone(), zero.clone(), zero);
+    let largest = right.par_iter().with_min_len(ROWS).map(Vector3::amax).reduce(|| 0.0, f64::max);
+    let Vectors { x, residual, z, z_product, direction, product } = vectors;
+    x.clear();
+    x.resize(right.len(), [0.0; 4]);
+    z.resize(right.len(), [0.0; 4]);
+    z_product.resize(right.len(), [0.0; 4]);
     // Single precision has a smaller range of exponents.
     let scaled = |v: &Vector3<f64>| [v.x, v.y, v.z, 0.0].map(|x| (x / largest) as f32);
-    let mut residual: Vec<[f32; 4]> = right.par_iter().with_min_len(ROWS).map(scaled).collect();
-    multigrid.cycle(matrix, &residual, &mut z, &mut z_product);
-    let (mut direction, mut product) = (z.clone(), z_product.clone());
-    let mut energy = dot(&residual, &z);
+    right.par_iter().with_min_len(ROWS).map(scaled).collect_into_vec(residual);
+    multigrid.cycle(matrix, residual, z, z_product);
+    direction.clone_from(z);
+    product.clone_from(z_product);
+    let mut energy = dot(residual, z);
     let first = energy;
     let (mut cycles, mut indefinite) = (1, false);
     let mut steps = Steps::default();
     while cycles < most_cycles
         && energy > 0.0
-        && (energy > tolerance * tolerance * first || steps.to_come() > tolerance * dot(&x, &x).sqrt())
+        && (energy > tolerance * tolerance * first || steps.to_come() > tolerance * dot(x, x).sqrt())
     {
-        let curvature = dot(&direction, &product);
+        let curvature = dot(direction, product);
         if curvature.is_nan() || curvature <= 0.0 {
             indefinite = true;
             break;
         }
         let length = energy / curvature;
-        add(&mut x, length as f32, &direction);
-        add(&mut residual, -length as f32, &product);
-        multigrid.cycle(matrix, &residual, &mut z, &mut z_product);
+        add(x, length as f32, direction);
+        add(residual, -length as f32, product);
+        multigrid.cycle(matrix, residual, z, z_product);
         cycles += 1;
-        let next = dot(&residual, &z);
+        let next = dot(residual, z);
         if next.is_nan() || next <= 0.0 {
             break;
         }
         let ratio = (next / energy) as f32;
         energy = next;
-        let (square, along) = turn(&mut direction, ratio, &z);
-        turn(&mut product, ratio, &z_product);
+        let (square, along) = turn(direction, ratio, z);
+        turn(product, ratio, z_product);
         steps.push(length, square, along);
     }
-    if x.iter().all(|x| *x == [0.0; 4]) {
-        x = z;
-    }
+    let x = if x.par_iter().with_min_len(ROWS).all(|x| *x == [0.0; 4]) { z } else { x };
     let unscaled = |&[x, y, z, _]: &[f32; 4]| Vector3::new(x, y, z).map(|x| f64::from(x) * largest);
     Solution { x: x.par_iter().with_min_len(ROWS).map(unscaled).collect(), cycles, indefinite }
 }

@@ -160,11 +160,20 @@ impl Body {
         parts.iter().sum::<f64>() - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
     }
 
-    /// A placement with the free vertices moved.
-    pub(crate) fn moved(&self, from: &State, direction: &[Vector3<f64>], length: f64) -> State {
-        let mut x = from.x.clone();
+    /// A placement with the free vertices moved. `x` is memory for it, which has all vertices with
+    /// the fixed ones at their places, or is empty.
+    pub(crate) fn moved(
+        &self,
+        from: &State,
+        direction: &[Vector3<f64>],
+        length: f64,
+        mut x: Vec<Point3<f64>>,
+    ) -> State {
+        if x.is_empty() {
+            x.extend_from_slice(&from.x);
+        }
         for (&v, step) in self.free.iter().zip(direction) {
-            x[v as usize] += step * length;
+            x[v as usize] = from.x[v as usize] + step * length;
         }
         self.at(x)
     }

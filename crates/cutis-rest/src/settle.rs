@@ -31,9 +31,12 @@ const STALE: f64 = 3.0;
 pub struct Search<'a> {
     pub(crate) body: &'a Body,
     options: Options,
-    /// Positions of all vertices at the start, relative to the origin, in m.
+    /// Positions of the free vertices at the start, relative to the origin, in m.
     start: Vec<Point3<f64>>,
     pub(crate) state: State,
+    /// Positions of an earlier state, whose memory is used again. Fixed vertices are where they are
+    /// now.
+    pub(crate) spare: Vec<Point3<f64>>,
     /// Estimate of the distance from rest, relative to the displacement from the start.
     error: f64,
     pub(crate) steps: Vec<Step>,
@@ -41,6 +44,7 @@ pub struct Search<'a> {
     levels: Option<Levels>,
     /// The matrix of the present step.
     matrix: Matrix,
+    vectors: conjugate::Vectors,
     /// See [`Rest::complexity`].
     complexity: f64,
     /// Longest displacement of a vertex in a step: half of the diagonal of the body, in m.
@@ -128,20 +132,22 @@ impl<'a> Search<'a> {
                 return Err(RestError::Value { what, value, expected: "a number from 0 to 1" });
             }
         }
-        let state = body.at(x.clone());
+        let state = body.at(x);
         if let Some(place) = state.forces.iter().position(|force| !force.iter().all(|f| f.is_finite())) {
             return Err(RestError::NotFinite { vertex: body.free[place] as usize });
         }
         let mut search = Self {
             body,
             options: *options,
-            start: x,
+            start: body.places(&state),
             state,
+            spare: Vec::new(),
             error: f64::INFINITY,
             steps: Vec::new(),
             energy_change_j: 0.0,
             levels: None,
             matrix: body.empty_matrix(),
+            vectors: conjugate::Vectors::default(),
             complexity: 1.0,
             reach: 0.5 * diagonal(&body.start),
             near_m: f64::INFINITY,
@@ -159,6 +165,7 @@ impl<'a> Search<'a> {
     /// Goes on from a placement whose fixed vertices are elsewhere.
     pub(crate) fn begin_at(&mut self, state: State) {
         self.state = state;
+        self.spare.clear();
         self.error = if self.is_balanced() { 0.0 } else { f64::INFINITY };
     }
 
@@ -240,8 +247,9 @@ impl<'a> Search<'a> {
             self.pending = Some(Pending { x: before.x, direction: solution.x, slope, change });
         } else {
             self.pending = None;
-            drop(before);
-            if length == 1.0 {
+            self.spare = before.x;
+            // It would cost as much as a part of a step, and the body is near enough to rest.
+            if length == 1.0 && !self.is_at_rest() {
                 self.relax(&solution.x);
             }
         }
@@ -256,7 +264,7 @@ impl<'a> Search<'a> {
         let change = self.body.difference(&self.state, &relaxed);
         if change < 0.0 && relaxed.is_finite() {
             self.energy_change_j += change;
-            self.state = relaxed;
+            self.spare = std::mem::replace(&mut self.state, relaxed).x;
         }
     }
 
@@ -326,7 +334,8 @@ impl<'a> Search<'a> {
         };
         self.complexity = levels.multigrid.complexity(matrix);
         let most = self.options.most_cycles;
-        let mut solution = conjugate::solve(matrix, &mut levels.multigrid, forces, tolerance, most);
+        let vectors = &mut self.vectors;
+        let mut solution = conjugate::solve(matrix, &mut levels.multigrid, forces, tolerance, most, vectors);
         // Where nothing resists, the equations have no finite solution.
         let longest = solution.x.iter().map(Vector3::norm).fold(0.0, f64::max);
         if longest > self.reach && longest.is_finite() {
@@ -341,9 +350,9 @@ impl<'a> Search<'a> {
 
     /// Displacement from the start to a state in m, as a root of the mean square.
     fn way(&self, state: &State) -> f64 {
-        let square = |&v: &u32| (state.x[v as usize] - self.start[v as usize]).norm_squared();
         let free = &self.body.free;
-        (free.iter().map(square).sum::<f64>() / free.len() as f64).sqrt()
+        let square = |(&v, start): (&u32, &Point3<f64>)| (state.x[v as usize] - start).norm_squared();
+        (free.iter().zip(&self.start).map(square).sum::<f64>() / free.len() as f64).sqrt()
     }
 
     /// Estimate of the distance from rest after a step, relative to the displacement `way` from the
