@@ -76,10 +76,14 @@ impl Operator<3, 4> for Matrix {
         let mut sum = WideF32x4::splat(0.0);
         let places = self.pattern.places(node);
         let neighbors = &self.pattern.columns[places.clone()];
-        let values = &self.values[9 * places.start..9 * places.end + 1];
-        for (n, &neighbor) in neighbors.iter().enumerate() {
-            prefetch(&self.values, 9 * (places.start + n) + AHEAD);
-            let block = &values[9 * n..9 * n + 10];
+        let mut values = &self.values[9 * places.start..9 * places.end + 1];
+        let mut ahead = 9 * places.start + AHEAD;
+        for &neighbor in neighbors {
+            // The block, and the number after it.
+            let Some(block) = values.first_chunk::<10>() else { break };
+            values = &values[9..];
+            prefetch(&self.values, ahead);
+            ahead += 9;
             let difference = columns(WideF32x4::from(x(neighbor as usize)) - own);
             for (column, difference) in difference.into_iter().enumerate() {
                 let block: [f32; 4] = std::array::from_fn(|row| block[3 * column + row]);
