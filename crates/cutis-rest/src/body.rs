@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cutis_coloring::{Incidence, Tuples};
+use cutis_coloring::Tuples;
 use cutis_constraints::Scalar;
 use cutis_solver::System;
 use nalgebra::{Point3, Vector3};
@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use crate::RestError;
 use crate::blocks::Pattern;
 use crate::constraints::Constraints;
-use crate::energy::{PART, State};
+use crate::elements::{Elements, Parts, joined};
+use crate::energy::State;
 use crate::matrix::is_curved;
 use crate::order::near_neighbors;
 
@@ -28,6 +29,8 @@ pub struct Body {
     /// For each free vertex the places of the free ones that share a constraint with it, and its
     /// own, ascending.
     pub(crate) pattern: Arc<Pattern>,
+    /// How the free vertices are divided.
+    pub(crate) parts: Parts,
     /// Weight and load of each free vertex in N.
     pub(crate) weights: Vec<Vector3<f64>>,
     /// Origin of the positions, in the caller's coordinates.
@@ -36,68 +39,13 @@ pub struct Body {
     pub(crate) start: Vec<Point3<f64>>,
 }
 
-/// The constraints of one kind, by the parts of the free vertices, [`PART`] in each. A part owns a
-/// constraint if no part before has one of its vertices.
-pub(crate) struct Elements {
-    pub kind: Arc<dyn Constraints>,
-    /// Starts of the parts in `constraints`, and the end of the last one.
-    starts: Vec<usize>,
-    /// Number of constraints that each part owns.
-    owned: Vec<usize>,
-    /// The constraints at the free vertices of each part: those that it owns, ascending, and the
-    /// others, ascending.
-    constraints: Vec<u32>,
-    /// Whether the value is curved as a function of a single vertex.
-    pub curved: bool,
-}
-
-impl Elements {
-    /// The constraints at the vertices that have these places. `lists` has those at each part,
-    /// each of them once.
-    pub fn new(kind: Arc<dyn Constraints>, curved: bool, place: &[u32], lists: Vec<Vec<u32>>) -> Self {
-        let arity = kind.arity();
-        let divided = |(part, list): (usize, Vec<u32>)| {
-            let owns = |k: &u32| {
-                let vertices = &kind.indices()[*k as usize * arity..][..arity];
-                vertices.iter().all(|&v| place[v as usize] as usize / PART >= part)
-            };
-            let (mut list, others): (Vec<u32>, Vec<u32>) = list.into_iter().partition(owns);
-            let owned = list.len();
-            list.extend(others);
-            (owned, list)
-        };
-        let (owned, lists): (Vec<_>, _) = lists.into_par_iter().enumerate().map(divided).unzip();
-        let (starts, constraints) = joined(lists);
-        Self { kind, starts, owned, constraints, curved }
-    }
-
-    /// The constraints at a part of the free vertices. Those that it owns come first.
-    #[inline]
-    pub fn of_part(&self, part: usize) -> &[u32] {
-        &self.constraints[self.starts[part]..self.starts[part + 1]]
-    }
-
-    /// The constraints that a part of the free vertices owns.
-    #[inline]
-    pub fn owned(&self, part: usize) -> &[u32] {
-        &self.constraints[self.starts[part]..][..self.owned[part]]
-    }
-
-    /// The vertices of a constraint.
-    #[inline]
-    pub fn vertices(&self, k: usize) -> &[u32] {
-        let arity = self.kind.arity();
-        &self.kind.indices()[k * arity..][..arity]
-    }
-}
-
 impl Body {
     /// The energies of a system, with its positions, parameters, stiffnesses and loads, under a
     /// gravity in m/s².
     ///
     /// # Errors
     /// [`RestError::Value`] for a gravity that is not finite, [`RestError::PbdStiffness`],
-    /// [`RestError::Rigid`], [`RestError::NothingMoves`], [`RestError::Incidence`].
+    /// [`RestError::Rigid`], [`RestError::NothingMoves`].
     pub fn of<T: Scalar>(system: &System<T>, gravity_m_s2: [f64; 3]) -> Result<Self, RestError> {
         for value in gravity_m_s2 {
             if !value.is_finite() {
@@ -128,16 +76,23 @@ impl Body {
             Vector3::from(gravity_m_s2) / inverse_mass(v) + load
         };
         let weights = free.iter().map(weight).collect();
-        let mut kinds = Vec::new();
-        let mut incidences = Vec::new();
-        for (kind, &tuples) in system.kinds().iter().zip(&tuples) {
-            let incidence = Incidence::new(tuples, start.len())?;
-            kinds.push(elements(Arc::new(kind.clone()), &start, &free, &place, &incidence)?);
-            incidences.push(incidence);
-        }
-        let pattern = Arc::new(neighbors(&kinds, &incidences, &free, &place));
+        let kinds: Vec<Arc<dyn Constraints>> = system
+            .kinds()
+            .iter()
+            .map(|kind| {
+                Constraints::check(kind)?;
+                Ok(Arc::new(kind.clone()) as Arc<dyn Constraints>)
+            })
+            .collect::<Result<_, RestError>>()?;
+        let parts = Parts::of(free.len(), &kinds, &place);
+        let divided = |kind: Arc<dyn Constraints>| {
+            let (curved, count) = (is_curved(&*kind, &start), kind.len());
+            Elements::new(kind, curved, &place, parts, count, |n| n as u32)
+        };
+        let kinds: Vec<Elements> = kinds.into_iter().map(divided).collect();
+        let pattern = Arc::new(neighbors(&kinds, &place, free.len(), parts));
         let origin = system.origin().coords.map(T::to_f64);
-        Ok(Self { kinds, free, place, pattern, weights, origin, start })
+        Ok(Self { kinds, free, place, pattern, parts, weights, origin, start })
     }
 
     /// Places of the vertices that can move.
@@ -156,67 +111,49 @@ impl Body {
     }
 }
 
-fn elements(
-    kind: Arc<dyn Constraints>,
-    start: &[Point3<f64>],
-    free: &[u32],
-    place: &[u32],
-    incidence: &Incidence,
-) -> Result<Elements, RestError> {
-    kind.check()?;
-    let arity = kind.arity().max(1) as u32;
-    let of_part = |free: &[u32]| {
-        let places = free.iter().flat_map(|&v| incidence.of(v));
-        let mut constraints: Vec<u32> = places.map(|place| place / arity).collect();
-        constraints.sort_unstable();
-        constraints.dedup();
-        constraints
-    };
-    let lists = free.par_chunks(PART).map(of_part).collect();
-    let curved = is_curved(&*kind, start);
-    Ok(Elements::new(kind, curved, place, lists))
-}
-
 /// See [`Body::pattern`].
-fn neighbors(kinds: &[Elements], incidences: &[Incidence], free: &[u32], place: &[u32]) -> Pattern {
-    let of_part = |free: &[u32]| -> (Vec<usize>, Vec<u32>) {
-        let (mut counts, mut columns, mut row) = (Vec::new(), Vec::new(), Vec::new());
-        for &v in free {
+fn neighbors(kinds: &[Elements], place: &[u32], free: usize, parts: Parts) -> Pattern {
+    let of_part = |rows: &mut Vec<Vec<u32>>, part: usize| -> (Vec<usize>, Vec<u32>) {
+        let range = part * parts.size..((part + 1) * parts.size).min(free);
+        rows.resize(range.len(), Vec::new());
+        for (row, own) in rows.iter_mut().zip(range.clone()) {
             row.clear();
-            row.push(place[v as usize]);
-            for (elements, incidence) in kinds.iter().zip(incidences) {
-                let arity = elements.kind.arity();
-                for &at in incidence.of(v) {
-                    row.extend(elements.vertices(at as usize / arity).iter().map(|&v| place[v as usize]));
+            row.push(own as u32);
+        }
+        for elements in kinds {
+            // In a lattice the next constraint has its neighbors at the same places of the rows.
+            let mut slots = vec![0; elements.kind.arity().pow(2)];
+            for &k in elements.of_part(part) {
+                let vertices = elements.vertices(k as usize);
+                for (own, &vertex) in vertices.iter().enumerate() {
+                    let own_place = place[vertex as usize] as usize;
+                    if !range.contains(&own_place) {
+                        continue;
+                    }
+                    let row = &mut rows[own_place - range.start];
+                    let slots = &mut slots[own * vertices.len()..][..vertices.len()];
+                    for (slot, &other) in slots.iter_mut().zip(vertices) {
+                        let column = place[other as usize];
+                        if column != FIXED && row.get(*slot) != Some(&column) {
+                            *slot = row.iter().position(|&known| known == column).unwrap_or(row.len());
+                            if *slot == row.len() {
+                                row.push(column);
+                            }
+                        }
+                    }
                 }
             }
-            row.sort_unstable();
-            row.dedup();
-            // Fixed vertices have the largest mark.
-            if row.last() == Some(&FIXED) {
-                row.pop();
-            }
-            counts.push(row.len());
-            columns.extend_from_slice(&row);
         }
-        (counts, columns)
+        rows.iter_mut().for_each(|row| row.sort_unstable());
+        (rows.iter().map(Vec::len).collect(), rows.concat())
     };
-    let parts: Vec<_> = free.par_chunks(PART).map(of_part).collect();
-    let mut starts = vec![0];
-    for count in parts.iter().flat_map(|(counts, _)| counts) {
+    let (counts, columns): (Vec<_>, Vec<_>) =
+        (0..parts.count).into_par_iter().map_init(Vec::new, of_part).unzip();
+    let mut starts = Vec::with_capacity(free + 1);
+    starts.push(0);
+    for count in counts.iter().flatten() {
         starts.push(starts[starts.len() - 1] + count);
     }
-    let (_, columns) = joined(parts.into_iter().map(|(_, columns)| columns).collect());
+    let (_, columns) = joined(columns);
     Pattern { starts, columns }
-}
-
-/// Lists one after the other: the start of each one, and the end of the last one.
-fn joined(lists: Vec<Vec<u32>>) -> (Vec<usize>, Vec<u32>) {
-    let mut starts = vec![0];
-    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
-    for list in lists {
-        all.extend(list);
-        starts.push(all.len());
-    }
-    (starts, all)
 }

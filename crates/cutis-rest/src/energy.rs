@@ -7,10 +7,7 @@ use rayon::prelude::*;
 
 use crate::Body;
 use crate::constraints::Evaluation;
-
-/// Vertices or constraints that a thread takes at once. Sums of parts are added in order, so that a
-/// result does not depend on the number of threads.
-pub(crate) const PART: usize = 4096;
+use crate::matrix::Scaled;
 
 /// The values of all constraints, and the forces.
 #[derive(Default)]
@@ -49,6 +46,8 @@ pub(crate) struct Scratch {
     pub ahead: Vec<Vector3<f64>>,
     /// Second derivatives, see [`Scratch::differentiate`].
     pub curvature: Vec<Matrix3<f64>>,
+    /// The scaled gradients of a constraint.
+    pub scaled: Vec<Scaled>,
     /// For each pair of vertices of a constraint, the place of its block in the row where it was
     /// found last. In a lattice the next constraint has it at the same place.
     pub slots: Vec<usize>,
@@ -64,7 +63,7 @@ impl Evaluation {
 impl Body {
     /// Evaluates all constraints.
     pub(crate) fn at(&self, x: Vec<Point3<f64>>) -> State {
-        let parts = self.free.len().div_ceil(PART);
+        let parts = self.parts.count;
         let (values, sums) = (vec![Arc::default(); parts], vec![[0.0; 4]; parts]);
         let all = vec![true; parts];
         self.evaluated(State { x, values, sums, forces: self.weights.clone(), ..State::default() }, &all)
@@ -75,7 +74,7 @@ impl Body {
     pub(crate) fn with_moved(&self, state: &State, x: Vec<Point3<f64>>, places: &[u32]) -> State {
         let mut touched = vec![false; state.values.len()];
         for &neighbor in places.iter().flat_map(|&place| self.pattern.row(place as usize)) {
-            touched[neighbor as usize / PART] = true;
+            touched[self.parts.at(neighbor)] = true;
         }
         let State { values, sums, forces, .. } = state;
         let (values, sums, forces) = (values.clone(), sums.clone(), forces.clone());
@@ -85,10 +84,11 @@ impl Body {
     /// Evaluates the constraints of the touched parts.
     fn evaluated(&self, mut state: State, touched: &[bool]) -> State {
         let State { x, values, sums, forces, .. } = &mut state;
-        let parts = forces.par_chunks_mut(PART).zip(values.par_iter_mut().zip(sums.par_iter_mut()));
+        let size = self.parts.size;
+        let parts = forces.par_chunks_mut(size).zip(values.par_iter_mut().zip(sums.par_iter_mut()));
         let parts = parts.enumerate().filter(|(part, _)| touched[*part]);
         parts.for_each_init(Evaluation::default, |scratch, (part, (forces, (values, sums)))| {
-            forces.copy_from_slice(&self.weights[part * PART..][..forces.len()]);
+            forces.copy_from_slice(&self.weights[part * size..][..forces.len()]);
             let (of_part, of_forces) = self.part_at(x, scratch, part, forces);
             (*values, *sums) = (of_part.into(), of_forces);
         });
@@ -106,17 +106,18 @@ impl Body {
         part: usize,
         forces: &mut [Vector3<f64>],
     ) -> (Vec<f64>, [f64; 4]) {
-        let rows = part * PART..part * PART + forces.len();
+        let start = part * self.parts.size;
+        let rows = start..start + forces.len();
         let mut sizes: Vec<[f64; 2]> = forces.iter().map(|force| [force.norm(), 0.0]).collect();
         let mut values = Vec::with_capacity(self.kinds.iter().map(|kind| kind.owned(part).len()).sum());
         let mut noise = 0.0;
         for elements in &self.kinds {
-            let owned = elements.owned(part).len();
+            let borrowed = elements.borrowed(part);
             for (n, &k) in elements.of_part(part).iter().enumerate() {
                 elements.kind.evaluate(k as usize, x, scratch);
                 let Evaluation { c, stiffness, .. } = *scratch;
                 let reach = scratch.reach() * stiffness;
-                if n < owned {
+                if n >= borrowed {
                     values.push(c);
                     noise += c.abs() * reach;
                 }

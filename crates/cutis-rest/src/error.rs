@@ -1,7 +1,5 @@
 //! The errors of this crate.
 
-use cutis_coloring::ColoringError;
-
 /// An invalid body or option, or a search that failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -30,9 +28,6 @@ pub enum RestError {
         /// The number of vertices.
         vertices: usize,
     },
-    /// The constraints of the vertices cannot be listed.
-    #[error(transparent)]
-    Incidence(#[from] ColoringError),
     /// An argument is out of range.
     #[error("{what} is {value}; expected {expected}")]
     Value {

@@ -29,6 +29,7 @@ mod blocks;
 mod body;
 mod conjugate;
 mod constraints;
+mod elements;
 mod energy;
 mod error;
 mod follow;
@@ -40,6 +41,8 @@ mod options;
 mod order;
 mod settle;
 mod smoother;
+#[cfg(test)]
+mod springs;
 mod transfer;
 mod vectors;
 

@@ -8,10 +8,11 @@
 use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::blocks::Pattern;
-use crate::body::{Elements, FIXED};
-use crate::energy::PART;
+use crate::body::FIXED;
+use crate::elements::{Elements, Parts};
 use crate::{Body, Options, Search};
 
 /// A vertex moved far if it moved by this many times the root of the mean square.
@@ -68,7 +69,10 @@ impl Body {
         for (n, &v) in free.iter().enumerate() {
             place[v as usize] = n as u32;
         }
-        let kinds = self.kinds.iter().map(|elements| elements.of_vertices(chosen, &free, &place)).collect();
+        let all: Vec<_> = self.kinds.iter().map(|elements| elements.kind.clone()).collect();
+        let parts = Parts::of(free.len(), &all, &place);
+        let of_vertices = |elements: &Elements| elements.of_vertices(chosen, self.parts, &place, parts);
+        let kinds = self.kinds.iter().map(of_vertices).collect();
         let (mut starts, mut columns) = (vec![0], Vec::new());
         for &row in chosen {
             let inside =
@@ -78,65 +82,31 @@ impl Body {
         }
         let weights = chosen.iter().map(|&place| self.weights[place as usize]).collect();
         let pattern = Arc::new(Pattern { starts, columns });
-        Self { kinds, free, place, pattern, weights, origin: self.origin, start: x.to_vec() }
+        let start = x.to_vec();
+        Self { kinds, free, place, pattern, parts, weights, origin: self.origin, start }
     }
 }
 
 impl Elements {
     /// The constraints at some vertices, which are at places `chosen` of the whole body and at
-    /// `place` of the part.
-    fn of_vertices(&self, chosen: &[u32], free: &[u32], place: &[u32]) -> Self {
-        let mut parts: Vec<usize> = chosen.iter().map(|&place| place as usize / PART).collect();
-        parts.dedup();
+    /// `place` of a part of it. The whole body is divided into `from`, and the part into `to`.
+    fn of_vertices(&self, chosen: &[u32], from: Parts, place: &[u32], to: Parts) -> Self {
+        let mut touched: Vec<usize> = chosen.iter().map(|&place| from.at(place)).collect();
+        touched.dedup();
         let inside = |&k: &u32| self.vertices(k as usize).iter().any(|&v| place[v as usize] != FIXED);
-        let mut all: Vec<u32> =
-            parts.iter().flat_map(|&part| self.of_part(part)).copied().filter(inside).collect();
+        let of_part = |&part: &usize| self.of_part(part).par_iter().copied().filter(inside);
+        let mut all: Vec<u32> = touched.par_iter().flat_map(of_part).collect();
         all.sort_unstable();
         all.dedup();
-        let of_part = |first: usize| -> Vec<u32> {
-            let own = first as u32..(first + PART) as u32;
-            let touches =
-                |&k: &u32| self.vertices(k as usize).iter().any(|&v| own.contains(&place[v as usize]));
-            all.iter().copied().filter(touches).collect()
-        };
-        let lists = (0..free.len()).step_by(PART).map(of_part).collect();
-        Self::new(self.kind.clone(), self.curved, place, lists)
+        Self::new(self.kind.clone(), self.curved, place, to, all.len(), |n| all[n])
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use cutis_constraints::{Distance, DistanceMaterial};
-    use cutis_solver::{Stiffness, System, SystemBuilder};
-    use cutis_test_kit::Kuhn;
-
     use super::*;
     use crate::energy::State;
-
-    /// A block of springs whose bottom is held.
-    fn block() -> System<f64> {
-        let Kuhn { positions, tets, .. } = Kuhn::new([10, 10, 60], 0.01);
-        let mut edges: Vec<[u32; 2]> = tets
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]])
-            .map(|[a, b]| [a.min(b), a.max(b)])
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
-        let inverse_mass = |x: &Point3<f64>| if x.z < 0.005 { 0.0 } else { 1e3 };
-        let inverse_masses: Vec<f64> = positions.iter().map(inverse_mass).collect();
-        let colors = cutis_coloring::greedy(&edges, positions.len()).unwrap();
-        SystemBuilder::<f64>::new(&positions, &inverse_masses)
-            .unwrap()
-            .add_from_rest::<Distance, 2>(
-                &edges,
-                &DistanceMaterial::default(),
-                Stiffness::compliance(1e-2),
-                &colors,
-            )
-            .unwrap()
-            .build()
-    }
+    use crate::springs::block;
 
     /// One vertex is far from its place. It returns with its neighbors, and the others stay.
     #[test]
@@ -175,9 +145,9 @@ mod tests {
     #[test]
     fn few_vertices_that_move_change_few_parts() {
         let body = Body::of(&block(), [0.0; 3]).unwrap();
-        assert!(body.free.len() > PART);
+        assert!(body.parts.count > 1);
         let before = body.at(body.start.clone());
-        for place in [0, PART - 1, body.free.len() - 1] {
+        for place in [0, body.parts.size - 1, body.free.len() - 1] {
             let mut x = body.start.clone();
             x[body.free[place] as usize].y += 0.003;
             let whole = body.at(x.clone());
