@@ -82,7 +82,7 @@ pub fn table(search: &Found, frames: &[Frames]) -> Table {
 /// Time and distance from rest after each step of a search.
 fn points(search: &Found) -> Vec<[f64; 2]> {
     let prepared = search.prepared_s;
-    search.steps.iter().filter_map(|step| Some([prepared + step.s, step.error?])).collect()
+    search.steps.iter().map(|step| [prepared + step.s, step.error]).collect()
 }
 
 /// The distances over time as SVG.
