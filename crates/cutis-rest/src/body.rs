@@ -13,7 +13,7 @@ use crate::blocks::Pattern;
 use crate::constraints::Constraints;
 use crate::elements::{Elements, Parts, joined};
 use crate::energy::State;
-use crate::matrix::is_curved;
+use crate::fill::is_curved;
 use crate::order::near_neighbors;
 
 /// Mark of a vertex that cannot move.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::Body;
 use crate::constraints::Evaluation;
-use crate::matrix::Scaled;
+use crate::fill::Scaled;
 
 /// The values of all constraints, and the forces.
 #[derive(Default)]

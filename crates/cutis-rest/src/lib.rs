@@ -32,6 +32,7 @@ mod constraints;
 mod elements;
 mod energy;
 mod error;
+mod fill;
 mod follow;
 mod fronts;
 mod local;

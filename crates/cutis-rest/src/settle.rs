@@ -5,8 +5,9 @@ use nalgebra::{Point3, Vector3};
 use crate::advance::{Moved, Pending};
 use crate::conjugate::{self, Solution};
 use crate::energy::State;
+use crate::fill::Curvature;
 use crate::local::Relaxed;
-use crate::matrix::{Curvature, Matrix};
+use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
 use crate::{Body, Options, Rest, RestError, Step};
 
