@@ -15,6 +15,7 @@ use crate::elements::{Elements, Parts, joined};
 use crate::energy::State;
 use crate::fill::is_curved;
 use crate::order::near_neighbors;
+use crate::settle::diagonal;
 
 /// Mark of a vertex that cannot move.
 pub(crate) const FIXED: u32 = u32::MAX;
@@ -37,6 +38,8 @@ pub struct Body {
     pub(crate) origin: Vector3<f64>,
     /// Positions of all vertices relative to the origin, in m.
     pub(crate) start: Vec<Point3<f64>>,
+    /// Longest displacement of a vertex in a step: half of the diagonal of the body, in m.
+    pub(crate) reach_m: f64,
 }
 
 impl Body {
@@ -86,13 +89,14 @@ impl Body {
             .collect::<Result<_, RestError>>()?;
         let parts = Parts::of(free.len(), &kinds, &place);
         let divided = |kind: Arc<dyn Constraints>| {
-            let (curved, count) = (is_curved(&*kind, &start), kind.len());
-            Elements::new(kind, curved, &place, parts, count, |n| n as u32)
+            let curved = is_curved(&*kind, &start);
+            Elements::new(kind, curved, &place, parts)
         };
         let kinds: Vec<Elements> = kinds.into_iter().map(divided).collect();
         let pattern = Arc::new(neighbors(&kinds, &place, free.len(), parts));
         let origin = system.origin().coords.map(T::to_f64);
-        Ok(Self { kinds, free, place, pattern, parts, weights, origin, start })
+        let reach_m = 0.5 * diagonal(&start);
+        Ok(Self { kinds, free, place, pattern, parts, weights, origin, start, reach_m })
     }
 
     /// Places of the vertices that can move.

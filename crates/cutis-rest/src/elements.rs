@@ -75,26 +75,18 @@ pub(crate) struct Elements {
 }
 
 impl Elements {
-    /// Divides `count` constraints, whose vertices are at `place`. `constraint` numbers them.
-    pub fn new(
-        kind: Arc<dyn Constraints>,
-        curved: bool,
-        place: &[u32],
-        parts: Parts,
-        count: usize,
-        constraint: impl Fn(usize) -> u32 + Sync,
-    ) -> Self {
-        let arity = kind.arity();
+    /// Divides the constraints of a kind, whose vertices are at `place`.
+    pub fn new(kind: Arc<dyn Constraints>, curved: bool, place: &[u32], parts: Parts) -> Self {
+        let (arity, count) = (kind.arity(), kind.len());
         // For each part the constraints that it borrows and those that it owns, after their place.
         let of_chunk = |chunk: usize| {
             let mut lists = vec![[const { Vec::new() }; 2]; parts.count];
             let mut others = Vec::new();
             for n in chunk * CHUNK..((chunk + 1) * CHUNK).min(count) {
-                let k = constraint(n);
-                let vertices = &kind.indices()[k as usize * arity..][..arity];
+                let vertices = &kind.indices()[n * arity..][..arity];
                 let places = || vertices.iter().map(|&v| place[v as usize]).filter(|&place| place != FIXED);
                 let Some(first) = places().min() else { continue };
-                let key = u64::from(first) << 32 | u64::from(k);
+                let key = u64::from(first) << 32 | n as u64;
                 let owner = parts.at(first);
                 lists[owner][1].push(key);
                 others.clear();

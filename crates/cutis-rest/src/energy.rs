@@ -161,21 +161,26 @@ impl Body {
         parts.iter().sum::<f64>() - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
     }
 
-    /// A placement with the free vertices moved. `x` is memory for it, which has all vertices with
-    /// the fixed ones at their places, or is empty.
+    /// The positions of a state. `memory` has all vertices, with the fixed ones at their places, or
+    /// is empty.
+    pub(crate) fn copied(&self, from: &State, mut memory: Vec<Point3<f64>>) -> Vec<Point3<f64>> {
+        if memory.is_empty() {
+            memory.extend_from_slice(&from.x);
+        }
+        self.free.iter().for_each(|&v| memory[v as usize] = from.x[v as usize]);
+        memory
+    }
+
+    /// A placement with the free vertices moved. `memory` is as in [`copied`](Self::copied).
     pub(crate) fn moved(
         &self,
         from: &State,
         direction: &[Vector3<f64>],
         length: f64,
-        mut x: Vec<Point3<f64>>,
+        memory: Vec<Point3<f64>>,
     ) -> State {
-        if x.is_empty() {
-            x.extend_from_slice(&from.x);
-        }
-        for (&v, step) in self.free.iter().zip(direction) {
-            x[v as usize] = from.x[v as usize] + step * length;
-        }
+        let mut x = self.copied(from, memory);
+        self.free.iter().zip(direction).for_each(|(&v, step)| x[v as usize] += step * length);
         self.at(x)
     }
 }

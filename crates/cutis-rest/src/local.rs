@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::blocks::Pattern;
 use crate::body::FIXED;
+use crate::constraints::{Constraints, Subset};
 use crate::elements::{Elements, Parts};
 use crate::{Body, Options, Search};
 
@@ -24,12 +25,12 @@ const MOST: f64 = 0.05;
 /// When the vertices are at rest.
 const OPTIONS: Options = Options { error: 0.1, force: 1e-6, most_steps: 40, most_cycles: 100 };
 
-/// A placement after local relaxation.
+/// The result of local relaxation.
 pub(crate) struct Relaxed {
-    /// Positions of all vertices.
-    pub x: Vec<Point3<f64>>,
-    /// Places of the vertices that may have moved.
+    /// Places of the vertices that may have moved, among the free ones.
     pub places: Vec<u32>,
+    /// Their positions.
+    pub x: Vec<Point3<f64>>,
 }
 
 impl Body {
@@ -44,7 +45,9 @@ impl Body {
         let part = self.part(&chosen, x);
         let mut search = Search::new(&part, &OPTIONS).ok()?;
         while !search.is_at_rest() && search.step().is_ok() {}
-        Some(Relaxed { x: search.state.x, places: chosen })
+        let mut x = search.state.x;
+        x.truncate(chosen.len());
+        Some(Relaxed { places: chosen, x })
     }
 
     /// Places of the vertices that moved far, and of their neighbors, ascending.
@@ -62,43 +65,68 @@ impl Body {
         chosen
     }
 
-    /// The part of a body in which only the vertices at some places can move.
+    /// The part of a body in which only the vertices at some places can move. They come first, and
+    /// then the others of their constraints.
     fn part(&self, chosen: &[u32], x: &[Point3<f64>]) -> Self {
-        let free: Vec<u32> = chosen.iter().map(|&place| self.free[place as usize]).collect();
-        let mut place = vec![FIXED; self.place.len()];
-        for (n, &v) in free.iter().enumerate() {
-            place[v as usize] = n as u32;
+        let mut vertices: Vec<u32> = chosen.iter().map(|&place| self.free[place as usize]).collect();
+        let count = vertices.len() as u32;
+        let mut number = vec![FIXED; self.place.len()];
+        for (n, &v) in vertices.iter().enumerate() {
+            number[v as usize] = n as u32;
         }
-        let all: Vec<_> = self.kinds.iter().map(|elements| elements.kind.clone()).collect();
-        let parts = Parts::of(free.len(), &all, &place);
-        let of_vertices = |elements: &Elements| elements.of_vertices(chosen, self.parts, &place, parts);
-        let kinds = self.kinds.iter().map(of_vertices).collect();
+        let touched: Vec<Vec<u32>> =
+            self.kinds.iter().map(|elements| elements.at_vertices(chosen, self.parts, &number)).collect();
+        for (elements, touched) in self.kinds.iter().zip(&touched) {
+            for &v in touched.iter().flat_map(|&k| elements.vertices(k as usize)) {
+                let number = &mut number[v as usize];
+                if *number == FIXED {
+                    *number = vertices.len() as u32;
+                    vertices.push(v);
+                }
+            }
+        }
+        let place: Vec<u32> = (0..vertices.len() as u32).map(|n| if n < count { n } else { FIXED }).collect();
+        let subset = |(elements, touched): (&Elements, Vec<u32>)| -> Arc<dyn Constraints> {
+            Arc::new(Subset::of(elements.kind.clone(), touched, &number))
+        };
+        let kinds: Vec<_> = self.kinds.iter().zip(touched).map(subset).collect();
+        let parts = Parts::of(count as usize, &kinds, &place);
+        let divided = |(kind, whole): (Arc<dyn Constraints>, &Elements)| {
+            Elements::new(kind, whole.curved, &place, parts)
+        };
+        let kinds = kinds.into_iter().zip(&self.kinds).map(divided).collect();
         let (mut starts, mut columns) = (vec![0], Vec::new());
         for &row in chosen {
             let inside =
-                self.pattern.row(row as usize).iter().map(|&n| place[self.free[n as usize] as usize]);
-            columns.extend(inside.filter(|&column| column != FIXED));
+                self.pattern.row(row as usize).iter().map(|&n| number[self.free[n as usize] as usize]);
+            columns.extend(inside.filter(|&column| column < count));
             starts.push(columns.len());
         }
-        let weights = chosen.iter().map(|&place| self.weights[place as usize]).collect();
-        let pattern = Arc::new(Pattern { starts, columns });
-        let start = x.to_vec();
-        Self { kinds, free, place, pattern, parts, weights, origin: self.origin, start }
+        Self {
+            kinds,
+            free: (0..count).collect(),
+            place,
+            pattern: Arc::new(Pattern { starts, columns }),
+            parts,
+            weights: chosen.iter().map(|&place| self.weights[place as usize]).collect(),
+            origin: self.origin,
+            start: vertices.iter().map(|&v| x[v as usize]).collect(),
+            reach_m: self.reach_m,
+        }
     }
 }
 
 impl Elements {
-    /// The constraints at some vertices, which are at places `chosen` of the whole body and at
-    /// `place` of a part of it. The whole body is divided into `from`, and the part into `to`.
-    fn of_vertices(&self, chosen: &[u32], from: Parts, place: &[u32], to: Parts) -> Self {
-        let mut touched: Vec<usize> = chosen.iter().map(|&place| from.at(place)).collect();
+    /// The constraints at some vertices, which are at places `chosen` and have a number.
+    fn at_vertices(&self, chosen: &[u32], parts: Parts, number: &[u32]) -> Vec<u32> {
+        let mut touched: Vec<usize> = chosen.iter().map(|&place| parts.at(place)).collect();
         touched.dedup();
-        let inside = |&k: &u32| self.vertices(k as usize).iter().any(|&v| place[v as usize] != FIXED);
+        let inside = |&k: &u32| self.vertices(k as usize).iter().any(|&v| number[v as usize] != FIXED);
         let of_part = |&part: &usize| self.of_part(part).par_iter().copied().filter(inside);
         let mut all: Vec<u32> = touched.par_iter().flat_map(of_part).collect();
         all.sort_unstable();
         all.dedup();
-        Self::new(self.kind.clone(), self.curved, place, to, all.len(), |n| all[n])
+        all
     }
 }
 
@@ -120,25 +148,29 @@ mod tests {
         let chosen = body.far(&step);
         assert!(chosen.len() > 20 && chosen.binary_search(&(center as u32)).is_ok(), "{}", chosen.len());
         let part = body.part(&chosen, &x);
-        let (whole, own) = (body.at(x.clone()), part.at(x.clone()));
+        assert!(part.start.len() < body.start.len() / 4, "{}", part.start.len());
+        let (whole, own) = (body.at(x.clone()), part.at(part.start.clone()));
         for (&place, force) in chosen.iter().zip(&own.forces) {
             assert!((whole.forces[place as usize] - force).norm() <= 1e-12 * whole.norm, "{place}");
         }
         // The part knows the change of the energy that its vertices cause.
-        let back = |&v: &u32| body.start[v as usize] - x[v as usize];
-        let moves: Vec<Vector3<f64>> = part.free.iter().map(back).collect();
+        let vertex = |&place: &u32| body.free[place as usize] as usize;
+        let back = |place: &u32| body.start[vertex(place)] - x[vertex(place)];
+        let moves: Vec<Vector3<f64>> = chosen.iter().map(back).collect();
         let [of_part, of_whole] = [
             part.difference(&own, &part.moved(&own, &moves, 1.0, Vec::new())),
             body.difference(&whole, &body.at(body.start.clone())),
         ];
         assert!((of_part / of_whole - 1.0).abs() < 1e-9 && of_part < 0.0, "{of_part} and {of_whole} J");
-        let found = body.relaxed(&x, &step).unwrap().x;
-        let farthest = |from: &[Point3<f64>]| {
-            from.iter().zip(&body.start).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+        let found = body.relaxed(&x, &step).unwrap();
+        assert_eq!(found.places, chosen);
+        let farthest = |x: &mut dyn Iterator<Item = Point3<f64>>| {
+            let from_start = |(x, place): (Point3<f64>, &u32)| (x - body.start[vertex(place)]).norm();
+            x.zip(&chosen).map(from_start).fold(0.0, f64::max)
         };
-        assert!(farthest(&found) < 0.2 * farthest(&x), "{:e} m", farthest(&found));
-        let moved = |v: &usize| found[*v] != x[*v];
-        assert!((0..x.len()).filter(moved).all(|v| part.place[v] != FIXED));
+        let before = farthest(&mut chosen.iter().map(|place| x[vertex(place)]));
+        let after = farthest(&mut found.x.iter().copied());
+        assert!(after < 0.2 * before && after > 0.0, "{after:e} m of {before:e} m");
     }
 
     /// Evaluating only the parts that are touched gives the bits of evaluating all of them.

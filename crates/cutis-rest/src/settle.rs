@@ -48,8 +48,6 @@ pub struct Search<'a> {
     vectors: conjugate::Vectors,
     /// See [`Rest::complexity`].
     complexity: f64,
-    /// Longest displacement of a vertex in a step: half of the diagonal of the body, in m.
-    reach: f64,
     /// Length of a step in m below which the exact second derivatives are tried, and whether the
     /// last step was below.
     near_m: f64,
@@ -150,7 +148,6 @@ impl<'a> Search<'a> {
             matrix: body.empty_matrix(),
             vectors: conjugate::Vectors::default(),
             complexity: 1.0,
-            reach: 0.5 * diagonal(&body.start),
             near_m: f64::INFINITY,
             near: false,
             shift: 0.0,
@@ -260,12 +257,18 @@ impl<'a> Search<'a> {
 
     /// Brings the vertices to rest that moved much farther than the others in a step.
     fn relax(&mut self, step: &[Vector3<f64>]) {
-        let Some(Relaxed { x, places }) = self.body.relaxed(&self.state.x, step) else { return };
+        let Some(Relaxed { places, x: moved }) = self.body.relaxed(&self.state.x, step) else { return };
+        let mut x = self.body.copied(&self.state, std::mem::take(&mut self.spare));
+        for (&place, moved) in places.iter().zip(moved) {
+            x[self.body.free[place as usize] as usize] = moved;
+        }
         let relaxed = self.body.with_moved(&self.state, x, &places);
         let change = self.body.difference(&self.state, &relaxed);
         if change < 0.0 && relaxed.is_finite() {
             self.energy_change_j += change;
             self.spare = std::mem::replace(&mut self.state, relaxed).x;
+        } else {
+            self.spare = relaxed.x;
         }
     }
 
@@ -339,8 +342,8 @@ impl<'a> Search<'a> {
         let mut solution = conjugate::solve(matrix, &mut levels.multigrid, forces, tolerance, most, vectors);
         // Where nothing resists, the equations have no finite solution.
         let longest = solution.x.iter().map(Vector3::norm).fold(0.0, f64::max);
-        if longest > self.reach && longest.is_finite() {
-            solution.x.iter_mut().for_each(|x| *x *= self.reach / longest);
+        if longest > body.reach_m && longest.is_finite() {
+            solution.x.iter_mut().for_each(|x| *x *= body.reach_m / longest);
         }
         let cost = solution.cycles as f64 / -tolerance.log10();
         if cost > STALE * *levels.cost.get_or_insert(cost) {
