@@ -87,20 +87,34 @@ fn a_run_of_the_tuned_scene_confirms_the_prediction() {
     let promised = picked.error.unwrap();
     assert!(promised + tuning.reference.error <= 0.06 && tuning.reference.error <= 0.006, "{tuning:?}");
 
+    // The search for rest, which this test repeats, is as far from the reference of this test.
+    let system = cutis::build_system(&loaded).unwrap().system;
+    let [start, fine] = reference(&loaded, 2 * tuning.reference.substeps.last().unwrap());
+    let trial = &tuning.rest;
+    assert!(trial.stated_error.unwrap() <= loaded.scene.run.error && trial.ms > Some(0.0), "{trial:?}");
+    let gravity = cutis::build_system(&loaded).unwrap().settings.gravity_m_s2;
+    let rest = cutis::rest::Body::of(&system, gravity).unwrap();
+    let rest = rest.settle(&cutis::rest::Options::default(), &mut |_| ()).unwrap().positions;
+    let rest = rest.into_iter().zip(system.vertices()).filter(|(_, v)| v.inverse_mass() > 0.0);
+    let apart = rms(&rest.map(|(p, _)| p).collect::<Vec<_>>(), &fine) / rms(&fine, &start);
+    assert!((trial.difference.unwrap() - apart).abs() < 0.01, "{apart} and {trial:?}");
+    assert!(
+        apart > 0.0 && trial.wounds[0].difference_mm.abs() < 0.1 * trial.wounds[0].growth_mm,
+        "{trial:?}"
+    );
+
     // Only the settings differ.
     let mut expected = loaded.scene.clone();
     expected.solver = tuned.scene.solver.clone();
     assert_eq!(tuned.scene, expected);
 
-    let system = cutis::build_system(&loaded).unwrap().system;
-    let [rest, fine] = reference(&loaded, 2 * tuning.reference.substeps.last().unwrap());
     let run = |loaded: &LoadedScene| -> (Report, f64) {
         let mut kept = loaded.clone();
         kept.scene.run.checkpoint_every = 1000;
         let report = run_in(folder.path(), &kept, false).unwrap();
         let end = state(folder.path()).into_iter().zip(system.vertices());
         let end: Vec<_> = end.filter(|(_, v)| v.inverse_mass() > 0.0).map(|(p, _)| p).collect();
-        (report, rms(&end, &fine) / rms(&fine, &rest))
+        (report, rms(&end, &fine) / rms(&fine, &start))
     };
     let (report, error) = run(&tuned);
     assert!(near(error, promised), "an error of {error} and not {promised}");
@@ -305,4 +319,16 @@ fn a_time_limit_that_is_too_short_is_reported() {
     for words in ["needs about ", "substeps a frame for an error of 5 %", &late] {
         assert!(note.contains(words), "no {words:?} in {note}");
     }
+}
+
+/// Handles move in the frames, so that there is no state of rest to compare with.
+#[test]
+fn a_scene_with_handles_is_not_searched_for_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let handle = "[{ at_mm = [-40, 100, 0], radius_mm = 15, move_mm = [0, 20, 5] }]";
+    let loaded = scene(&[("run.frames", "2"), ("handle", handle)]);
+    let options = TuneOptions { minutes: 1e-6, ..options(folder.path().join("tuned.toml"), Demand::Default) };
+    let tuning = cutis::tune(&loaded, &options, &Silent).unwrap();
+    assert!(tuning.rest.skipped.as_ref().is_some_and(|why| why.contains("handles")), "{:?}", tuning.rest);
+    assert_eq!((tuning.rest.ms, tuning.rest.difference), (None, None));
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cutis::tune::{Candidate, Demand, Omission, RegionTrial, WoundError};
+use cutis::tune::{Candidate, Demand, Omission, RegionTrial, RestTrial, WoundError};
 use cutis::{Error, Scene, TuneOptions, Tuning};
 
 use super::pretty;
@@ -67,6 +67,7 @@ fn tables(tuning: &Tuning) -> String {
         "  > picked, * on the Pareto front (no cheaper setting is as accurate), = the scene's own".into(),
     );
     lines.extend(abandoned(tuning));
+    lines.push(at_rest(&tuning.rest));
     if !tuning.regions.is_empty() {
         lines.push("regions around the action, compared with the whole body".into());
         lines.push(region_row(
@@ -106,6 +107,21 @@ fn abandoned(tuning: &Tuning) -> Vec<String> {
     let line = |(why, settings): (&str, Vec<String>)| format!("  {why}: {}", settings.join("; "));
     let head = (!reasons.is_empty()).then(|| "not measured to the end:".to_owned());
     head.into_iter().chain(reasons.into_iter().map(line)).collect()
+}
+
+/// The search for rest, compared with the last frame of the reference.
+fn at_rest(trial: &RestTrial) -> String {
+    let (Some(ms), Some(stated), Some(apart)) = (trial.ms, trial.stated_error, trial.difference) else {
+        return format!("search for rest  not measured: {}", trial.skipped.as_deref().unwrap_or("no reason"));
+    };
+    let wounds = trial.wounds.iter().map(|wound| format!("; wound {}", difference(wound)));
+    format!(
+        "search for rest  {:.2} s, to an error of {:.2} %; {:.2} % from the last frame of the reference{}",
+        1e-3 * ms,
+        100.0 * stated,
+        100.0 * apart,
+        wounds.collect::<String>()
+    )
 }
 
 fn candidate_row(candidate: &Candidate, tuning: &Tuning) -> String {

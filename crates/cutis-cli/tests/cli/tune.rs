@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::{Desk, SCENE};
 
-const KEYS: [&str; 22] = [
+const KEYS: [&str; 25] = [
     "schema",
     "cutis_version",
     "machine",
@@ -23,6 +23,9 @@ const KEYS: [&str; 22] = [
     "picked.setting.formulation",
     "picked.ms_per_frame",
     "picked.error",
+    "rest.ms",
+    "rest.stated_error",
+    "rest.difference",
     "scene_file",
     "ledger.parts",
     "regions",
@@ -62,7 +65,9 @@ fn tune_prints_its_result_and_writes_a_copy_with_comments() {
     tune(&desk, "-o scene.toml --force").expect_error(2, &["scene.toml", "the scene itself"]);
     let done = tune(&desk, "--error 40 --force --settings-only").expect_success();
     let regions = "regions around the action";
-    for words in ["reference", "target", "ms/frame", "opening", "> picked", regions, "written:"] {
+    for words in
+        ["reference", "target", "ms/frame", "opening", "> picked", "search for rest", regions, "written:"]
+    {
         assert!(done.stdout.contains(words), "no {words:?} in {}", done.stdout);
     }
     let done = tune(&desk, "--error 40 --force --settings-only --whole-body").expect_success();

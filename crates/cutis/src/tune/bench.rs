@@ -136,7 +136,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Growth of each wound at `positions`, mm.
-    fn growths_mm<T: Scalar>(&self, positions: &[Point3<T>]) -> Vec<f64> {
+    pub(super) fn growths_mm<T: Scalar>(&self, positions: &[Point3<T>]) -> Vec<f64> {
         let now = |v: u32| positions[v as usize].map(T::to_f64);
         let rest = |v: u32| {
             let vertex = self.system.vertices()[v as usize].position() + self.system.origin().coords;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Demand, Omission, ReferenceReport, RegionTrial, Setting};
+use super::{Demand, Omission, ReferenceReport, RegionTrial, RestTrial, Setting};
 use crate::report::{Backend, Machine, Stage};
 use crate::{CostReport, Error};
 
@@ -35,6 +35,9 @@ pub struct Tuning {
     pub candidates: Vec<Candidate>,
     /// The picked setting; none if no setting meets the target.
     pub picked: Option<Candidate>,
+    /// The state of rest, which a search finds without frames.
+    #[serde(default)]
+    pub rest: RestTrial,
     /// The tuned copy of the scene; none if no setting meets the target.
     pub scene_file: Option<PathBuf>,
     /// Bytes and time of the picked setting by part; no parts if none was picked.

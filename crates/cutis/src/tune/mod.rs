@@ -8,14 +8,16 @@
 //!    with the reference (`trials`). A candidate is abandoned after a quarter or half of its frames
 //!    if a cheaper one of the same formulation is much more accurate at that point, or if it is
 //!    over budget;
-//! 3. regions of interest around the action, with the picked setting, until one has the opening of
+//! 3. the state of rest, which a search finds without frames (`at_rest`);
+//! 4. regions of interest around the action, with the picked setting, until one has the opening of
 //!    the whole body (`region`);
-//! 4. the scene without each of its parts, with the picked setting (`ablation`).
+//! 5. the scene without each of its parts, with the picked setting (`ablation`).
 //!
 //! The error and the time of the picked setting and region come from complete runs. A run of the
 //! tuned scene has the same displacements bit for bit. Its time differs if the machine is busier.
 
 mod ablation;
+mod at_rest;
 mod baseline;
 mod bench;
 mod choose;
@@ -45,6 +47,7 @@ use crate::scene::{LoadedScene, RegionSection, WholeBody};
 use crate::{CostReport, Error, Progress};
 
 pub use ablation::Omission;
+pub use at_rest::RestTrial;
 use baseline::Baseline;
 use bench::Bench;
 pub use choose::Demand;
@@ -113,6 +116,8 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
     let mut trials =
         Trials { bench: &bench, reference: &reference, demand: options.demand, done: Vec::new() };
     trials.run(own, limit_s - reference.report.seconds, &mut clock)?;
+    let rest =
+        clock.stage("search for rest", 0, |_| Ok(RestTrial::run(&bench, &loaded.scene, &reference)))?;
     let mut candidates = trials.done;
     choose::mark_front(&mut candidates);
     let place = candidates.iter().position(|candidate| candidate.own).unwrap_or(0);
@@ -129,6 +134,7 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         reference: reference.report,
         candidates,
         picked,
+        rest,
         scene_file: None,
         costs: CostReport { time: "no setting was picked".into(), ..CostReport::default() },
         regions: Vec::new(),
@@ -139,6 +145,9 @@ pub fn tune(loaded: &LoadedScene, options: &TuneOptions, progress: &dyn Progress
         let needed = tuning.needed().map(|needed| format!("the picked setting misses the target: {needed}"));
         tuning.warnings.extend(needed);
     }
+    let frames_ms = tuning.picked.as_ref().and_then(|picked| picked.ms_per_frame);
+    let frames_ms = frames_ms.map_or(0.0, |ms| ms * f64::from(tuning.frames));
+    tuning.warnings.extend(tuning.rest.advice(options.demand.region_error(), frames_ms));
     if let Some(picked) = &tuning.picked {
         let times = clock.stage("parts of a frame", 0, |_| bench.profile(picked.setting))?;
         let how = "one frame of the picked setting, each part timed separately";

@@ -47,6 +47,14 @@ pub(super) struct Reference {
     pub(super) report: ReferenceReport,
 }
 
+impl Reference {
+    /// Displacements at the last frame.
+    pub(super) fn at_end(&self) -> &Field {
+        static NONE: Field = Field(Vec::new());
+        self.fields.last().unwrap_or(&NONE)
+    }
+}
+
 /// Quality and cost of the reference.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ReferenceReport {
