@@ -114,7 +114,9 @@ fn at_rest(trial: &RestTrial) -> String {
     let (Some(ms), Some(stated), Some(apart)) = (trial.ms, trial.stated_error, trial.difference) else {
         return format!("search for rest  not measured: {}", trial.skipped.as_deref().unwrap_or("no reason"));
     };
-    let wounds = trial.wounds.iter().map(|wound| format!("; wound {}", difference(wound)));
+    let opens =
+        |wound: &WoundError| format!("; the wound opens by {:.3} mm, {}", wound.growth_mm, difference(wound));
+    let wounds = trial.wounds.iter().map(opens);
     format!(
         "search for rest  {:.2} s, to an error of {:.2} %; {:.2} % from the last frame of the reference{}",
         1e-3 * ms,
