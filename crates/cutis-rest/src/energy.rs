@@ -44,7 +44,7 @@ pub(crate) struct Scratch {
     pub own: Evaluation,
     /// Gradients at other positions.
     pub ahead: Vec<Vector3<f64>>,
-    /// Second derivatives of all pairs of vertices, see [`Scratch::differentiate_all`].
+    /// Second derivatives, see [`Scratch::differentiate`].
     pub curvature: Vec<Matrix3<f64>>,
     /// The scaled gradients of a constraint.
     pub scaled: Vec<Scaled>,
@@ -187,6 +187,6 @@ impl Body {
 
 /// The sum of the sizes of the coordinates.
 #[inline]
-pub(crate) fn norm_1(x: &Vector3<f64>) -> f64 {
+fn norm_1(x: &Vector3<f64>) -> f64 {
     x.x.abs() + x.y.abs() + x.z.abs()
 }

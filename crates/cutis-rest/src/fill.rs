@@ -10,13 +10,11 @@ use crate::blocks::{Block, Pattern};
 use crate::body::FIXED;
 use crate::constraints::{Constraints, Evaluation};
 use crate::elements::Elements;
-use crate::energy::{Scratch, norm_1};
+use crate::energy::Scratch;
 use crate::matrix::Matrix;
 
 /// Constraints of a kind that are tried for curvature.
 const TRIED: usize = 16;
-/// The sum of gradients that cancel, over their sizes.
-const CANCEL: f64 = 1e-12;
 
 /// The constraints whose second derivatives count.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -94,18 +92,15 @@ impl Body {
                 }
                 scratch.scaled.push(Scaled::new(place, gradient));
             }
-            if counts {
-                let inside = |vertex: &Scaled| to.rows.contains(&(vertex.place as usize));
-                scratch.differentiate_all(&*elements.kind, k, inside);
-            }
             for own in 0..arity {
                 let Scaled { place, gradient, rows: left, .. } = scratch.scaled[own];
                 let row = place as usize;
                 if !to.rows.contains(&row) {
                     continue;
                 }
-                // Empty where no second derivatives count.
-                let curvature = scratch.curvature.get(own * arity..).unwrap_or_default();
+                if counts {
+                    scratch.differentiate(&*elements.kind, k, own);
+                }
                 let whole = &mut wholes[row - to.rows.start];
                 add_outer(whole, &gradient, &all);
                 let columns = to.pattern.row(row);
@@ -113,7 +108,7 @@ impl Body {
                 for (b, Scaled { place: column, columns: right, .. }) in scratch.scaled.iter().enumerate() {
                     let curved = counts && *column != FIXED;
                     if curved {
-                        add(whole.as_flattened_mut(), c * stiffness, &curvature[b]);
+                        add(whole.as_flattened_mut(), c * stiffness, &scratch.curvature[b]);
                     }
                     if *column == FIXED || (to.rows.start..row + 1).contains(&(*column as usize)) {
                         continue;
@@ -128,7 +123,7 @@ impl Body {
                         block[n] += left[n] * right[n];
                     }
                     if curved {
-                        add(block, (c * stiffness) as f32, &curvature[b].map(|x| x as f32));
+                        add(block, (c * stiffness) as f32, &scratch.curvature[b].map(|x| x as f32));
                     }
                 }
             }
@@ -221,39 +216,12 @@ fn add<T: nalgebra::RealField + Copy>(to: &mut [T], factor: T, matrix: &Matrix3<
 }
 
 impl Scratch {
-    /// The second derivatives `∂²C/∂x_own∂x_b` of a constraint after
-    /// [`evaluate`](Constraints::evaluate), for those vertices `own` that are wanted, and possibly
-    /// for others.
-    ///
-    /// Most constraints do not change if all their vertices move alike. Their gradients cancel, and
-    /// so do the derivatives of these, which give those of the last vertex.
-    fn differentiate_all(&mut self, kind: &dyn Constraints, k: usize, wanted: impl Fn(&Scaled) -> bool) {
-        let gradients = &self.own.gradients;
-        let arity = gradients.len();
-        let (sum, size) = gradients
-            .iter()
-            .fold((Vector3::zeros(), 0.0), |(sum, size), gradient| (sum + gradient, size + norm_1(gradient)));
-        let cancel = arity > 1 && norm_1(&sum) <= CANCEL * size;
-        self.curvature.clear();
-        self.curvature.resize(arity * arity, Matrix3::zeros());
-        for own in 0..arity {
-            let needed = if cancel { own + 1 < arity } else { wanted(&self.scaled[own]) };
-            if needed {
-                self.differentiate(kind, k, own);
-            }
-        }
-        if cancel {
-            let (others, last) = self.curvature.split_at_mut(arity * (arity - 1));
-            for of_vertex in others.chunks_exact(arity) {
-                last.iter_mut().zip(of_vertex).for_each(|(last, other)| *last -= other);
-            }
-        }
-    }
-
-    /// Forward differences of the gradients over the position of one vertex.
+    /// Forward differences of the gradients over the position of one vertex, after
+    /// [`evaluate`](Self::evaluate): `∂²C/∂x_own∂x_b` for each vertex `b`.
     fn differentiate(&mut self, kind: &dyn Constraints, k: usize, own: usize) {
         let Self { own: Evaluation { places, gradients, .. }, ahead, curvature, .. } = self;
-        let curvature = &mut curvature[own * places.len()..][..places.len()];
+        curvature.clear();
+        curvature.resize(places.len(), Matrix3::zeros());
         let first = places[0];
         let extent = places.iter().map(|place| (place - first).norm_squared()).fold(0.0, f64::max).sqrt();
         let step = f64::EPSILON.sqrt() * extent;
@@ -284,15 +252,12 @@ pub(crate) fn is_curved(kind: &dyn Constraints, x: &[Point3<f64>]) -> bool {
     let count = kind.len();
     (0..count).step_by(count.div_ceil(TRIED).max(1)).any(|k| {
         kind.evaluate(k, x, &mut scratch.own);
-        let arity = kind.arity();
-        scratch.curvature.clear();
-        scratch.curvature.resize(arity * arity, Matrix3::zeros());
         let Evaluation { places, gradients, .. } = &scratch.own;
         let size = gradients.iter().map(Vector3::norm).fold(0.0, f64::max);
         let extent = places.iter().map(|place| (place - places[0]).norm()).fold(0.0, f64::max);
-        (0..arity).any(|own| {
+        (0..kind.arity()).any(|own| {
             scratch.differentiate(kind, k, own);
-            scratch.curvature[own * arity + own].norm() * extent > 1e-3 * size
+            scratch.curvature[own].norm() * extent > 1e-3 * size
         })
     })
 }
