@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::WoundError;
 use super::bench::Bench;
 use super::reference::Reference;
+use crate::model::constraints::rest_options;
 use crate::scene::Scene;
 
 /// The state of rest, compared with the last frame of the reference.
@@ -36,7 +37,7 @@ impl RestTrial {
             let why = "handles move the body in the frames";
             return Self { skipped: Some(why.into()), ..Self::default() };
         }
-        let options = Options { error: scene.run.error, ..Options::default() };
+        let options = rest_options(scene.run.error);
         match Self::searched(bench, &options, reference) {
             Ok(trial) => trial,
             Err(error) => Self { skipped: Some(error.to_string()), ..Self::default() },

@@ -30,6 +30,7 @@ pub(crate) use estimate::CostEstimate;
 use hooks::Hooks;
 pub(super) use kinds::contact::fill_default;
 use solver_run::SolverRun;
+pub(crate) use solver_run::rest_options;
 use start::StartedSolver;
 pub(crate) use start::{device_memory, start};
 use threads::Threads;

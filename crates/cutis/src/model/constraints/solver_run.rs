@@ -22,6 +22,11 @@ const COLLAPSED: f64 = 0.01;
 /// precision: they leave about 3e-6 in a body that is at rest in the scan.
 const BALANCED: f64 = 1e-5;
 
+/// When a search for the state of rest of a scene ends, for its `run.error`.
+pub(crate) fn rest_options(error: f64) -> cutis_rest::Options {
+    cutis_rest::Options { error, force: BALANCED, ..Default::default() }
+}
+
 /// Name of the work of cuts that grow in a profile.
 const CUT: &str = "cut";
 
@@ -225,7 +230,7 @@ impl Simulation for SolverRun<'_> {
         hooks::place(solver.system()?, time_s, &mut placed);
         solver.restore(&placed, &velocities, frame)?;
         let body = cutis_rest::Body::of(solver.system()?, gravity)?;
-        let options = cutis_rest::Options { error, force: BALANCED, ..Default::default() };
+        let options = rest_options(error);
         let before: Vec<Point3<f64>> = before.iter().map(|x| x.cast()).collect();
         let rest = body.settle_after(&before, &options, progress)?;
         let positions: Vec<Point3<f32>> = rest.positions.iter().map(|x| x.cast()).collect();
