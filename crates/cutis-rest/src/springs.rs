@@ -7,14 +7,7 @@ use nalgebra::Point3;
 
 /// A block of springs and volumes whose bottom is held. It has several parts.
 pub(crate) fn block() -> System<f64> {
-    let Kuhn { positions, tets, .. } = Kuhn::new([10, 10, 60], 0.01);
-    let mut edges: Vec<[u32; 2]> = tets
-        .iter()
-        .flat_map(|&[a, b, c, d]| [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
+    let Kuhn { positions, edges, tets, .. } = Kuhn::new([10, 10, 60], 0.01);
     let inverse_mass = |x: &Point3<f64>| if x.z < 0.005 { 0.0 } else { 1e3 };
     let inverse_masses: Vec<f64> = positions.iter().map(inverse_mass).collect();
     let colors = cutis_coloring::greedy(&edges, positions.len()).unwrap();
