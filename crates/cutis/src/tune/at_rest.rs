@@ -19,7 +19,7 @@ pub struct RestTrial {
     /// Wall time of the search, ms.
     pub ms: Option<f64>,
     /// Error that the search states: distance from rest over the displacement, both as roots of
-    /// mean squares. At most `run.error`.
+    /// mean squares. At most `run.error`, unless all forces cancel to single precision before.
     pub stated_error: Option<f64>,
     /// Distance from the reference at the last frame: RMS of the positions over RMS displacement.
     pub difference: Option<f64>,
