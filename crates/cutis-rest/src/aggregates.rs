@@ -24,21 +24,21 @@ impl Aggregates {
     /// rest join the aggregate to which they couple most. Nodes with many neighbors come first,
     /// because larger aggregates make smaller levels.
     pub fn of<const B: usize, const L: usize>(matrix: &impl Operator<B, L>) -> Self {
-        let (count, pattern) = (matrix.nodes(), matrix.pattern());
-        let size = |row: usize| pattern.find(row, row).map_or(0.0, |place| norm(&matrix.block(place)));
+        let (count, graph) = (matrix.nodes(), &*matrix.above().neighbors);
+        let size = |row: usize| norm(&matrix.diagonal(row));
         let sizes: Vec<f64> = (0..count).into_par_iter().with_min_len(ROWS).map(size).collect();
         let strong = |row: usize| {
-            matrix.row(row).filter_map({
+            matrix.above().row(row).filter_map({
                 let sizes = &sizes;
                 move |(column, block)| {
                     let strength = norm(&block);
-                    let is_strong = column != row && strength > WEAK * (sizes[row] * sizes[column]).sqrt();
+                    let is_strong = strength > WEAK * (sizes[row] * sizes[column]).sqrt();
                     is_strong.then_some((column, strength))
                 }
             })
         };
-        let neighbors = |row: usize| pattern.row(row).len();
-        let mean = pattern.columns.len().div_ceil(count.max(1));
+        let neighbors = |row: usize| graph.of(row).len();
+        let mean = (2 * graph.blocks()).div_ceil(count.max(1));
         let (most, few): (Vec<usize>, Vec<usize>) = (0..count).partition(|&row| neighbors(row) >= mean);
         let mut of = vec![NONE; count];
         let mut aggregates = 0;

@@ -12,7 +12,7 @@ pub(crate) const ROWS: usize = 256;
 pub(crate) const AHEAD: usize = 512;
 
 /// Numbers after the last block, so that a register can be read at the last column of a block.
-const PADDING: usize = 8;
+pub(crate) const PADDING: usize = 8;
 
 /// A block with `R` rows and `C` columns, column by column.
 pub(crate) type Block<const R: usize, const C: usize> = [[f64; R]; C];
@@ -26,27 +26,10 @@ pub(crate) struct Pattern {
 }
 
 impl Pattern {
-    /// Number of rows of blocks.
-    pub fn height(&self) -> usize {
-        self.starts.len() - 1
-    }
-
     /// Places of the blocks of a row.
     #[inline]
     pub fn places(&self, row: usize) -> Range<usize> {
         self.starts[row]..self.starts[row + 1]
-    }
-
-    /// Columns of the blocks of a row.
-    #[inline]
-    pub fn row(&self, row: usize) -> &[u32] {
-        &self.columns[self.places(row)]
-    }
-
-    /// The place of the block in a row and a column, if it is stored.
-    pub fn find(&self, row: usize, column: usize) -> Option<usize> {
-        let found = self.row(row).binary_search(&(column as u32)).ok()?;
-        Some(self.starts[row] + found)
     }
 }
 
@@ -60,47 +43,52 @@ pub(crate) struct Blocks<const R: usize, const C: usize> {
 }
 
 impl<const R: usize, const C: usize> Blocks<R, C> {
-    /// A matrix row by row: `row` adds the blocks of a row to the sums.
-    pub fn by_rows(rows: Range<usize>, width: usize, row: impl Fn(&mut Sums<R, C>, usize) + Sync) -> Self {
-        let part = |sums: &mut Sums<R, C>, part: usize| {
-            let (mut ends, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
-            let start = rows.start + part * ROWS;
-            for n in start..(start + ROWS).min(rows.end) {
-                row(sums, n);
-                sums.take(&mut columns, &mut values);
-                ends.push(columns.len());
-            }
-            (ends, columns, values)
+    /// A matrix row by row: `columns` lists the columns of a row, in any order and also more than
+    /// once, and `row` adds its blocks to the sums.
+    pub fn by_rows(
+        height: usize,
+        width: usize,
+        columns: impl Fn(usize, &mut Vec<u32>) + Sync,
+        row: impl Fn(&mut Sums<R, C>, usize) + Sync,
+    ) -> Self {
+        let count = |list: &mut Vec<u32>, row: usize| {
+            list.clear();
+            columns(row, list);
+            list.sort_unstable();
+            list.dedup();
+            list.len()
         };
-        let parts = 0..rows.len().div_ceil(ROWS);
-        let parts: Vec<_> = parts.into_par_iter().map_init(|| Sums::new(width), part).collect();
-        let count = parts.iter().map(|(_, columns, _)| columns.len()).sum();
-        let mut starts = Vec::with_capacity(rows.len() + 1);
-        let mut columns = Vec::with_capacity(count);
-        let mut values = Vec::with_capacity(R * C * count + PADDING);
+        let counts: Vec<usize> =
+            (0..height).into_par_iter().with_min_len(ROWS).map_init(Vec::new, count).collect();
+        let mut starts = Vec::with_capacity(height + 1);
         starts.push(0);
-        for (ends, of_part, numbers) in parts {
-            let before = columns.len();
-            starts.extend(ends.iter().map(|end| before + end));
-            columns.extend(of_part);
-            values.extend(numbers);
+        for (n, count) in counts.into_iter().enumerate() {
+            starts.push(starts[n] + count);
         }
-        values.resize(values.len() + PADDING, 0.0);
+        let mut columns = vec![0; starts[height]];
+        let mut values = vec![0.0; R * C * columns.len() + PADDING];
+        let (mut rest, mut of_rest) = (&mut columns[..], &mut values[..]);
+        let mut parts = Vec::with_capacity(height.div_ceil(ROWS));
+        for start in (0..height).step_by(ROWS) {
+            let rows = start..(start + ROWS).min(height);
+            let count = starts[rows.end] - starts[start];
+            let (columns, after) = rest.split_at_mut(count);
+            let (values, after_values) = of_rest.split_at_mut(R * C * count);
+            parts.push((rows, columns, values));
+            (rest, of_rest) = (after, after_values);
+        }
+        parts.into_par_iter().for_each_init(
+            || Sums::new(width),
+            |sums, (rows, columns, values)| {
+                let before = starts[rows.start];
+                for n in rows {
+                    row(sums, n);
+                    let own = starts[n] - before..starts[n + 1] - before;
+                    sums.take(&mut columns[own.clone()], &mut values[R * C * own.start..R * C * own.end]);
+                }
+            },
+        );
         Self { pattern: Pattern { starts, columns }, width, values }
-    }
-
-    /// Appends the rows of another matrix.
-    pub fn append(&mut self, rows: Self) {
-        let before = self.pattern.columns.len();
-        self.pattern.starts.extend(rows.pattern.starts[1..].iter().map(|end| before + end));
-        self.pattern.columns.extend(rows.pattern.columns);
-        self.values.truncate(self.values.len() - PADDING);
-        self.values.extend(rows.values);
-    }
-
-    /// Number of numbers.
-    pub fn len(&self) -> usize {
-        R * C * self.pattern.columns.len()
     }
 
     /// A block in double precision.
@@ -137,27 +125,6 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
                 sum[row] += values[R * column + row] * x[column];
             }
         }
-    }
-
-    /// One row of blocks times a vector.
-    #[inline(always)]
-    pub fn row_times<const L: usize>(&self, row: usize, x: impl Fn(usize) -> [f32; L]) -> [f32; L] {
-        // Two sums, so that an addition does not wait for the one before.
-        let mut sums = [[0.0; L]; 2];
-        for place in self.pattern.places(row) {
-            // A block of 36 numbers lies in two or three lines of the cache.
-            prefetch(&self.values, R * C * place + AHEAD);
-            prefetch(&self.values, R * C * place + AHEAD + 16);
-            let x = x(self.pattern.columns[place] as usize);
-            let values = &self.values[R * C * place..][..R * (C - 1) + L];
-            for column in 0..C {
-                let sum = &mut sums[column % 2];
-                for row in 0..L {
-                    sum[row] += values[R * column + row] * x[column];
-                }
-            }
-        }
-        std::array::from_fn(|row| if row < R { sums[0][row] + sums[1][row] } else { 0.0 })
     }
 
     /// One row of transposed blocks times a vector, whose numbers beyond `R` are zeros.
@@ -197,6 +164,12 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         });
         Blocks { pattern, width, values }
     }
+}
+
+/// The transposed block.
+#[inline(always)]
+pub(crate) fn transposed<const B: usize>(block: &Block<B, B>) -> Block<B, B> {
+    std::array::from_fn(|column| std::array::from_fn(|row| block[row][column]))
 }
 
 /// Adds `left · right`.
@@ -241,7 +214,7 @@ pub(crate) struct Sums<const R: usize, const C: usize> {
 }
 
 impl<const R: usize, const C: usize> Sums<R, C> {
-    fn new(width: usize) -> Self {
+    pub fn new(width: usize) -> Self {
         Self { places: vec![0; width], columns: Vec::new(), sums: Vec::new() }
     }
 
@@ -256,13 +229,32 @@ impl<const R: usize, const C: usize> Sums<R, C> {
         &mut self.sums[self.places[column] as usize - 1]
     }
 
-    /// Appends the sums in the order of their columns, and clears them.
-    fn take(&mut self, columns: &mut Vec<u32>, values: &mut Vec<f32>) {
+    /// Writes the sums in the order of their columns, and clears them.
+    fn take(&mut self, columns: &mut [u32], values: &mut [f32]) {
+        let mut to = columns.iter_mut().zip(values.chunks_exact_mut(R * C));
+        self.drain(|column, sum| {
+            let Some((to_column, to_values)) = to.next() else { return };
+            *to_column = column;
+            to_values.iter_mut().zip(sum.as_flattened()).for_each(|(to, &x)| *to = x as f32);
+        });
+    }
+
+    /// Appends the sums of the columns from one on, in their order, and clears all.
+    pub fn append_from(&mut self, first: usize, columns: &mut Vec<u32>, values: &mut Vec<f32>) {
+        self.drain(|column, sum| {
+            if column as usize >= first {
+                columns.push(column);
+                values.extend(sum.as_flattened().iter().map(|&x| x as f32));
+            }
+        });
+    }
+
+    /// Clears the sums. `each` receives them in the order of their columns.
+    fn drain(&mut self, mut each: impl FnMut(u32, &Block<R, C>)) {
         self.columns.sort_unstable();
         for (column, place) in self.columns.drain(..) {
             self.places[column as usize] = 0;
-            columns.push(column);
-            values.extend(self.sums[place as usize].as_flattened().iter().map(|&x| x as f32));
+            each(column, &self.sums[place as usize]);
         }
         self.sums.clear();
     }
@@ -287,7 +279,7 @@ impl Columns {
         }
         let mut next = starts.clone();
         let mut blocks = vec![(0, 0); columns.len()];
-        for row in 0..matrix.pattern.height() {
+        for row in 0..matrix.pattern.starts.len() - 1 {
             for place in matrix.pattern.places(row) {
                 let at = &mut next[columns[place] as usize];
                 blocks[*at] = (row as u32, place as u32);

@@ -9,13 +9,13 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::RestError;
-use crate::blocks::Pattern;
 use crate::constraints::Constraints;
 use crate::elements::{Elements, Parts, joined};
 use crate::energy::State;
 use crate::fill::is_curved;
 use crate::order::near_neighbors;
 use crate::settle::diagonal;
+use crate::symmetric::Neighbors;
 
 /// Mark of a vertex that cannot move.
 pub(crate) const FIXED: u32 = u32::MAX;
@@ -27,9 +27,8 @@ pub struct Body {
     pub(crate) free: Vec<u32>,
     /// For each vertex its place in `free`, or [`FIXED`].
     pub(crate) place: Vec<u32>,
-    /// For each free vertex the places of the free ones that share a constraint with it, and its
-    /// own, ascending.
-    pub(crate) pattern: Arc<Pattern>,
+    /// For each free vertex the places of the free ones that share a constraint with it.
+    pub(crate) neighbors: Arc<Neighbors>,
     /// How the free vertices are divided.
     pub(crate) parts: Parts,
     /// Weight and load of each free vertex in N.
@@ -93,10 +92,10 @@ impl Body {
             Elements::new(kind, curved, &place, parts)
         };
         let kinds: Vec<Elements> = kinds.into_iter().map(divided).collect();
-        let pattern = Arc::new(neighbors(&kinds, &place, free.len(), parts));
+        let neighbors = Arc::new(neighbors(&kinds, &place, free.len(), parts));
         let origin = system.origin().coords.map(T::to_f64);
         let reach_m = 0.5 * diagonal(&start);
-        Ok(Self { kinds, free, place, pattern, parts, weights, origin, start, reach_m })
+        Ok(Self { kinds, free, place, neighbors, parts, weights, origin, start, reach_m })
     }
 
     /// Places of the vertices that can move.
@@ -115,15 +114,13 @@ impl Body {
     }
 }
 
-/// See [`Body::pattern`].
-fn neighbors(kinds: &[Elements], place: &[u32], free: usize, parts: Parts) -> Pattern {
+/// See [`Body::neighbors`].
+fn neighbors(kinds: &[Elements], place: &[u32], free: usize, parts: Parts) -> Neighbors {
+    // The later neighbors.
     let of_part = |rows: &mut Vec<Vec<u32>>, part: usize| -> (Vec<usize>, Vec<u32>) {
         let range = part * parts.size..((part + 1) * parts.size).min(free);
         rows.resize(range.len(), Vec::new());
-        for (row, own) in rows.iter_mut().zip(range.clone()) {
-            row.clear();
-            row.push(own as u32);
-        }
+        rows.iter_mut().for_each(Vec::clear);
         for elements in kinds {
             // In a lattice the next constraint has its neighbors at the same places of the rows.
             let mut slots = vec![0; elements.kind.arity().pow(2)];
@@ -138,7 +135,8 @@ fn neighbors(kinds: &[Elements], place: &[u32], free: usize, parts: Parts) -> Pa
                     let slots = &mut slots[own * vertices.len()..][..vertices.len()];
                     for (slot, &other) in slots.iter_mut().zip(vertices) {
                         let column = place[other as usize];
-                        if column != FIXED && row.get(*slot) != Some(&column) {
+                        let is_later = column != FIXED && column as usize > own_place;
+                        if is_later && row.get(*slot) != Some(&column) {
                             *slot = row.iter().position(|&known| known == column).unwrap_or(row.len());
                             if *slot == row.len() {
                                 row.push(column);
@@ -158,6 +156,5 @@ fn neighbors(kinds: &[Elements], place: &[u32], free: usize, parts: Parts) -> Pa
     for count in counts.iter().flatten() {
         starts.push(starts[starts.len() - 1] + count);
     }
-    let (_, columns) = joined(columns);
-    Pattern { starts, columns }
+    Neighbors::from_later(starts, &joined(columns).1)
 }

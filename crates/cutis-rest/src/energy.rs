@@ -73,8 +73,9 @@ impl Body {
     /// parts with a constraint at one of them are evaluated.
     pub(crate) fn with_moved(&self, state: &State, x: Vec<Point3<f64>>, places: &[u32]) -> State {
         let mut touched = vec![false; state.values.len()];
-        for &neighbor in places.iter().flat_map(|&place| self.pattern.row(place as usize)) {
-            touched[self.parts.at(neighbor)] = true;
+        for &place in places {
+            touched[self.parts.at(place)] = true;
+            self.neighbors.of(place as usize).iter().for_each(|&n| touched[self.parts.at(n)] = true);
         }
         let State { values, sums, forces, .. } = state;
         let (values, sums, forces) = (values.clone(), sums.clone(), forces.clone());

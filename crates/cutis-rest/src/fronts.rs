@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use crate::blocks::Pattern;
+use crate::symmetric::Neighbors;
 
 /// Numbers of the matrix in a piece.
 const PIECE: usize = 1 << 20;
@@ -25,15 +25,16 @@ pub(crate) struct Fronts<const N: usize> {
 }
 
 impl<const N: usize> Fronts<N> {
-    /// The fronts for a symmetric pattern with this many numbers in a block.
-    pub fn of(pattern: &Pattern, numbers: usize) -> Self {
-        let height = pattern.height();
-        let mean = (numbers * pattern.columns.len()).div_ceil(height.max(1));
+    /// The fronts for nodes with these neighbors, and blocks of this many numbers.
+    pub fn of(neighbors: &Neighbors, numbers: usize) -> Self {
+        let height = neighbors.count();
+        let mean = (numbers * neighbors.blocks()).div_ceil(height.max(1));
         let piece = (PIECE / mean.max(1)).max(1);
         // The end of the neighbors of each piece.
         let reach = |start: usize| {
             let rows = start..(start + piece).min(height);
-            rows.filter_map(|row| pattern.row(row).last()).max().map_or(0, |&last| last as usize + 1)
+            let last = |row: usize| neighbors.later(row).last().map_or(row, |&last| last as usize);
+            rows.map(last).max().map_or(0, |last| last + 1)
         };
         let reaches: Vec<usize> = (0..height).step_by(piece).map(reach).collect();
         let mut fronts = Vec::new();
@@ -66,24 +67,15 @@ impl<const N: usize> Fronts<N> {
 mod tests {
     use super::*;
 
-    /// A band of a width, and a row far away that some rows need.
-    fn pattern(height: usize, width: usize, far: Option<usize>) -> Pattern {
-        let (mut starts, mut columns) = (vec![0], Vec::new());
+    /// The neighbors in a band of a width, and a row far away that the first one needs.
+    fn neighbors(height: usize, width: usize, far: Option<usize>) -> Neighbors {
+        let (mut starts, mut later) = (vec![0], Vec::new());
         for row in 0..height {
-            let mut own: Vec<usize> = (row.saturating_sub(width)..(row + width + 1).min(height)).collect();
-            if let Some(far) = far {
-                if row == far {
-                    own.push(0);
-                } else if row == 0 {
-                    own.push(far);
-                }
-            }
-            own.sort_unstable();
-            own.dedup();
-            columns.extend(own.into_iter().map(|column| column as u32));
-            starts.push(columns.len());
+            later.extend((row + 1..(row + width + 1).min(height)).map(|neighbor| neighbor as u32));
+            later.extend(far.filter(|_| row == 0).map(|far| far as u32));
+            starts.push(later.len());
         }
-        Pattern { starts, columns }
+        Neighbors::from_later(starts, &later)
     }
 
     /// Each stage takes each row once, and after the stage before has left the row's neighbors.
@@ -91,16 +83,17 @@ mod tests {
     #[test]
     fn a_stage_takes_rows_whose_neighbors_are_done() {
         for (height, width, far) in [(1, 0, None), (40_000, 300, None), (40_000, 300, Some(39_000))] {
-            let pattern = pattern(height, width, far);
-            let fronts = Fronts::<3>::of(&pattern, 9);
+            let neighbors = neighbors(height, width, far);
+            let fronts = Fronts::<3>::of(&neighbors, 9);
             let mut done = [0; 3];
             for front in &fronts.fronts {
                 for (n, rows) in front.iter().enumerate() {
                     assert_eq!(rows.start, done[n]);
                     for row in rows.clone() {
-                        let (low, high) = (pattern.row(row)[0], pattern.row(row)[pattern.row(row).len() - 1]);
-                        assert!(n == 0 || (high as usize) < done[n - 1], "stage {n}, row {row}");
-                        assert!(n > 0 || low as usize >= front[2].end || front[2].is_empty(), "row {row}");
+                        let of_row = || neighbors.of(row).iter().map(|&node| node as usize).chain([row]);
+                        let (low, high) = (of_row().min().unwrap(), of_row().max().unwrap());
+                        assert!(n == 0 || high < done[n - 1], "stage {n}, row {row}");
+                        assert!(n > 0 || low >= front[2].end || front[2].is_empty(), "row {row}");
                     }
                 }
                 done = [0, 1, 2].map(|n| front[n].end);
@@ -114,7 +107,7 @@ mod tests {
     #[test]
     fn the_stages_are_near_each_other() {
         let apart = |far: Option<usize>| {
-            let fronts = Fronts::<3>::of(&pattern(400_000, 300, far), 9);
+            let fronts = Fronts::<3>::of(&neighbors(400_000, 300, far), 9);
             fronts.fronts.iter().map(|front| front[0].end - front[2].end).max().unwrap()
         };
         assert!(apart(None) < 5_000, "{}", apart(None));

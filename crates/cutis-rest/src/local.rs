@@ -10,10 +10,10 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::blocks::Pattern;
 use crate::body::FIXED;
 use crate::constraints::{Constraints, Subset};
 use crate::elements::{Elements, Parts};
+use crate::symmetric::Neighbors;
 use crate::{Body, Options, Search};
 
 /// A vertex moved far if it moved by this many times the root of the mean square.
@@ -56,11 +56,11 @@ impl Body {
         let far = |place: &u32| step[*place as usize].norm_squared() > FAR * FAR * mean;
         let mut chosen: Vec<u32> = (0..step.len() as u32).filter(far).collect();
         for _ in 0..RINGS {
-            let rings = chosen.iter().flat_map(|&place| self.pattern.row(place as usize));
-            let mut next: Vec<u32> = rings.copied().collect();
-            next.sort_unstable();
-            next.dedup();
-            chosen = next;
+            let rings: Vec<u32> =
+                chosen.iter().flat_map(|&place| self.neighbors.of(place as usize)).copied().collect();
+            chosen.extend(rings);
+            chosen.sort_unstable();
+            chosen.dedup();
         }
         chosen
     }
@@ -95,18 +95,18 @@ impl Body {
             Elements::new(kind, whole.curved, &place, parts)
         };
         let kinds = kinds.into_iter().zip(&self.kinds).map(divided).collect();
-        let (mut starts, mut columns) = (vec![0], Vec::new());
+        let (mut starts, mut later) = (vec![0], Vec::new());
         for &row in chosen {
-            let inside =
-                self.pattern.row(row as usize).iter().map(|&n| number[self.free[n as usize] as usize]);
-            columns.extend(inside.filter(|&column| column < count));
-            starts.push(columns.len());
+            let row = row as usize;
+            let numbers = self.neighbors.later(row).iter().map(|&n| number[self.free[n as usize] as usize]);
+            later.extend(numbers.filter(|&number| number < count));
+            starts.push(later.len());
         }
         Self {
             kinds,
             free: (0..count).collect(),
             place,
-            pattern: Arc::new(Pattern { starts, columns }),
+            neighbors: Arc::new(Neighbors::from_later(starts, &later)),
             parts,
             weights: chosen.iter().map(|&place| self.weights[place as usize]).collect(),
             origin: self.origin,

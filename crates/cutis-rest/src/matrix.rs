@@ -1,13 +1,11 @@
 //! The matrix of a Newton step.
 
-use std::sync::Arc;
-
-use cutis_constraints::prefetch;
 use simba::simd::{SimdValue, WideF32x4};
 
 use crate::Body;
-use crate::blocks::{AHEAD, Block, Pattern};
+use crate::blocks::Block;
 use crate::smoother::Operator;
+use crate::symmetric::Above;
 
 /// The matrix of a step in single precision, applied to differences between neighbors.
 ///
@@ -16,85 +14,52 @@ use crate::smoother::Operator;
 /// precision, `A x` at a node is `S_i x_i + Σ_j A_ij (x_j − x_i)`. Then rounding is relative to the
 /// strain and not to the displacement.
 pub(crate) struct Matrix {
-    pub(crate) pattern: Arc<Pattern>,
-    /// The blocks one after the other, each column by column, and a zero, so that four numbers can
-    /// be read at the last column.
-    pub(crate) values: Vec<f32>,
+    pub(crate) above: Above<3>,
     /// `S_i`, with a zero after each column.
     pub(crate) sums: Vec<[[f32; 4]; 3]>,
 }
 
 impl Operator<3, 4> for Matrix {
-    fn pattern(&self) -> &Pattern {
-        &self.pattern
-    }
-
-    fn block(&self, place: usize) -> Block<3, 3> {
-        let values = &self.values[9 * place..][..9];
-        std::array::from_fn(|column| std::array::from_fn(|row| f64::from(values[3 * column + row])))
+    fn above(&self) -> &Above<3> {
+        &self.above
     }
 
     fn diagonal(&self, node: usize) -> Block<3, 3> {
-        let mut sum = [[0.0; 3]; 3];
-        for (to, from) in sum.iter_mut().zip(&self.sums[node]) {
-            for n in 0..3 {
-                to[n] = f64::from(from[n]);
+        let mut diagonal = [[0.0; 3]; 3];
+        self.for_each(node, |_, block| diagonal = block);
+        diagonal
+    }
+
+    #[inline]
+    fn for_each(&self, row: usize, mut each: impl FnMut(usize, Block<3, 3>)) {
+        let mut diagonal: Block<3, 3> =
+            self.sums[row].map(|column| std::array::from_fn(|n| f64::from(column[n])));
+        for (column, block) in self.above.row(row) {
+            for (to, from) in diagonal.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
+                *to -= from;
             }
+            each(column, block);
         }
-        for (column, block) in self.row(node) {
-            if column != node {
-                for (to, from) in sum.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
-                    *to -= from;
-                }
-            }
-        }
-        sum
+        each(row, diagonal);
     }
 
     #[inline(always)]
     fn row_times(&self, node: usize, x: impl Fn(usize) -> [f32; 4]) -> [f32; 4] {
         let own = WideF32x4::from(x(node));
-        let mut sum = WideF32x4::splat(0.0);
-        let places = self.pattern.places(node);
-        let neighbors = &self.pattern.columns[places.clone()];
-        let mut values = &self.values[9 * places.start..9 * places.end + 1];
-        let mut ahead = 9 * places.start + AHEAD;
-        for &neighbor in neighbors {
-            // The block, and the number after it.
-            let Some(block) = values.first_chunk::<10>() else { break };
-            values = &values[9..];
-            prefetch(&self.values, ahead);
-            ahead += 9;
-            let difference = columns(WideF32x4::from(x(neighbor as usize)) - own);
-            for (column, difference) in difference.into_iter().enumerate() {
-                let block: [f32; 4] = std::array::from_fn(|row| block[3 * column + row]);
-                sum += WideF32x4::from(block) * difference;
-            }
-        }
+        let [mut sum] = self.above.row_times(node, |neighbor| [WideF32x4::from(x(neighbor)) - own]);
         // Last, because it may be much larger. Coming first, it would round off all others.
-        for (column, own) in self.sums[node].iter().zip(columns(own)) {
-            sum += WideF32x4::from(*column) * own;
+        let own: [f32; 4] = own.into();
+        for (column, own) in self.sums[node].iter().zip(own) {
+            sum += WideF32x4::from(*column) * WideF32x4::splat(own);
         }
         let [x, y, z, _] = sum.into();
         [x, y, z, 0.0]
     }
 }
 
-/// The first three numbers, each in all lanes.
-#[inline(always)]
-fn columns(x: WideF32x4) -> [WideF32x4; 3] {
-    let x: [f32; 4] = x.into();
-    std::array::from_fn(|n| WideF32x4::splat(x[n]))
-}
-
 impl Body {
     /// A matrix of zeros with a block for each pair of vertices that share a constraint.
     pub(crate) fn empty_matrix(&self) -> Matrix {
-        let count = self.free.len();
-        Matrix {
-            pattern: self.pattern.clone(),
-            values: vec![0.0; 9 * self.pattern.columns.len() + 1],
-            sums: vec![[[0.0; 4]; 3]; count],
-        }
+        Matrix { above: Above::zeros(self.neighbors.clone()), sums: vec![[[0.0; 4]; 3]; self.free.len()] }
     }
 }

@@ -12,13 +12,14 @@ use crate::aggregates::Aggregates;
 use crate::blocks::{Blocks, Columns, ROWS};
 use crate::matrix::Matrix;
 use crate::smoother::{Operator, Smoother};
+use crate::symmetric::Symmetric;
 use crate::transfer::{self, Modes};
 use crate::vectors::Vector;
 
 /// Unknowns of a rigid body.
 pub(crate) const RIGID: usize = 6;
 /// [`RIGID`] and the zeros of a vector.
-const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 /// Blocks after the present one that are fetched into the cache.
 const AHEAD: usize = 8;
 /// A level with at most this many nodes is solved directly.
@@ -37,7 +38,7 @@ struct Level<const B: usize, const L: usize> {
 
 /// A level below the finest one.
 struct Coarse {
-    matrix: Blocks<RIGID, RIGID>,
+    matrix: Symmetric<RIGID, LANES>,
     level: Level<RIGID, LANES>,
 }
 
@@ -63,16 +64,16 @@ impl Multigrid {
         let modes = places.iter().map(transfer::rigid_modes).collect();
         let (fine, mut matrix, mut modes) = Level::new(matrix, modes);
         let mut coarse = Vec::new();
-        while matrix.pattern.height() > BOTTOM {
-            let before = matrix.pattern.height();
+        while matrix.nodes() > BOTTOM {
+            let before = matrix.nodes();
             let (level, next, next_modes) = Level::new(&matrix, modes);
             coarse.push(Coarse { matrix, level });
             (matrix, modes) = (next, next_modes);
-            if matrix.pattern.height() * 10 > before * 9 {
+            if matrix.nodes() * 10 > before * 9 {
                 break;
             }
         }
-        Self { fine: Some(fine), coarse, bottom: Bottom::new::<RIGID, LANES>(&matrix) }
+        Self { fine: Some(fine), coarse, bottom: Bottom::new(&matrix) }
     }
 
     /// Adapts the smoother of the finest level to another matrix. The other levels stay.
@@ -107,8 +108,8 @@ impl Multigrid {
 
     /// Numbers in the matrices of all levels over those of the first one.
     pub fn complexity(&self, matrix: &Matrix) -> f64 {
-        let coarse: usize = self.coarse.iter().map(|coarse| coarse.matrix.len()).sum();
-        1.0 + coarse as f64 / (9 * matrix.pattern().columns.len()) as f64
+        let coarse: usize = self.coarse.iter().map(|coarse| coarse.matrix.numbers()).sum();
+        1.0 + coarse as f64 / matrix.numbers() as f64
     }
 }
 
@@ -127,7 +128,7 @@ impl<const B: usize, const L: usize> Level<B, L> {
     fn new(
         matrix: &impl Operator<B, L>,
         modes: Vec<Modes<B>>,
-    ) -> (Self, Blocks<RIGID, RIGID>, Vec<Modes<RIGID>>) {
+    ) -> (Self, Symmetric<RIGID, LANES>, Vec<Modes<RIGID>>) {
         let aggregates = Aggregates::of(matrix);
         let (tentative, next_modes) = transfer::tentative(&aggregates, modes);
         let smoother = Smoother::new(matrix);
@@ -183,16 +184,13 @@ impl Bottom {
         let size = B * matrix.nodes();
         let mut dense = DMatrix::zeros(size, size);
         for row in 0..matrix.nodes() {
-            for (column, mut block) in matrix.row(row) {
-                if column == row {
-                    block = matrix.diagonal(row);
-                }
+            matrix.for_each(row, |column, block| {
                 for (j, of_column) in block.iter().enumerate() {
                     for (i, &value) in of_column.iter().enumerate() {
                         dense[(B * row + i, B * column + j)] = value;
                     }
                 }
-            }
+            });
         }
         let mut shift = 0.0;
         let mean = if size > 0 { dense.diagonal().sum() / size as f64 } else { 1.0 };

@@ -3,8 +3,9 @@
 use nalgebra::{Cholesky, SMatrix};
 use rayon::prelude::*;
 
-use crate::blocks::{Block, Blocks, Pattern, ROWS};
+use crate::blocks::{Block, ROWS};
 use crate::fronts::Fronts;
+use crate::symmetric::Above;
 use crate::vectors::{Vector, dot};
 
 /// Matrix products of a smoother.
@@ -16,47 +17,26 @@ const POWER_STEPS: [usize; 2] = [12, 3];
 
 /// A matrix with one row of blocks per node.
 pub(crate) trait Operator<const B: usize, const L: usize>: Sync {
-    /// Where the blocks are.
-    fn pattern(&self) -> &Pattern;
-    /// A block. On the diagonal it may be less exact than [`diagonal`](Self::diagonal).
-    fn block(&self, place: usize) -> Block<B, B>;
+    /// The blocks above the diagonal.
+    fn above(&self) -> &Above<B>;
     /// The block of a node on the diagonal.
     fn diagonal(&self, node: usize) -> Block<B, B>;
+    /// Gives the columns and blocks of a row to `each`, the one on the diagonal last.
+    fn for_each(&self, row: usize, each: impl FnMut(usize, Block<B, B>));
     /// The row of a node times a vector, which `x` has at each node.
     fn row_times(&self, node: usize, x: impl Fn(usize) -> [f32; L]) -> [f32; L];
     /// Number of nodes.
     fn nodes(&self) -> usize {
-        self.pattern().height()
+        self.above().neighbors.count()
     }
-    /// Columns and blocks of a row.
-    #[inline]
-    fn row(&self, node: usize) -> impl Iterator<Item = (usize, Block<B, B>)> {
-        let pattern = self.pattern();
-        pattern.places(node).map(|place| (pattern.columns[place] as usize, self.block(place)))
+    /// Numbers of all blocks, on both sides of the diagonal.
+    fn numbers(&self) -> usize {
+        B * B * (self.nodes() + 2 * self.above().neighbors.blocks())
     }
     /// The matrix times a vector.
     fn times(&self, x: &[[f32; L]], to: &mut [[f32; L]]) {
         let row = |(node, to): (usize, &mut [f32; L])| *to = self.row_times(node, |node| x[node]);
         to.par_iter_mut().enumerate().with_min_len(ROWS).for_each(row);
-    }
-}
-
-impl<const B: usize, const L: usize> Operator<B, L> for Blocks<B, B> {
-    fn pattern(&self) -> &Pattern {
-        &self.pattern
-    }
-
-    fn block(&self, place: usize) -> Block<B, B> {
-        Blocks::block(self, place)
-    }
-
-    fn diagonal(&self, node: usize) -> Block<B, B> {
-        self.pattern.find(node, node).map_or([[0.0; B]; B], |place| Blocks::block(self, place))
-    }
-
-    #[inline(always)]
-    fn row_times(&self, node: usize, x: impl Fn(usize) -> [f32; L]) -> [f32; L] {
-        Blocks::row_times(self, node, x)
     }
 }
 
@@ -92,7 +72,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
             largest: 1.0,
             vector: (0..nodes).map(start).collect(),
             changes: [zero.clone(), zero],
-            fronts: Fronts::of(matrix.pattern(), B * B),
+            fronts: Fronts::of(&matrix.above().neighbors, B * B),
         };
         smoother.invert(matrix);
         smoother.find_largest(matrix, POWER_STEPS[0]);
@@ -303,37 +283,39 @@ fn noise(n: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::symmetric::{Rows, Symmetric};
 
     /// A symmetric band, in which each node has some neighbors on both sides.
-    fn band(count: usize) -> Blocks<3, 3> {
-        Blocks::by_rows(0..count, count, |sums, row| {
-            for column in row.saturating_sub(6)..(row + 7).min(count) {
-                let (low, high) = (row.min(column), row.max(column));
-                let strength = if row == column { 20.0 } else { f64::from(noise(7 * low + high)) };
-                for n in 0..3 {
+    fn band(count: usize) -> Symmetric<6, 8> {
+        let rows = Rows::of(0..count, count, |sums, row| {
+            for column in row..(row + 7).min(count) {
+                let strength = if row == column { 20.0 } else { f64::from(noise(7 * row + column)) };
+                for n in 0..6 {
                     sums.at(column)[n][n] += strength + n as f64 / 8.0;
+                    sums.at(column)[n][5 - n] += strength / 4.0;
                 }
             }
-        })
+        });
+        rows.into()
     }
 
     /// Products that go through the rows together give the bits of products one after the other.
     #[test]
     fn products_together_give_the_bits_of_single_ones() {
         let matrix = band(60_000);
-        let vector = |seed: usize| -> Vector<4> {
-            let number = |node: usize, n: usize| if n < 3 { noise(seed + 3 * node + n) } else { 0.0 };
+        let vector = |seed: usize| -> Vector<8> {
+            let number = |node: usize, n: usize| if n < 6 { noise(seed + 6 * node + n) } else { 0.0 };
             (0..60_000).map(|node| std::array::from_fn(|n| number(node, n))).collect()
         };
-        let mut smoother = Smoother::<3, 4>::new(&matrix);
+        let mut smoother = Smoother::<6, 8>::new(&matrix);
         assert!(smoother.fronts.fronts.len() > 5, "{}", smoother.fronts.fronts.len());
         let (right, start) = (vector(0), vector(1_000_000));
-        let times = |x: &Vector<4>| {
+        let times = |x: &Vector<8>| {
             let mut product = start.clone();
             matrix.times(x, &mut product);
             product
         };
-        let minus = |a: &Vector<4>, b: &Vector<4>| -> Vector<4> {
+        let minus = |a: &Vector<8>, b: &Vector<8>| -> Vector<8> {
             a.iter().zip(b).map(|(a, b)| std::array::from_fn(|n| a[n] - b[n])).collect()
         };
         let (mut x, mut change, mut r) = (start.clone(), start.clone(), right.clone());
@@ -354,7 +336,7 @@ mod tests {
         let mut residual = right.clone();
         smoother.start(&matrix, &mut found, &mut residual);
         let exact = minus(&right, &times(&found));
-        let largest = |x: &Vector<4>| x.as_flattened().iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+        let largest = |x: &Vector<8>| x.as_flattened().iter().fold(0.0, |most: f32, x| most.max(x.abs()));
         assert!(largest(&minus(&exact, &residual)) < 1e-5 * largest(&right));
     }
 }

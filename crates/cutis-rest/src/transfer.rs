@@ -4,9 +4,10 @@ use nalgebra::{Point3, SMatrix};
 use rayon::prelude::*;
 
 use crate::aggregates::Aggregates;
-use crate::blocks::{Block, Blocks, Columns, ROWS, add_product, add_transposed_product};
-use crate::multigrid::RIGID;
+use crate::blocks::{Block, Blocks, Columns, ROWS, Sums, add_product, add_transposed_product};
+use crate::multigrid::{LANES, RIGID};
 use crate::smoother::Operator;
+use crate::symmetric::{Rows, Symmetric};
 
 /// Parts in which the matrix of the next level is made.
 const CHUNKS: usize = 8;
@@ -89,18 +90,22 @@ pub(crate) fn smoothed<const B: usize, const L: usize>(
     tentative: &[Modes<B>],
 ) -> Blocks<B, RIGID> {
     let damping = -4.0 / 3.0 / f64::from(largest);
-    Blocks::by_rows(0..tentative.len(), aggregates.count, |sums, row| {
+    let columns = |row: usize, list: &mut Vec<u32>| {
+        let neighbors = matrix.above().neighbors.of(row).iter().map(|&node| node as usize);
+        list.extend(neighbors.chain([row]).map(|node| aggregates.of[node]));
+    };
+    Blocks::by_rows(tentative.len(), aggregates.count, columns, |sums, row| {
         let own = sums.at(aggregates.of[row] as usize);
         for (to, from) in own.as_flattened_mut().iter_mut().zip(tentative[row].as_flattened()) {
             *to += from;
         }
         let mut factor = inverse(row);
         factor.as_flattened_mut().iter_mut().for_each(|x| *x *= damping);
-        for (column, block) in matrix.row(row) {
+        matrix.for_each(row, |column, block| {
             let mut step = [[0.0; B]; B];
             add_product(&mut step, &factor, &block);
             add_product(sums.at(aggregates.of[column] as usize), &step, &tentative[column]);
-        }
+        });
     })
 }
 
@@ -112,11 +117,12 @@ pub(crate) fn galerkin<const B: usize, const L: usize>(
     matrix: &impl Operator<B, L>,
     prolongation: &Blocks<B, RIGID>,
     columns: &Columns,
-) -> Blocks<RIGID, RIGID> {
+) -> Symmetric<RIGID, LANES> {
     let count = prolongation.width;
     let chunk = count.div_ceil(CHUNKS).max(ROWS);
     let mut place = vec![u32::MAX; matrix.nodes()];
-    let mut whole: Option<Blocks<RIGID, RIGID>> = None;
+    let mut product: Vec<Part<B>> = Vec::new();
+    let mut next = Rows::default();
     for start in (0..count).step_by(chunk) {
         let rows = start..(start + chunk).min(count);
         let mut fine: Vec<u32> = Vec::new();
@@ -128,33 +134,70 @@ pub(crate) fn galerkin<const B: usize, const L: usize>(
         }
         fine.sort_unstable();
         fine.iter().enumerate().for_each(|(n, &node)| place[node as usize] = n as u32);
-        let product = Blocks::<B, RIGID>::by_rows(0..fine.len(), count, |sums, n| {
-            let row = fine[n] as usize;
-            for (column, mut block) in matrix.row(row) {
-                if column == row {
-                    block = matrix.diagonal(row);
+        product.resize_with(fine.len().div_ceil(ROWS).max(product.len()), Part::default);
+        product.par_iter_mut().zip(fine.par_chunks(ROWS)).for_each_init(
+            || Sums::new(count),
+            |sums, (part, nodes)| {
+                part.clear();
+                for &row in nodes {
+                    matrix.for_each(row as usize, |column, block| {
+                        for (to, right) in prolongation.row(column) {
+                            add_product(sums.at(to), &block, &right);
+                        }
+                    });
+                    part.push(sums);
                 }
-                for (to, right) in prolongation.row(column) {
-                    add_product(sums.at(to), &block, &right);
-                }
-            }
-        });
-        let next = Blocks::<RIGID, RIGID>::by_rows(rows, count, |sums, row| {
+            },
+        );
+        next.append(Rows::of(rows, count, |sums, row| {
             for &(node, at) in columns.of_column(row) {
                 let left = prolongation.block(at as usize);
-                for (to, right) in product.row(place[node as usize] as usize) {
-                    add_transposed_product(sums.at(to), &left, &right);
+                let node = place[node as usize] as usize;
+                for (to, right) in product[node / ROWS].row(node % ROWS) {
+                    if to >= row {
+                        add_transposed_product(sums.at(to), &left, &right);
+                    }
                 }
             }
             hold_missing_modes(sums.at(row));
-        });
+        }));
         fine.iter().for_each(|&node| place[node as usize] = u32::MAX);
-        match &mut whole {
-            Some(whole) => whole.append(next),
-            none => *none = Some(next),
-        }
     }
-    whole.unwrap_or_else(|| Blocks::by_rows(0..0, count, |_, _| ()))
+    next.into()
+}
+
+/// Some rows of `A P`.
+#[derive(Default)]
+struct Part<const B: usize> {
+    ends: Vec<usize>,
+    columns: Vec<u32>,
+    values: Vec<f32>,
+}
+
+impl<const B: usize> Part<B> {
+    fn clear(&mut self) {
+        self.ends.clear();
+        self.columns.clear();
+        self.values.clear();
+    }
+
+    /// Appends the row with these sums, and clears them.
+    fn push(&mut self, sums: &mut Sums<B, RIGID>) {
+        sums.append_from(0, &mut self.columns, &mut self.values);
+        self.ends.push(self.columns.len());
+    }
+
+    /// Columns and blocks of a row.
+    #[inline]
+    fn row(&self, row: usize) -> impl Iterator<Item = (usize, Block<B, RIGID>)> {
+        let start = row.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let own = start..self.ends[row];
+        let blocks = self.values[B * RIGID * own.start..].chunks_exact(B * RIGID);
+        self.columns[own].iter().zip(blocks).map(|(&column, values)| {
+            let block = |n: usize, row: usize| f64::from(values[B * n + row]);
+            (column as usize, std::array::from_fn(|n| std::array::from_fn(|row| block(n, row))))
+        })
+    }
 }
 
 /// Gives the unknowns of missing modes, whose rows are zero, a diagonal.
