@@ -44,6 +44,7 @@ mod settle;
 mod smoother;
 #[cfg(test)]
 mod springs;
+mod sweep;
 mod symmetric;
 mod transfer;
 mod vectors;

@@ -153,8 +153,7 @@ impl<const B: usize, const L: usize> Level<B, L> {
         below: impl FnOnce(&[[f32; LANES]], &mut [[f32; LANES]]),
     ) {
         let Self { smoother, prolongation, columns, residual, coarse } = self;
-        residual.copy_from_slice(right);
-        smoother.start(matrix, to, residual);
+        smoother.start(matrix, right, to, residual);
         let mut restricted = vec![[0.0; LANES]; coarse.len()];
         let restrict = |(column, to): (usize, &mut [f32; LANES])| {
             let blocks = columns.of_column(column);

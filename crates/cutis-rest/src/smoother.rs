@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::blocks::{Block, ROWS};
 use crate::fronts::Fronts;
+use crate::sweep::{Factors, Rows, Stage, Sweep};
 use crate::symmetric::Above;
 use crate::vectors::{Vector, dot};
 
@@ -51,15 +52,8 @@ pub(crate) struct Smoother<const B: usize, const L: usize> {
     vector: Vector<L>,
     /// The change of each unknown, and the next change.
     changes: [Vector<L>; 2],
-    /// The rows that the products take together.
-    fronts: Fronts<4>,
-}
-
-/// The factors of the changes after three products, for the change before and for the residual.
-#[derive(Clone, Copy)]
-struct Factors {
-    first: [(f32, f32); 2],
-    last: Option<(f32, f32)>,
+    /// The order in which the products take the rows. Without it they come one after the other.
+    fronts: Option<Fronts<4>>,
 }
 
 impl<const B: usize, const L: usize> Smoother<B, L> {
@@ -72,7 +66,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
             largest: 1.0,
             vector: (0..nodes).map(start).collect(),
             changes: [zero.clone(), zero],
-            fronts: Fronts::of(&matrix.above().neighbors, B * B),
+            fronts: Fronts::of(&matrix.above().neighbors),
         };
         smoother.invert(matrix);
         smoother.find_largest(matrix, POWER_STEPS[0]);
@@ -136,7 +130,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
     }
 
     /// The factors of a change, for the change before and for the residual, one pair per step.
-    fn factors(&self) -> [(f32, f32); PRODUCTS] {
+    fn factors(&self) -> [Factors; PRODUCTS] {
         let (middle, half) = (0.5 * self.largest * (1.0 + SPECTRUM), 0.5 * self.largest * (1.0 - SPECTRUM));
         let ratio = middle / half;
         let mut factors = [(0.0, 1.0 / middle); PRODUCTS];
@@ -149,17 +143,21 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         factors
     }
 
-    /// Smooths from zero. `residual` is the right-hand side before, and the residual of `x` after.
-    pub fn start(&mut self, matrix: &impl Operator<B, L>, x: &mut [[f32; L]], residual: &mut [[f32; L]]) {
+    /// Smooths from zero. Writes the result to `x`, and its residual.
+    pub fn start(
+        &mut self,
+        matrix: &impl Operator<B, L>,
+        right: &[[f32; L]],
+        x: &mut [[f32; L]],
+        residual: &mut [[f32; L]],
+    ) {
         let [(_, first), second, third] = self.factors();
-        let rows = x.par_iter_mut().zip(&*residual).zip(&self.inverse).with_min_len(ROWS);
-        rows.for_each(|((x, r), inverse)| *x = times(inverse, r).map(|step| first * step));
-        let factors = Factors { first: [second, third], last: None };
-        self.steps(matrix, None, x, residual, factors, None);
+        let stages = [Stage::Start(first), Stage::First(second), Stage::Second(third), Stage::Third(None)];
+        self.run(matrix, stages, right, [x, residual], None);
     }
 
-    /// Smooths an approximation `x`. `residual` is memory for the residual. Writes the matrix times
-    /// the result to `product`, if there is one.
+    /// Smooths an approximation `x`. `residual` is memory. Writes the matrix times the result to
+    /// `product`, if there is one.
     pub fn smooth(
         &mut self,
         matrix: &impl Operator<B, L>,
@@ -169,88 +167,28 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
         product: Option<&mut [[f32; L]]>,
     ) {
         let [first, second, third] = self.factors();
-        let factors = Factors { first: [first, second], last: Some(third) };
-        self.steps(matrix, Some(right), x, residual, factors, product);
+        let stages = [Stage::First(first), Stage::Second(second), Stage::Third(Some(third)), Stage::Product];
+        self.run(matrix, stages, right, [x, residual], product);
     }
 
-    /// Three products with the matrix, and a change of `x` after each of the first two, and also
-    /// after the third one if there are factors for it. The first product is that with `x`, and the
-    /// others are those with the changes. A change is a multiple of the change before, or of `x`,
-    /// plus a multiple of the inverse blocks times the residual. `right` is the right-hand side.
-    /// Without it, `residual` has it. The fourth product is that with the last `x`.
-    ///
-    /// All products move through the rows together, see [`Fronts`].
-    fn steps(
+    /// Runs the stages at all rows.
+    fn run(
         &mut self,
         matrix: &impl Operator<B, L>,
-        right: Option<&[[f32; L]]>,
-        x: &mut [[f32; L]],
-        residual: &mut [[f32; L]],
-        Factors { first: factors, last }: Factors,
-        mut product: Option<&mut [[f32; L]]>,
+        stages: [Stage; 4],
+        right: &[[f32; L]],
+        [x, residual]: [&mut [[f32; L]]; 2],
+        product: Option<&mut [[f32; L]]>,
     ) {
-        let Self { inverse, changes: [first, second], fronts, .. } = self;
-        let rows = fronts.rows;
-        let step = |node: usize, from: &[f32; L], r: &[f32; L], (old, new): (f32, f32)| {
-            let step = times(&inverse[node], r);
-            std::array::from_fn::<f32, L, _>(|n| old * from[n] + new * step[n])
-        };
-        for [a, b, c, d] in &fronts.fronts {
-            // The fourth product reads `x` where the third one has finished, and the first one
-            // reads it where the third one has not begun.
-            let (x_done, x_rest) = x.split_at_mut(c.start);
-            let (x_c, x_ahead) = x_rest.split_at_mut(c.len());
-            let (first_done, first_rest) = first.split_at_mut(a.start);
-            let (second_done, second_rest) = second.split_at_mut(b.start);
-            let (r_done, r_a) = residual.split_at_mut(a.start);
-            let (r_done, r_b) = r_done.split_at_mut(b.start);
-            let r_c = &mut r_done[c.clone()];
-            let r_b = &mut r_b[..b.len()];
-            let first_stage = || {
-                let of_rows = first_rest[..a.len()].par_iter_mut().zip(&mut r_a[..a.len()]).enumerate();
-                of_rows.with_min_len(rows).for_each(|(n, (change, r))| {
-                    let node = a.start + n;
-                    let product = matrix.row_times(node, |node| x_ahead[node - c.end]);
-                    let before = right.map_or(*r, |right| right[node]);
-                    *r = std::array::from_fn(|n| before[n] - product[n]);
-                    *change = step(node, &x_ahead[node - c.end], r, factors[0]);
-                });
-            };
-            let second_stage = || {
-                let of_rows = second_rest[..b.len()].par_iter_mut().zip(r_b).enumerate();
-                of_rows.with_min_len(rows).for_each(|(n, (change, r))| {
-                    let node = b.start + n;
-                    let product = matrix.row_times(node, |node| first_done[node]);
-                    *r = std::array::from_fn(|n| r[n] - product[n]);
-                    *change = step(node, &first_done[node], r, factors[1]);
-                });
-            };
-            let third_stage = || {
-                let of_rows = x_c.par_iter_mut().zip(r_c).enumerate();
-                of_rows.with_min_len(rows).for_each(|(n, (x, r))| {
-                    let node = c.start + n;
-                    let product = matrix.row_times(node, |node| second_done[node]);
-                    *r = std::array::from_fn(|n| r[n] - product[n]);
-                    let last = last.map(|factors| step(node, &second_done[node], r, factors));
-                    for n in 0..L {
-                        x[n] = x[n] + first_done[node][n] + second_done[node][n];
-                        x[n] += last.map_or(0.0, |last| last[n]);
-                    }
-                });
-            };
-            let fourth_stage = || {
-                let Some(product) = &mut product else { return };
-                let of_rows = product[d.clone()].par_iter_mut().enumerate().with_min_len(rows);
-                of_rows.for_each(|(n, to)| *to = matrix.row_times(d.start + n, |node| x_done[node]));
-            };
-            rayon::join(|| rayon::join(first_stage, second_stage), || rayon::join(third_stage, fourth_stage));
-        }
+        let Self { inverse, changes: [one, two], fronts, .. } = self;
+        let vectors = Rows { first: 0, x, residual, changes: [one, two], product };
+        Sweep { matrix, inverse, right, stages }.run(fronts.as_ref(), vectors);
     }
 }
 
 /// A block times a vector.
 #[inline(always)]
-fn times<const B: usize, const L: usize>(block: &[[f32; L]; B], x: &[f32; L]) -> [f32; L] {
+pub(crate) fn times<const B: usize, const L: usize>(block: &[[f32; L]; B], x: &[f32; L]) -> [f32; L] {
     let mut sum = [0.0; L];
     for column in 0..B {
         for row in 0..L {
@@ -308,7 +246,6 @@ mod tests {
             (0..60_000).map(|node| std::array::from_fn(|n| number(node, n))).collect()
         };
         let mut smoother = Smoother::<6, 8>::new(&matrix);
-        assert!(smoother.fronts.fronts.len() > 5, "{}", smoother.fronts.fronts.len());
         let (right, start) = (vector(0), vector(1_000_000));
         let times = |x: &Vector<8>| {
             let mut product = start.clone();
@@ -327,16 +264,21 @@ mod tests {
                 x[node] = std::array::from_fn(|n| x[node][n] + change[n]);
             }
         }
-        let (mut found, mut residual, mut product) = (start.clone(), start.clone(), start.clone());
-        smoother.smooth(&matrix, &right, &mut found, &mut residual, Some(&mut product));
-        assert!(found == x && residual == r && product == times(&x));
-        assert!(product != times(&start), "control");
+        for together in [true, false] {
+            if !together {
+                smoother.fronts = None;
+            }
+            assert_eq!(smoother.fronts.is_some(), together);
+            let (mut found, mut residual, mut product) = (start.clone(), start.clone(), start.clone());
+            smoother.smooth(&matrix, &right, &mut found, &mut residual, Some(&mut product));
+            assert!(found == x && residual == r && product == times(&x), "{together}");
+            assert!(product != times(&start), "control");
 
-        // From zero the residual comes out.
-        let mut residual = right.clone();
-        smoother.start(&matrix, &mut found, &mut residual);
-        let exact = minus(&right, &times(&found));
-        let largest = |x: &Vector<8>| x.as_flattened().iter().fold(0.0, |most: f32, x| most.max(x.abs()));
-        assert!(largest(&minus(&exact, &residual)) < 1e-5 * largest(&right));
+            // From zero the residual comes out.
+            smoother.start(&matrix, &right, &mut found, &mut residual);
+            let exact = minus(&right, &times(&found));
+            let largest = |x: &Vector<8>| x.as_flattened().iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+            assert!(largest(&minus(&exact, &residual)) < 1e-5 * largest(&right), "{together}");
+        }
     }
 }

@@ -143,20 +143,21 @@ impl<const B: usize> Above<B> {
         row: usize,
         x: impl Fn(usize) -> [WideF32x4; N],
     ) -> [WideF32x4; N] {
-        let Self { neighbors, values } = self;
+        let (neighbors, values) = (&*self.neighbors, &self.values[..]);
         let zero = WideF32x4::splat(0.0);
         let (below, above) = (neighbors.below(row), neighbors.above(row));
         let (earlier, later) = neighbors.of(row).split_at(below.len());
         // The sums of a transposed block's columns come at the end.
         let mut columns = [[zero; N]; B];
-        for (n, (&neighbor, &place)) in earlier.iter().zip(&neighbors.below[below.clone()]).enumerate() {
-            if let Some(&place) = neighbors.below.get(below.start + n + BLOCKS_AHEAD) {
-                for number in (0..B * B).step_by(16).chain([B * B - 1]) {
-                    prefetch(values, B * B * place as usize + number);
-                }
+        let places = &neighbors.below[below.start..];
+        for (n, (&neighbor, &place)) in earlier.iter().zip(places).enumerate() {
+            if let Some(&place) = places.get(n + BLOCKS_AHEAD) {
+                let first = B * B * place as usize;
+                prefetch_lines(values, first, B * B);
+                prefetch(values, first + B * B - 1);
             }
-            let values = values.get(B * B * place as usize..);
-            let Some(block) = values.and_then(|values| values.get(..B * (B - 1) + 4 * N)) else { break };
+            let from = values.get(B * B * place as usize..);
+            let Some(block) = from.and_then(|from| from.get(..B * (B - 1) + 4 * N)) else { break };
             let x = x(neighbor as usize);
             for (column, sums) in columns.iter_mut().enumerate() {
                 for r in 0..N {
@@ -173,11 +174,11 @@ impl<const B: usize> Above<B> {
         }
         let mut sums = sums.map(WideF32x4::from);
         let mut numbers = B * B * above.start;
-        let mut values = &values[numbers..B * B * above.end + 4 * N - B];
+        let mut of_row = &values[numbers..B * B * above.end + 4 * N - B];
         for &neighbor in later {
-            let Some(block) = values.get(..B * (B - 1) + 4 * N) else { break };
-            values = &values[B * B..];
-            prefetch(&self.values, numbers + AHEAD);
+            let Some(block) = of_row.get(..B * (B - 1) + 4 * N) else { break };
+            of_row = &of_row[B * B..];
+            prefetch_lines(values, numbers + AHEAD, B * B);
             numbers += B * B;
             let x: [[f32; 4]; N] = x(neighbor as usize).map(Into::into);
             for column in 0..B {
@@ -194,8 +195,18 @@ impl<const B: usize> Above<B> {
 /// Four numbers from a place on.
 #[inline(always)]
 fn register(values: &[f32], place: usize) -> WideF32x4 {
-    let numbers: [f32; 4] = std::array::from_fn(|n| values[place + n]);
-    numbers.into()
+    let numbers: Option<&[f32; 4]> = values[place..].first_chunk();
+    numbers.copied().unwrap_or_default().into()
+}
+
+/// Fetches some numbers into the cache, one line of it after the other.
+#[inline(always)]
+fn prefetch_lines(values: &[f32], first: usize, count: usize) {
+    let mut number = 0;
+    while number < count {
+        prefetch(values, first + number);
+        number += 16;
+    }
 }
 
 /// A symmetric matrix with `B` unknowns per node, in vectors of `L` numbers.
