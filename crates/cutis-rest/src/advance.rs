@@ -89,7 +89,7 @@ impl Search<'_> {
             let parabola = -0.5 * slope * length * length / (change - slope * length);
             let within = (0.1 * length)..=(0.5 * length);
             let length = if within.contains(&parabola) { parabola } else { 0.3 * length };
-            self.spare = tried.state.x;
+            self.spare = tried.state;
             tried = self.moved(direction, length, slope);
             if self.is_lower(&tried) {
                 return Some(tried);

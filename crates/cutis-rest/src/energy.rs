@@ -15,7 +15,7 @@ pub(crate) struct State {
     /// Positions of all vertices.
     pub x: Vec<Point3<f64>>,
     /// For each part of the free vertices, `C` of the constraints that it owns, kind by kind.
-    values: Vec<Arc<[f64]>>,
+    values: Vec<Arc<Vec<f64>>>,
     /// For each part, the squares of the forces, of their sizes and of their rounding, and the
     /// energy of the rounding.
     sums: Vec<[f64; 4]>,
@@ -63,10 +63,16 @@ impl Evaluation {
 impl Body {
     /// Evaluates all constraints.
     pub(crate) fn at(&self, x: Vec<Point3<f64>>) -> State {
+        self.evaluated_again(State { x, ..State::default() })
+    }
+
+    /// Evaluates all constraints at the positions of a state, whose memory is used again.
+    fn evaluated_again(&self, mut memory: State) -> State {
         let parts = self.parts.count;
-        let (values, sums) = (vec![Arc::default(); parts], vec![[0.0; 4]; parts]);
-        let all = vec![true; parts];
-        self.evaluated(State { x, values, sums, forces: self.weights.clone(), ..State::default() }, &all)
+        memory.values.resize(parts, Arc::default());
+        memory.sums.resize(parts, [0.0; 4]);
+        memory.forces.resize(self.free.len(), Vector3::zeros());
+        self.evaluated(memory, &vec![true; parts])
     }
 
     /// Moves the free vertices at some places from `state` to their positions in `x`. Only the
@@ -90,27 +96,31 @@ impl Body {
         let parts = parts.enumerate().filter(|(part, _)| touched[*part]);
         parts.for_each_init(Evaluation::default, |scratch, (part, (forces, (values, sums)))| {
             forces.copy_from_slice(&self.weights[part * size..][..forces.len()]);
-            let (of_part, of_forces) = self.part_at(x, scratch, part, forces);
-            (*values, *sums) = (of_part.into(), of_forces);
+            // Values that another state has, too, stay as they are.
+            let mut own = Arc::get_mut(values).map(std::mem::take).unwrap_or_default();
+            *sums = self.part_at(x, scratch, part, forces, &mut own);
+            *values = Arc::new(own);
         });
         let sum = |n: usize| state.sums.iter().map(|sums| sums[n]).sum::<f64>();
         let (norm, scale, floor, noise) = (sum(0).sqrt(), sum(1).sqrt(), sum(2).sqrt(), sum(3));
         State { norm, scale, floor: f64::EPSILON * floor, noise: f64::EPSILON * noise, ..state }
     }
 
-    /// Adds the forces on a part of the free vertices. Returns `C` of the constraints that it owns,
-    /// and the sums of the part, see [`State`].
+    /// Adds the forces on a part of the free vertices, and writes `C` of the constraints that it
+    /// owns. Returns the sums of the part, see [`State`].
     fn part_at(
         &self,
         x: &[Point3<f64>],
         scratch: &mut Evaluation,
         part: usize,
         forces: &mut [Vector3<f64>],
-    ) -> (Vec<f64>, [f64; 4]) {
+        values: &mut Vec<f64>,
+    ) -> [f64; 4] {
         let start = part * self.parts.size;
         let rows = start..start + forces.len();
         let mut sizes: Vec<[f64; 2]> = forces.iter().map(|force| [force.norm(), 0.0]).collect();
-        let mut values = Vec::with_capacity(self.kinds.iter().map(|kind| kind.owned(part).len()).sum());
+        values.clear();
+        values.reserve_exact(self.kinds.iter().map(|kind| kind.owned(part).len()).sum());
         let mut noise = 0.0;
         for elements in &self.kinds {
             let borrowed = elements.borrowed(part);
@@ -140,7 +150,7 @@ impl Body {
             sums[1] += size * size;
             sums[2] += rounding * rounding;
         }
-        (values, sums)
+        sums
     }
 
     /// The energy at `to` minus that at `from`, constraint by constraint, so that it is as accurate
@@ -162,13 +172,13 @@ impl Body {
         parts.iter().sum::<f64>() - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
     }
 
-    /// The positions of a state. `memory` has all vertices, with the fixed ones at their places, or
-    /// is empty.
-    pub(crate) fn copied(&self, from: &State, mut memory: Vec<Point3<f64>>) -> Vec<Point3<f64>> {
-        if memory.is_empty() {
-            memory.extend_from_slice(&from.x);
+    /// A state for other positions than those of `from`. `memory` is an earlier state with the fixed
+    /// vertices at the same places, or an empty one.
+    pub(crate) fn copied(&self, from: &State, mut memory: State) -> State {
+        if memory.x.is_empty() {
+            memory.x.extend_from_slice(&from.x);
         }
-        self.free.iter().for_each(|&v| memory[v as usize] = from.x[v as usize]);
+        self.free.iter().for_each(|&v| memory.x[v as usize] = from.x[v as usize]);
         memory
     }
 
@@ -178,11 +188,11 @@ impl Body {
         from: &State,
         direction: &[Vector3<f64>],
         length: f64,
-        memory: Vec<Point3<f64>>,
+        memory: State,
     ) -> State {
-        let mut x = self.copied(from, memory);
-        self.free.iter().zip(direction).for_each(|(&v, step)| x[v as usize] += step * length);
-        self.at(x)
+        let mut state = self.copied(from, memory);
+        self.free.iter().zip(direction).for_each(|(&v, step)| state.x[v as usize] += step * length);
+        self.evaluated_again(state)
     }
 }
 

@@ -234,6 +234,7 @@ pub(crate) fn is_curved(kind: &dyn Constraints, x: &[Point3<f64>]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::energy::State;
     use crate::springs::block;
 
     /// The matrix times small displacements is the change of the forces, in all parts of a body. A
@@ -247,7 +248,7 @@ mod tests {
         let mut x = body.start.clone();
         body.free.iter().for_each(|&v| x[v as usize] += noises(v as usize) * 1e-3);
         let steps: Vec<Vector3<f64>> = (0..body.free.len()).map(|n| noises(n + x.len())).collect();
-        let at = |factor: f64| body.moved(&body.at(x.clone()), &steps, factor, Vec::new()).forces;
+        let at = |factor: f64| body.moved(&body.at(x.clone()), &steps, factor, State::default()).forces;
         let (ahead, behind) = (at(1e-7), at(-1e-7));
         let expected: Vec<Vector3<f64>> = ahead.iter().zip(&behind).map(|(a, b)| (b - a) / 2e-7).collect();
         let mut matrix = body.empty_matrix();

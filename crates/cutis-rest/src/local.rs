@@ -158,7 +158,7 @@ mod tests {
         let back = |place: &u32| body.start[vertex(place)] - x[vertex(place)];
         let moves: Vec<Vector3<f64>> = chosen.iter().map(back).collect();
         let [of_part, of_whole] = [
-            part.difference(&own, &part.moved(&own, &moves, 1.0, Vec::new())),
+            part.difference(&own, &part.moved(&own, &moves, 1.0, State::default())),
             body.difference(&whole, &body.at(body.start.clone())),
         ];
         assert!((of_part / of_whole - 1.0).abs() < 1e-9 && of_part < 0.0, "{of_part} and {of_whole} J");

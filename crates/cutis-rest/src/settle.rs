@@ -35,9 +35,8 @@ pub struct Search<'a> {
     /// Positions of the free vertices at the start, relative to the origin, in m.
     start: Vec<Point3<f64>>,
     pub(crate) state: State,
-    /// Positions of an earlier state, whose memory is used again. Fixed vertices are where they are
-    /// now.
-    pub(crate) spare: Vec<Point3<f64>>,
+    /// An earlier state, whose memory is used again. Fixed vertices are where they are now.
+    pub(crate) spare: State,
     /// Estimate of the distance from rest, relative to the displacement from the start.
     error: f64,
     pub(crate) steps: Vec<Step>,
@@ -140,7 +139,7 @@ impl<'a> Search<'a> {
             options: *options,
             start: body.places(&state),
             state,
-            spare: Vec::new(),
+            spare: State::default(),
             error: f64::INFINITY,
             steps: Vec::new(),
             energy_change_j: 0.0,
@@ -163,7 +162,7 @@ impl<'a> Search<'a> {
     /// Goes on from a placement whose fixed vertices are elsewhere.
     pub(crate) fn begin_at(&mut self, state: State) {
         self.state = state;
-        self.spare.clear();
+        self.spare = State::default();
         self.error = if self.is_balanced() { 0.0 } else { f64::INFINITY };
     }
 
@@ -245,7 +244,7 @@ impl<'a> Search<'a> {
             self.pending = Some(Pending { x: before.x, direction: solution.x, slope, change });
         } else {
             self.pending = None;
-            self.spare = before.x;
+            self.spare = before;
             // It would cost as much as a part of a step, and the body is near enough to rest.
             if length == 1.0 && !self.is_at_rest() {
                 self.relax(&solution.x);
@@ -258,7 +257,8 @@ impl<'a> Search<'a> {
     /// Brings the vertices to rest that moved much farther than the others in a step.
     fn relax(&mut self, step: &[Vector3<f64>]) {
         let Some(Relaxed { places, x: moved }) = self.body.relaxed(&self.state.x, step) else { return };
-        let mut x = self.body.copied(&self.state, std::mem::take(&mut self.spare));
+        let mut memory = self.body.copied(&self.state, std::mem::take(&mut self.spare));
+        let mut x = std::mem::take(&mut memory.x);
         for (&place, moved) in places.iter().zip(moved) {
             x[self.body.free[place as usize] as usize] = moved;
         }
@@ -266,10 +266,11 @@ impl<'a> Search<'a> {
         let change = self.body.difference(&self.state, &relaxed);
         if change < 0.0 && relaxed.is_finite() {
             self.energy_change_j += change;
-            self.spare = std::mem::replace(&mut self.state, relaxed).x;
+            memory.x = std::mem::replace(&mut self.state, relaxed).x;
         } else {
-            self.spare = relaxed.x;
+            memory.x = relaxed.x;
         }
+        self.spare = memory;
     }
 
     /// Solves for a step, and searches along it.
