@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::blocks::ROWS;
 use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
-use crate::vectors::{PART, Vector, add, dot};
+use crate::vectors::{PART, Vector, dot, dot_of_part};
 
 /// An approximate solution.
 pub(crate) struct Solution {
@@ -60,20 +60,21 @@ pub(crate) fn solve(
     product.clone_from(z_product);
     let mut energy = dot(residual, z);
     let first = energy;
+    let mut curvature = dot(direction, product);
+    // Of `x`.
+    let mut square = 0.0;
     let (mut cycles, mut indefinite) = (1, false);
     let mut steps = Steps::default();
     while cycles < most_cycles
         && energy > 0.0
-        && (energy > tolerance * tolerance * first || steps.to_come() > tolerance * dot(x, x).sqrt())
+        && (energy > tolerance * tolerance * first || steps.to_come() > tolerance * f64::sqrt(square))
     {
-        let curvature = dot(direction, product);
         if curvature.is_nan() || curvature <= 0.0 {
             indefinite = true;
             break;
         }
         let length = energy / curvature;
-        add(x, length as f32, direction);
-        add(residual, -length as f32, product);
+        square = move_along(x, residual, length as f32, direction, product);
         multigrid.cycle(matrix, residual, z, z_product);
         cycles += 1;
         let next = dot(residual, z);
@@ -82,32 +83,84 @@ pub(crate) fn solve(
         }
         let ratio = (next / energy) as f32;
         energy = next;
-        let (square, along) = turn(direction, ratio, z);
-        turn(product, ratio, z_product);
-        steps.push(length, square, along);
+        let turn = turn(direction, product, ratio, z, z_product);
+        steps.push(length, turn.square, turn.along);
+        curvature = turn.curvature;
     }
     let x = if x.par_iter().with_min_len(ROWS).all(|x| *x == [0.0; 4]) { z } else { x };
     let unscaled = |&[x, y, z, _]: &[f32; 4]| Vector3::new(x, y, z).map(|x| f64::from(x) * largest);
     Solution { x: x.par_iter().with_min_len(ROWS).map(unscaled).collect(), cycles, indefinite }
 }
 
-/// Replaces a direction by `z + ratio · direction`. Returns the square of the old one, and its
-/// inner product with the new one.
-fn turn(direction: &mut [[f32; 4]], ratio: f32, z: &[[f32; 4]]) -> (f64, f64) {
-    let part = |(direction, z): (&mut [[f32; 4]], &[[f32; 4]])| {
-        let (mut square, mut along) = ([0.0; 4], [0.0; 4]);
-        for (direction, z) in direction.iter_mut().zip(z) {
-            for n in 0..4 {
-                let old = direction[n];
-                direction[n] = z[n] + ratio * old;
-                square[n] += f64::from(old) * f64::from(old);
-                along[n] += f64::from(old) * f64::from(direction[n]);
+/// Adds `length · direction` to `x`, and takes `length · product` from the residual. Returns the
+/// square of `x`.
+fn move_along(
+    x: &mut [[f32; 4]],
+    residual: &mut [[f32; 4]],
+    length: f32,
+    direction: &[[f32; 4]],
+    product: &[[f32; 4]],
+) -> f64 {
+    let parts = x.par_chunks_mut(PART).zip(residual.par_chunks_mut(PART));
+    let parts = parts.zip(direction.par_chunks(PART).zip(product.par_chunks(PART)));
+    let squares: Vec<f64> = parts
+        .map(|((x, residual), (direction, product))| {
+            for (to, from) in x.iter_mut().zip(direction) {
+                (0..4).for_each(|n| to[n] += length * from[n]);
             }
-        }
-        (square.iter().sum::<f64>(), along.iter().sum::<f64>())
-    };
-    let parts: Vec<_> = direction.par_chunks_mut(PART).zip(z.par_chunks(PART)).map(part).collect();
-    parts.iter().fold((0.0, 0.0), |(square, along), part| (square + part.0, along + part.1))
+            for (to, from) in residual.iter_mut().zip(product) {
+                (0..4).for_each(|n| to[n] -= length * from[n]);
+            }
+            dot_of_part(x, x)
+        })
+        .collect();
+    squares.iter().sum()
+}
+
+/// Inner products when the direction turns.
+#[derive(Clone, Copy, Default)]
+struct Turn {
+    /// Square of the old direction, and its product with the new one.
+    square: f64,
+    along: f64,
+    /// The new direction times its product with the matrix.
+    curvature: f64,
+}
+
+/// Replaces a direction by `z + ratio · direction`, and its product with the matrix in the same
+/// way.
+fn turn(
+    direction: &mut [[f32; 4]],
+    product: &mut [[f32; 4]],
+    ratio: f32,
+    z: &[[f32; 4]],
+    z_product: &[[f32; 4]],
+) -> Turn {
+    let parts = direction.par_chunks_mut(PART).zip(product.par_chunks_mut(PART));
+    let parts = parts.zip(z.par_chunks(PART).zip(z_product.par_chunks(PART)));
+    let turns: Vec<Turn> = parts
+        .map(|((direction, product), (z, z_product))| {
+            let (mut square, mut along) = ([0.0; 4], [0.0; 4]);
+            for (direction, z) in direction.iter_mut().zip(z) {
+                for n in 0..4 {
+                    let old = direction[n];
+                    direction[n] = z[n] + ratio * old;
+                    square[n] += f64::from(old) * f64::from(old);
+                    along[n] += f64::from(old) * f64::from(direction[n]);
+                }
+            }
+            for (product, z) in product.iter_mut().zip(z_product) {
+                (0..4).for_each(|n| product[n] = z[n] + ratio * product[n]);
+            }
+            let curvature = dot_of_part(direction, product);
+            Turn { square: square.iter().sum(), along: along.iter().sum(), curvature }
+        })
+        .collect();
+    turns.iter().fold(Turn::default(), |sum, part| Turn {
+        square: sum.square + part.square,
+        along: sum.along + part.along,
+        curvature: sum.curvature + part.curvature,
+    })
 }
 
 /// The last steps of an iteration. The length of a single one says little, so they count in pairs.

@@ -13,24 +13,17 @@ pub(crate) const PART: usize = 4096;
 
 /// The inner product of two vectors.
 pub(crate) fn dot<const L: usize>(a: &[[f32; L]], b: &[[f32; L]]) -> f64 {
-    let part = |(a, b): (&[[f32; L]], &[[f32; L]])| -> f64 {
-        let mut sums = [0.0; L];
-        for (a, b) in a.iter().zip(b) {
-            for n in 0..L {
-                sums[n] += f64::from(a[n]) * f64::from(b[n]);
-            }
-        }
-        sums.iter().sum()
-    };
-    let parts: Vec<f64> = a.par_chunks(PART).zip(b.par_chunks(PART)).map(part).collect();
-    parts.iter().sum()
+    let parts = a.par_chunks(PART).zip(b.par_chunks(PART));
+    parts.map(|(a, b)| dot_of_part(a, b)).collect::<Vec<f64>>().iter().sum()
 }
 
-/// Adds a multiple of a vector to another one.
-pub(crate) fn add<const L: usize>(to: &mut [[f32; L]], factor: f32, x: &[[f32; L]]) {
-    to.par_iter_mut().with_min_len(PART).zip(x).for_each(|(to, x)| {
+/// The inner product of two vectors of at most [`PART`] nodes.
+pub(crate) fn dot_of_part<const L: usize>(a: &[[f32; L]], b: &[[f32; L]]) -> f64 {
+    let mut sums = [0.0; L];
+    for (a, b) in a.iter().zip(b) {
         for n in 0..L {
-            to[n] += factor * x[n];
+            sums[n] += f64::from(a[n]) * f64::from(b[n]);
         }
-    });
+    }
+    sums.iter().sum()
 }
