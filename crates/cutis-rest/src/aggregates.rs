@@ -27,15 +27,29 @@ impl Aggregates {
         let (count, graph) = (matrix.nodes(), &*matrix.above().neighbors);
         let size = |row: usize| norm(&matrix.diagonal(row));
         let sizes: Vec<f64> = (0..count).into_par_iter().with_min_len(ROWS).map(size).collect();
+        // How strongly each node couples to its neighbors, or zero where it is too little.
+        let mut strengths = vec![0.0; 2 * graph.blocks()];
+        let mut parts = Vec::with_capacity(count.div_ceil(ROWS));
+        let mut rest = &mut strengths[..];
+        for start in (0..count).step_by(ROWS) {
+            let rows = start..(start + ROWS).min(count);
+            let (own, after) = rest.split_at_mut(rows.clone().map(|row| graph.of(row).len()).sum());
+            parts.push((rows, own));
+            rest = after;
+        }
+        parts.into_par_iter().for_each(|(rows, strengths)| {
+            let couplings = rows.flat_map(|row| matrix.above().row(row).map(move |found| (row, found)));
+            for (to, (row, (column, block))) in strengths.iter_mut().zip(couplings) {
+                let strength = norm(&block);
+                let is_strong = strength > WEAK * (sizes[row] * sizes[column]).sqrt();
+                *to = if is_strong { strength as f32 } else { 0.0 };
+            }
+        });
         let strong = |row: usize| {
-            matrix.above().row(row).filter_map({
-                let sizes = &sizes;
-                move |(column, block)| {
-                    let strength = norm(&block);
-                    let is_strong = strength > WEAK * (sizes[row] * sizes[column]).sqrt();
-                    is_strong.then_some((column, strength))
-                }
-            })
+            let of_row = graph.of(row).iter().zip(&strengths[graph.start(row)..]);
+            of_row
+                .filter(|(_, strength)| **strength > 0.0)
+                .map(|(&node, &strength)| (node as usize, strength))
         };
         let neighbors = |row: usize| graph.of(row).len();
         let mean = (2 * graph.blocks()).div_ceil(count.max(1));

@@ -109,20 +109,24 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         pattern.places(row).map(|place| (pattern.columns[place] as usize, self.block(place)))
     }
 
-    /// Fetches a block into the cache.
+    /// Adds each block of a row times a vector to the vector of its column. `sums` are those from
+    /// the column `first` on. The rest of each one, beyond `R`, has no meaning.
     #[inline(always)]
-    pub fn prefetch(&self, place: usize) {
-        prefetch(&self.values, R * C * place);
-        prefetch(&self.values, R * C * place + R * C - 1);
-    }
-
-    /// Adds a block times a vector. The rest of the sum, beyond `R`, has no meaning.
-    #[inline(always)]
-    pub fn add_times<const L: usize, const M: usize>(&self, place: usize, x: &[f32; M], sum: &mut [f32; L]) {
-        let values = &self.values[R * C * place..][..R * (C - 1) + L];
-        for column in 0..C {
-            for row in 0..L {
-                sum[row] += values[R * column + row] * x[column];
+    pub fn add_row_times<const L: usize, const M: usize>(
+        &self,
+        row: usize,
+        x: &[f32; M],
+        first: usize,
+        sums: &mut [[f32; L]],
+    ) {
+        for place in self.pattern.places(row) {
+            prefetch(&self.values, R * C * place + AHEAD);
+            let values = &self.values[R * C * place..][..R * (C - 1) + L];
+            let sum = &mut sums[self.pattern.columns[place] as usize - first];
+            for column in 0..C {
+                for n in 0..L {
+                    sum[n] += values[R * column + n] * x[column];
+                }
             }
         }
     }
@@ -227,6 +231,11 @@ impl<const R: usize, const C: usize> Sums<R, C> {
             self.places[column] = self.sums.len() as u32;
         }
         &mut self.sums[self.places[column] as usize - 1]
+    }
+
+    /// Changes each sum.
+    pub fn for_each(&mut self, change: impl FnMut(&mut Block<R, C>)) {
+        self.sums.iter_mut().for_each(change);
     }
 
     /// Writes the sums in the order of their columns, and clears them.

@@ -9,28 +9,25 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3};
 use rayon::prelude::*;
 
 use crate::aggregates::Aggregates;
-use crate::blocks::{Blocks, Columns, ROWS};
+use crate::blocks::Columns;
 use crate::matrix::Matrix;
 use crate::smoother::{Operator, Smoother};
 use crate::symmetric::Symmetric;
-use crate::transfer::{self, Modes};
+use crate::transfer::{self, Modes, Transfer};
 use crate::vectors::Vector;
 
 /// Unknowns of a rigid body.
 pub(crate) const RIGID: usize = 6;
 /// [`RIGID`] and the zeros of a vector.
 pub(crate) const LANES: usize = 8;
-/// Blocks after the present one that are fetched into the cache.
-const AHEAD: usize = 8;
 /// A level with at most this many nodes is solved directly.
 const BOTTOM: usize = 150;
 
 /// A level and the way to the next one.
 struct Level<const B: usize, const L: usize> {
     smoother: Smoother<B, L>,
-    /// From the unknowns of the next level. Each block is transposed.
-    prolongation: Blocks<RIGID, B>,
-    columns: Columns,
+    /// From the unknowns of the next level, and back.
+    transfer: Transfer<B>,
     /// Memory for vectors of this level and of the next one.
     residual: Vector<L>,
     coarse: Vector<LANES>,
@@ -61,7 +58,7 @@ impl Multigrid {
         if matrix.nodes() <= BOTTOM {
             return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix) };
         }
-        let modes = places.iter().map(transfer::rigid_modes).collect();
+        let modes = places.par_iter().map(transfer::rigid_modes).collect();
         let (fine, mut matrix, mut modes) = Level::new(matrix, modes);
         let mut coarse = Vec::new();
         while matrix.nodes() > BOTTOM {
@@ -137,10 +134,11 @@ impl<const B: usize, const L: usize> Level<B, L> {
         drop(tentative);
         let columns = Columns::of(&prolongation);
         let next = transfer::galerkin(matrix, &prolongation, &columns);
-        let prolongation = prolongation.with_transposed_blocks();
-        let zero = vec![[0.0; L]; matrix.nodes()];
+        drop(columns);
+        let transfer = Transfer::new(prolongation);
+        let residual = vec![[0.0; L]; matrix.nodes()];
         let coarse = vec![[0.0; LANES]; aggregates.count];
-        let level = Self { smoother, prolongation, columns, residual: zero, coarse };
+        let level = Self { smoother, transfer, residual, coarse };
         (level, next, next_modes)
     }
 
@@ -152,28 +150,10 @@ impl<const B: usize, const L: usize> Level<B, L> {
         product: Option<&mut [[f32; L]]>,
         below: impl FnOnce(&[[f32; LANES]], &mut [[f32; LANES]]),
     ) {
-        let Self { smoother, prolongation, columns, residual, coarse } = self;
+        let Self { smoother, transfer, residual, coarse } = self;
         smoother.start(matrix, right, to, residual);
-        let mut restricted = vec![[0.0; LANES]; coarse.len()];
-        let restrict = |(column, to): (usize, &mut [f32; LANES])| {
-            let blocks = columns.of_column(column);
-            for (n, &(fine, place)) in blocks.iter().enumerate() {
-                if let Some(&(_, place)) = blocks.get(n + AHEAD) {
-                    prolongation.prefetch(place as usize);
-                }
-                prolongation.add_times(place as usize, &residual[fine as usize], to);
-            }
-            to[RIGID..].fill(0.0);
-        };
-        restricted.par_iter_mut().enumerate().with_min_len(ROWS / 8).for_each(restrict);
-        below(&restricted, coarse);
-        let prolong = |(row, to): (usize, &mut [f32; L])| {
-            let step: [f32; L] = prolongation.row_transposed_times(row, coarse);
-            for n in 0..L {
-                to[n] += step[n];
-            }
-        };
-        to.par_iter_mut().enumerate().with_min_len(ROWS).for_each(prolong);
+        below(&transfer.restrict(residual), coarse);
+        transfer.add_prolonged(coarse, to);
         smoother.smooth(matrix, right, to, residual, product);
     }
 }

@@ -16,6 +16,8 @@ use crate::smoother::Operator;
 
 /// Blocks below the diagonal after the present one that are fetched into the cache.
 const BLOCKS_AHEAD: usize = 16;
+/// Columns of transposed blocks that are added up together. They divide the columns of a block.
+const COLUMNS: usize = 3;
 
 /// The neighbors of each node: the nodes with which it has a block.
 pub(crate) struct Neighbors {
@@ -73,6 +75,12 @@ impl Neighbors {
     #[inline]
     pub fn of(&self, node: usize) -> &[u32] {
         &self.nodes[self.starts[node]..self.starts[node + 1]]
+    }
+
+    /// Number of neighbors of all nodes before one.
+    #[inline]
+    pub fn start(&self, node: usize) -> usize {
+        self.starts[node]
     }
 
     /// Later neighbors of a node, ascending.
@@ -147,29 +155,32 @@ impl<const B: usize> Above<B> {
         let zero = WideF32x4::splat(0.0);
         let (below, above) = (neighbors.below(row), neighbors.above(row));
         let (earlier, later) = neighbors.of(row).split_at(below.len());
-        // The sums of a transposed block's columns come at the end.
-        let mut columns = [[zero; N]; B];
+        // The sums of the columns of transposed blocks. A processor has registers for few at a time.
+        let mut sums = [[0.0; 4]; N];
         let places = &neighbors.below[below.start..];
-        for (n, (&neighbor, &place)) in earlier.iter().zip(places).enumerate() {
-            if let Some(&place) = places.get(n + BLOCKS_AHEAD) {
-                let first = B * B * place as usize;
-                prefetch_lines(values, first, B * B);
-                prefetch(values, first + B * B - 1);
-            }
-            let from = values.get(B * B * place as usize..);
-            let Some(block) = from.and_then(|from| from.get(..B * (B - 1) + 4 * N)) else { break };
-            let x = x(neighbor as usize);
-            for (column, sums) in columns.iter_mut().enumerate() {
-                for r in 0..N {
-                    sums[r] += register(block, B * column + 4 * r) * x[r];
+        for group in 0..B / COLUMNS {
+            let mut columns = [[zero; N]; COLUMNS];
+            for (n, (&neighbor, &place)) in earlier.iter().zip(places).enumerate() {
+                if let Some(&place) = places.get(n + BLOCKS_AHEAD).filter(|_| group == 0) {
+                    let first = B * B * place as usize;
+                    prefetch_lines(values, first, B * B);
+                    prefetch(values, first + B * B - 1);
+                }
+                let from = values.get(B * B * place as usize + COLUMNS * B * group..);
+                let Some(block) = from.and_then(|from| from.get(..B * (COLUMNS - 1) + 4 * N)) else { break };
+                let x = x(neighbor as usize);
+                for (column, sums) in columns.iter_mut().enumerate() {
+                    for r in 0..N {
+                        sums[r] += register(block, B * column + 4 * r) * x[r];
+                    }
                 }
             }
-        }
-        let mut sums = [[0.0; 4]; N];
-        for (column, of_column) in columns.iter().enumerate() {
-            for &sum in of_column {
-                let [a, b, c, d]: [f32; 4] = sum.into();
-                sums[column / 4][column % 4] += (a + b) + (c + d);
+            for (column, of_column) in columns.iter().enumerate() {
+                let column = COLUMNS * group + column;
+                for &sum in of_column {
+                    let [a, b, c, d]: [f32; 4] = sum.into();
+                    sums[column / 4][column % 4] += (a + b) + (c + d);
+                }
             }
         }
         let mut sums = sums.map(WideF32x4::from);
@@ -229,9 +240,9 @@ pub(crate) struct Rows<const B: usize> {
 }
 
 impl<const B: usize> Rows<B> {
-    /// Rows of a matrix with this many columns. `row` adds the blocks of a row to the sums, on the
-    /// diagonal and above.
-    pub fn of(rows: Range<usize>, width: usize, row: impl Fn(&mut Sums<B, B>, usize) + Sync) -> Self {
+    /// Rows of a matrix with this many columns, in parts. `row` adds the blocks of a row to the
+    /// sums, on the diagonal and above.
+    pub fn of(rows: Range<usize>, width: usize, row: impl Fn(&mut Sums<B, B>, usize) + Sync) -> Vec<Self> {
         let part = |sums: &mut Sums<B, B>, part: usize| {
             let mut to = Self::default();
             let start = rows.start + part * ROWS;
@@ -244,34 +255,37 @@ impl<const B: usize> Rows<B> {
             to
         };
         let parts = 0..rows.len().div_ceil(ROWS);
-        let parts: Vec<_> = parts.into_par_iter().map_init(|| Sums::new(width), part).collect();
-        let mut whole = Self::default();
-        parts.into_iter().for_each(|part| whole.append(part));
-        whole
-    }
-
-    /// Appends more rows.
-    pub fn append(&mut self, rows: Self) {
-        let before = self.columns.len();
-        self.ends.extend(rows.ends.iter().map(|end| before + end));
-        self.columns.extend(rows.columns);
-        self.values.extend(rows.values);
-        self.diagonal.extend(rows.diagonal);
+        parts.into_par_iter().map_init(|| Sums::new(width), part).collect()
     }
 }
 
-impl<const B: usize, const L: usize> From<Rows<B>> for Symmetric<B, L> {
-    fn from(rows: Rows<B>) -> Self {
-        let Rows { ends, columns, mut values, diagonal } = rows;
-        let above = std::iter::once(0).chain(ends).collect();
-        let neighbors = Arc::new(Neighbors::from_later(above, &columns));
-        values.resize(values.len() + PADDING, 0.0);
+impl<const B: usize, const L: usize> From<Vec<Rows<B>>> for Symmetric<B, L> {
+    /// The matrix with all rows.
+    fn from(rows: Vec<Rows<B>>) -> Self {
+        let mut starts = vec![0];
+        for part in &rows {
+            let before = starts[starts.len() - 1];
+            starts.extend(part.ends.iter().map(|end| before + end));
+        }
+        let count = starts[starts.len() - 1];
+        let mut later = Vec::with_capacity(count);
+        rows.iter().for_each(|part| later.extend_from_slice(&part.columns));
+        let mut values = vec![0.0; B * B * count + PADDING];
+        let mut rest = &mut values[..];
+        let mut copies = Vec::with_capacity(rows.len());
+        for part in &rows {
+            let (own, after) = rest.split_at_mut(part.values.len());
+            copies.push((own, &part.values));
+            rest = after;
+        }
+        copies.into_par_iter().for_each(|(to, from)| to.copy_from_slice(from));
         let padded = |block: &[f32]| -> [[f32; L]; B] {
             std::array::from_fn(|column| {
                 std::array::from_fn(|row| if row < B { block[B * column + row] } else { 0.0 })
             })
         };
-        let diagonal = diagonal.chunks_exact(B * B).map(padded).collect();
+        let diagonal = rows.iter().flat_map(|part| part.diagonal.chunks_exact(B * B)).map(padded).collect();
+        let neighbors = Arc::new(Neighbors::from_later(starts, &later));
         Self { above: Above { neighbors, values }, diagonal }
     }
 }

@@ -1,5 +1,7 @@
 //! The way between two levels: prolongation from the rigid motions of the aggregates.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, SMatrix};
 use rayon::prelude::*;
 
@@ -11,6 +13,11 @@ use crate::symmetric::{Rows, Symmetric};
 
 /// Parts in which the matrix of the next level is made.
 const CHUNKS: usize = 8;
+/// Rows of a part in which a vector is restricted, and the most parts.
+const PART: usize = 2048;
+const MOST_PARTS: usize = 32;
+/// Unknowns of a rigid body, and the zeros of a vector.
+type Coarse = [f32; LANES];
 
 /// Displacements of a node in each rigid motion of the body.
 pub(crate) type Modes<const B: usize> = Block<B, RIGID>;
@@ -36,11 +43,12 @@ pub(crate) fn tentative<const B: usize>(
     let found: Vec<_> =
         members.par_iter().with_min_len(ROWS / 8).map(|nodes| orthonormal(nodes, &modes)).collect();
     let mut of_nodes = modes;
-    for (nodes, (blocks, _)) in members.iter().zip(&found) {
-        for (&node, block) in nodes.iter().zip(blocks) {
-            of_nodes[node as usize] = std::array::from_fn(|n| block.column(n).into_owned().into());
-        }
-    }
+    let of_node = |(node, to): (usize, &mut Modes<B>)| {
+        let aggregate = aggregates.of[node] as usize;
+        let Ok(member) = members[aggregate].binary_search(&(node as u32)) else { return };
+        *to = std::array::from_fn(|n| found[aggregate].0[member].column(n).into_owned().into());
+    };
+    of_nodes.par_iter_mut().enumerate().with_min_len(ROWS).for_each(of_node);
     (of_nodes, found.into_iter().map(|(_, factor)| factor.into()).collect())
 }
 
@@ -95,17 +103,20 @@ pub(crate) fn smoothed<const B: usize, const L: usize>(
         list.extend(neighbors.chain([row]).map(|node| aggregates.of[node]));
     };
     Blocks::by_rows(tentative.len(), aggregates.count, columns, |sums, row| {
+        matrix.for_each(row, |column, block| {
+            add_product(sums.at(aggregates.of[column] as usize), &block, &tentative[column]);
+        });
+        let mut factor = inverse(row);
+        factor.as_flattened_mut().iter_mut().for_each(|x| *x *= damping);
+        sums.for_each(|sum| {
+            let mut step = [[0.0; B]; RIGID];
+            add_product(&mut step, &factor, sum);
+            *sum = step;
+        });
         let own = sums.at(aggregates.of[row] as usize);
         for (to, from) in own.as_flattened_mut().iter_mut().zip(tentative[row].as_flattened()) {
             *to += from;
         }
-        let mut factor = inverse(row);
-        factor.as_flattened_mut().iter_mut().for_each(|x| *x *= damping);
-        matrix.for_each(row, |column, block| {
-            let mut step = [[0.0; B]; B];
-            add_product(&mut step, &factor, &block);
-            add_product(sums.at(aggregates.of[column] as usize), &step, &tentative[column]);
-        });
     })
 }
 
@@ -122,7 +133,7 @@ pub(crate) fn galerkin<const B: usize, const L: usize>(
     let chunk = count.div_ceil(CHUNKS).max(ROWS);
     let mut place = vec![u32::MAX; matrix.nodes()];
     let mut product: Vec<Part<B>> = Vec::new();
-    let mut next = Rows::default();
+    let mut next = Vec::new();
     for start in (0..count).step_by(chunk) {
         let rows = start..(start + chunk).min(count);
         let mut fine: Vec<u32> = Vec::new();
@@ -149,7 +160,7 @@ pub(crate) fn galerkin<const B: usize, const L: usize>(
                 }
             },
         );
-        next.append(Rows::of(rows, count, |sums, row| {
+        next.extend(Rows::of(rows, count, |sums, row| {
             for &(node, at) in columns.of_column(row) {
                 let left = prolongation.block(at as usize);
                 let node = place[node as usize] as usize;
@@ -197,6 +208,69 @@ impl<const B: usize> Part<B> {
             let block = |n: usize, row: usize| f64::from(values[B * n + row]);
             (column as usize, std::array::from_fn(|n| std::array::from_fn(|row| block(n, row))))
         })
+    }
+}
+
+/// A prolongation and its transposed matrix, as maps of vectors.
+pub(crate) struct Transfer<const B: usize> {
+    /// Each block is transposed.
+    prolongation: Blocks<RIGID, B>,
+    /// Parts of the rows, and the columns that each has blocks in.
+    parts: Vec<[Range<usize>; 2]>,
+}
+
+impl<const B: usize> Transfer<B> {
+    pub fn new(prolongation: Blocks<B, RIGID>) -> Self {
+        let prolongation = prolongation.with_transposed_blocks();
+        let pattern = &prolongation.pattern;
+        let height = pattern.starts.len() - 1;
+        let count = (height / PART).clamp(1, MOST_PARTS);
+        let part = |n: usize| {
+            let rows = n * height / count..(n + 1) * height / count;
+            let columns = &pattern.columns[pattern.starts[rows.start]..pattern.starts[rows.end]];
+            let first = columns.iter().min().map_or(0, |&first| first as usize);
+            let end = columns.iter().max().map_or(first, |&last| last as usize + 1);
+            [rows, first..end]
+        };
+        let parts = (0..count).into_par_iter().map(part).collect();
+        Self { prolongation, parts }
+    }
+
+    /// Nodes of the next level.
+    pub fn width(&self) -> usize {
+        self.prolongation.width
+    }
+
+    /// The transposed prolongation times a vector.
+    pub fn restrict<const L: usize>(&self, x: &[[f32; L]]) -> Vec<Coarse> {
+        let Self { prolongation, parts } = self;
+        let of_part = |[rows, columns]: &[Range<usize>; 2]| {
+            let mut sums = vec![[0.0; LANES]; columns.len()];
+            for row in rows.clone() {
+                prolongation.add_row_times(row, &x[row], columns.start, &mut sums);
+            }
+            sums
+        };
+        let sums: Vec<Vec<Coarse>> = parts.par_iter().map(of_part).collect();
+        let mut whole = vec![[0.0; LANES]; self.width()];
+        whole.par_chunks_mut(ROWS).enumerate().for_each(|(chunk, whole)| {
+            let start = chunk * ROWS;
+            for ([_, columns], sums) in parts.iter().zip(&sums) {
+                for column in columns.start.max(start)..columns.end.min(start + whole.len()) {
+                    let (to, from) = (&mut whole[column - start], &sums[column - columns.start]);
+                    (0..RIGID).for_each(|n| to[n] += from[n]);
+                }
+            }
+        });
+        whole
+    }
+
+    /// Adds the prolongation of a vector.
+    pub fn add_prolonged<const L: usize>(&self, x: &[Coarse], to: &mut [[f32; L]]) {
+        to.par_iter_mut().enumerate().with_min_len(ROWS).for_each(|(row, to)| {
+            let step: [f32; L] = self.prolongation.row_transposed_times(row, x);
+            (0..L).for_each(|n| to[n] += step[n]);
+        });
     }
 }
 
