@@ -172,8 +172,8 @@ impl Body {
         parts.iter().sum::<f64>() - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
     }
 
-    /// A state for other positions than those of `from`. `memory` is an earlier state with the fixed
-    /// vertices at the same places, or an empty one.
+    /// A state whose positions are those of `from`, and whose other numbers have no meaning yet.
+    /// `memory` is an earlier state with the fixed vertices at the same places, or an empty one.
     pub(crate) fn copied(&self, from: &State, mut memory: State) -> State {
         if memory.x.is_empty() {
             memory.x.extend_from_slice(&from.x);

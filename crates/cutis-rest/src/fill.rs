@@ -68,8 +68,8 @@ impl Body {
         }
     }
 
-    /// Adds the constraints of one kind to the rows of a part above the diagonal, and to the sums of
-    /// the whole rows in double precision.
+    /// Adds the constraints of one kind to the rows of a part above the diagonal, and to the sums
+    /// of the whole rows in double precision.
     #[expect(clippy::too_many_arguments, reason = "one loop, and what it reads and writes")]
     fn add(
         &self,

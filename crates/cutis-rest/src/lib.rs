@@ -16,8 +16,9 @@
 //!   count. They come from differences of the gradients.
 //! - **Preconditioner.** Smoothed aggregation (Vaněk, Mandel and Brezina, Computing 56, 1996): see
 //!   `multigrid.rs`. It is built from `H` alone, so it knows every cut. Matrix and cycles have
-//!   single precision, energies and forces double precision: see `matrix.rs`. Products that follow
-//!   on each other go through the matrix together, because the memory is slow: see `fronts.rs`.
+//!   single precision, energies and forces double precision: see `matrix.rs`. The memory is slow.
+//!   So only the blocks above the diagonal are stored (see `symmetric.rs`), and products that
+//!   follow on each other go through the matrix together (see `fronts.rs`).
 //! - **Steps.** Each step lowers `U`, but a full one may raise it once: see `advance.rs`. Where no
 //!   step lowers it, a shift is added to the diagonal (Levenberg and Marquardt). The
 //!   equations are solved to 20 % far from rest and to 10 % near it.

@@ -155,7 +155,7 @@ impl<const B: usize> Above<B> {
         let zero = WideF32x4::splat(0.0);
         let (below, above) = (neighbors.below(row), neighbors.above(row));
         let (earlier, later) = neighbors.of(row).split_at(below.len());
-        // The sums of the columns of transposed blocks. A processor has registers for few at a time.
+        // The sums of the columns of transposed blocks. A processor has registers for few of them.
         let mut sums = [[0.0; 4]; N];
         let places = &neighbors.below[below.start..];
         for group in 0..B / COLUMNS {
@@ -329,7 +329,7 @@ mod tests {
     #[test]
     fn a_matrix_is_that_of_its_blocks_and_their_transposed_ones() {
         const COUNT: usize = 700;
-        let has = |row: usize, column: usize| row == column || (row * 31 + column * 17) % 23 == 0;
+        let has = |row: usize, column: usize| row == column || (row * 31 + column * 17).is_multiple_of(23);
         let number = |n: usize| ((n as f64 + 1.0) * 12.9898).sin();
         let entry = |row: usize, column: usize, i: usize, j: usize| {
             let [(row, i), (column, j)] =
