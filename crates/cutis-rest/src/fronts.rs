@@ -64,7 +64,8 @@ impl Reach {
         (piece * PIECE).min(self.height)
     }
 
-    /// The pieces of a range that read only rows of `within`: all between two of them.
+    /// The longest run of pieces at the end of a range that read no rows before `within`, up to the
+    /// first one that reads rows after it. Both ranges count pieces.
     fn inside(&self, pieces: &Range<usize>, within: &Range<usize>) -> Range<usize> {
         let (low, high) = (self.start(within.start), self.start(within.end));
         let start = pieces.clone().rev().find(|&piece| self.low[piece] < low).map_or(pieces.start, |n| n + 1);
@@ -72,8 +73,8 @@ impl Reach {
         start..end
     }
 
-    /// The steps of stages over their pieces. `ready` has the pieces that are there for each stage
-    /// when the ones that this domain takes in the stage before are there, too.
+    /// The steps of stages over their pieces. A stage follows the one before as closely as it can.
+    /// What it reads beyond the pieces of that one must be there.
     fn steps<const N: usize>(&self, stages: &[Range<usize>; N]) -> Vec<(usize, Range<usize>)> {
         let mut next: [usize; N] = std::array::from_fn(|stage| stages[stage].start);
         let mut steps = Vec::new();
