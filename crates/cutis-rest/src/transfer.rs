@@ -283,3 +283,43 @@ fn hold_missing_modes(block: &mut [[f64; RIGID]; RIGID]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vectors::dot;
+
+    /// Restriction is the transposed prolongation, also where the rows are in several parts whose
+    /// columns overlap: `(P c) · r = c · (Pᵀ r)`.
+    #[test]
+    fn restriction_is_the_transposed_prolongation() {
+        const HEIGHT: usize = 10_000;
+        let width = HEIGHT / 25;
+        let number = |n: usize| ((n as f64 + 1.0) * 12.9898).sin();
+        let columns_of = |row: usize| [row / 25, (row / 25 + 1).min(width - 1), row * 7 % width];
+        let prolongation = Blocks::<3, RIGID>::by_rows(
+            HEIGHT,
+            width,
+            |row, columns| columns.extend(columns_of(row).map(|column| column as u32)),
+            |sums, row| {
+                for column in columns_of(row) {
+                    let block = sums.at(column).as_flattened_mut();
+                    block.iter_mut().enumerate().for_each(|(n, x)| *x += number(18 * row + column + n));
+                }
+            },
+        );
+        let transfer = Transfer::new(prolongation);
+        assert!(transfer.parts.len() > 3, "{}", transfer.parts.len());
+        let coarse: Vec<Coarse> = (0..width)
+            .map(|node| std::array::from_fn(|n| if n < RIGID { number(9 * node + n) as f32 } else { 0.0 }))
+            .collect();
+        let mut prolonged = vec![[0.0; 4]; HEIGHT];
+        transfer.add_prolonged(&coarse, &mut prolonged);
+        // Not orthogonal to the prolonged vector, and not along it.
+        let fine: Vec<[f32; 4]> = prolonged.iter().map(|&[x, y, z, _]| [x, 0.5 * y, x + z, 0.0]).collect();
+        let (left, right) = (dot(&prolonged, &fine), dot(&coarse, &transfer.restrict(&fine)));
+        let size = (dot(&prolonged, &prolonged) * dot(&fine, &fine)).sqrt();
+        assert!((left - right).abs() < 1e-6 * size, "{left} and {right} of {size}");
+        assert!(left > 0.1 * size, "control: {left} of {size}");
+    }
+}
