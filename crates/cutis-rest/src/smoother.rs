@@ -245,7 +245,9 @@ mod tests {
             let number = |node: usize, n: usize| if n < 6 { noise(seed + 6 * node + n) } else { 0.0 };
             (0..60_000).map(|node| std::array::from_fn(|n| number(node, n))).collect()
         };
-        let mut smoother = Smoother::<6, 8>::new(&matrix);
+        // More threads would have too few rows for domains of their own.
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let mut smoother = threads.install(|| Smoother::<6, 8>::new(&matrix));
         let (right, start) = (vector(0), vector(1_000_000));
         let times = |x: &Vector<8>| {
             let mut product = start.clone();
