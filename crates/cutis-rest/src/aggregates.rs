@@ -1,8 +1,10 @@
 //! Groups of neighboring nodes that become the nodes of a coarser level.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use crate::blocks::{Block, ROWS};
+use crate::blocks::{Block, ROWS, divided, row_parts};
 use crate::smoother::Operator;
 
 /// Couplings weaker than this share of the geometric mean of both diagonal blocks join no nodes.
@@ -29,15 +31,10 @@ impl Aggregates {
         let sizes: Vec<f64> = (0..count).into_par_iter().with_min_len(ROWS).map(size).collect();
         // How strongly each node couples to its neighbors, or zero where it is too little.
         let mut strengths = vec![0.0; 2 * graph.blocks()];
-        let mut parts = Vec::with_capacity(count.div_ceil(ROWS));
-        let mut rest = &mut strengths[..];
-        for start in (0..count).step_by(ROWS) {
-            let rows = start..(start + ROWS).min(count);
-            let (own, after) = rest.split_at_mut(rows.clone().map(|row| graph.of(row).len()).sum());
-            parts.push((rows, own));
-            rest = after;
-        }
-        parts.into_par_iter().for_each(|(rows, strengths)| {
+        let parts = row_parts(count);
+        let length = |rows: &Range<usize>| graph.start(rows.end) - graph.start(rows.start);
+        let of_parts = divided(&mut strengths, parts.iter().map(length));
+        parts.into_par_iter().zip(of_parts).for_each(|(rows, strengths)| {
             let couplings = rows.flat_map(|row| matrix.above().row(row).map(move |found| (row, found)));
             for (to, (row, (column, block))) in strengths.iter_mut().zip(couplings) {
                 let strength = norm(&block);

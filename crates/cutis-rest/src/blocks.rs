@@ -14,6 +14,22 @@ pub(crate) const AHEAD: usize = 512;
 /// Numbers after the last block, so that a register can be read at the last column of a block.
 pub(crate) const PADDING: usize = 8;
 
+/// The parts of rows that a thread takes at once.
+pub(crate) fn row_parts(height: usize) -> Vec<Range<usize>> {
+    (0..height).step_by(ROWS).map(|start| start..(start + ROWS).min(height)).collect()
+}
+
+/// Pieces of these lengths, one after the other.
+pub(crate) fn divided<T>(mut rest: &mut [T], lengths: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
+    let mut pieces = Vec::with_capacity(lengths.size_hint().0);
+    for length in lengths {
+        let (piece, after) = rest.split_at_mut(length);
+        pieces.push(piece);
+        rest = after;
+    }
+    pieces
+}
+
 /// A block with `R` rows and `C` columns, column by column.
 pub(crate) type Block<const R: usize, const C: usize> = [[f64; R]; C];
 
@@ -67,19 +83,13 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         }
         let mut columns = vec![0; starts[height]];
         let mut values = vec![0.0; R * C * columns.len() + PADDING];
-        let (mut rest, mut of_rest) = (&mut columns[..], &mut values[..]);
-        let mut parts = Vec::with_capacity(height.div_ceil(ROWS));
-        for start in (0..height).step_by(ROWS) {
-            let rows = start..(start + ROWS).min(height);
-            let count = starts[rows.end] - starts[start];
-            let (columns, after) = rest.split_at_mut(count);
-            let (values, after_values) = of_rest.split_at_mut(R * C * count);
-            parts.push((rows, columns, values));
-            (rest, of_rest) = (after, after_values);
-        }
-        parts.into_par_iter().for_each_init(
+        let parts = row_parts(height);
+        let count = |rows: &Range<usize>| starts[rows.end] - starts[rows.start];
+        let of_columns = divided(&mut columns, parts.iter().map(count));
+        let of_values = divided(&mut values, parts.iter().map(|rows| R * C * count(rows)));
+        parts.into_par_iter().zip(of_columns).zip(of_values).for_each_init(
             || Sums::new(width),
-            |sums, (rows, columns, values)| {
+            |sums, ((rows, columns), values)| {
                 let before = starts[rows.start];
                 for n in rows {
                     row(sums, n);

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::Body;
-use crate::blocks::Block;
+use crate::blocks::{Block, divided};
 use crate::body::FIXED;
 use crate::constraints::{Constraints, Evaluation};
 use crate::elements::Elements;
@@ -35,17 +35,14 @@ impl Body {
     pub(crate) fn fill(&self, matrix: &mut Matrix, x: &[Point3<f64>], curvature: Curvature, shift: f64) {
         let neighbors = &*self.neighbors;
         let Matrix { above, sums } = &mut *matrix;
-        let mut rest = above.values_mut();
-        let mut parts = Vec::new();
-        for (part, sums) in sums.chunks_mut(self.parts.size).enumerate() {
-            let start = part * self.parts.size;
-            let rows = start..start + sums.len();
-            let (values, after) = rest.split_at_mut(9 * neighbors.above_rows(rows.clone()).len());
-            parts.push((Rows { neighbors, rows, values }, sums));
-            rest = after;
-        }
-        let parts = parts.into_par_iter().enumerate();
-        parts.for_each_init(Scratch::default, |scratch, (part, (mut rows, sums))| {
+        let (size, count) = (self.parts.size, sums.len());
+        let parts: Vec<Range<usize>> =
+            (0..count).step_by(size).map(|start| start..(start + size).min(count)).collect();
+        let numbers = |rows: &Range<usize>| 9 * neighbors.above_rows(rows.clone()).len();
+        let values = divided(above.values_mut(), parts.iter().map(numbers));
+        let parts = parts.into_par_iter().zip(values).zip(sums.par_chunks_mut(size)).enumerate();
+        parts.for_each_init(Scratch::default, |scratch, (part, ((rows, values), sums))| {
+            let mut rows = Rows { neighbors, rows, values };
             let mut wholes = vec![[[0.0; 3]; 3]; sums.len()];
             rows.values.fill(0.0);
             for elements in &self.kinds {

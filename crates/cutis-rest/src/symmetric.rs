@@ -11,7 +11,7 @@ use cutis_constraints::prefetch;
 use rayon::prelude::*;
 use simba::simd::{SimdValue, WideF32x4};
 
-use crate::blocks::{AHEAD, Block, PADDING, ROWS, Sums, transposed};
+use crate::blocks::{AHEAD, Block, PADDING, ROWS, Sums, divided, transposed};
 use crate::smoother::Operator;
 
 /// Blocks below the diagonal after the present one that are fetched into the cache.
@@ -271,14 +271,8 @@ impl<const B: usize, const L: usize> From<Vec<Rows<B>>> for Symmetric<B, L> {
         let mut later = Vec::with_capacity(count);
         rows.iter().for_each(|part| later.extend_from_slice(&part.columns));
         let mut values = vec![0.0; B * B * count + PADDING];
-        let mut rest = &mut values[..];
-        let mut copies = Vec::with_capacity(rows.len());
-        for part in &rows {
-            let (own, after) = rest.split_at_mut(part.values.len());
-            copies.push((own, &part.values));
-            rest = after;
-        }
-        copies.into_par_iter().for_each(|(to, from)| to.copy_from_slice(from));
+        let pieces = divided(&mut values, rows.iter().map(|part| part.values.len()));
+        pieces.into_par_iter().zip(&rows).for_each(|(to, part)| to.copy_from_slice(&part.values));
         let padded = |block: &[f32]| -> [[f32; L]; B] {
             std::array::from_fn(|column| {
                 std::array::from_fn(|row| if row < B { block[B * column + row] } else { 0.0 })
