@@ -45,8 +45,9 @@ fn extreme_bodies_come_to_rest_or_say_why_not() {
             keep(trial)
         })
     });
-    // Most of the bodies have a state of rest.
-    assert!(at_rest > 8 * named, "{at_rest} at rest, {named} not");
+    // Most of the bodies have a state of rest. 18 cannot: nothing moves, or no force acts on a
+    // body that is a point.
+    assert!(at_rest > 15 * named, "{at_rest} at rest, {named} not");
 }
 
 /// One case of each sort, because a software adapter is slow. The scale is the one at which an

@@ -53,7 +53,8 @@ impl Search<'_> {
         let pairs = self.state.forces.iter().zip(&ahead.forces);
         let forces: Vec<Vector3<f64>> = pairs.map(|(force, ahead)| force + (ahead - force) / small).collect();
         let mut x = placed(1.0);
-        let solution = self.solve(&forces, Curvature::Stretched);
+        let mut solution = self.solve(&forces, Curvature::Stretched);
+        self.shorten(&mut solution);
         for (&v, step) in body.free.iter().zip(&solution.x) {
             x[v as usize] += step;
         }

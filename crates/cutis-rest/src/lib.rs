@@ -20,8 +20,8 @@
 //!   So only the blocks above the diagonal are stored (see `symmetric.rs`), and products that
 //!   follow on each other go through the matrix together (see `fronts.rs`).
 //! - **Steps.** Each step lowers `U`, but a full one may raise it once: see `advance.rs`. Where no
-//!   step lowers it, a shift is added to the diagonal (Levenberg and Marquardt). The
-//!   equations are solved to 20 % far from rest and to 10 % near it.
+//!   step lowers it, a shift is added to the diagonal, and no step is longer than a reach that
+//!   grows: see `trial.rs`. The equations are solved to 20 % far from rest and to 10 % near it.
 #![forbid(unsafe_code)]
 
 mod advance;
@@ -48,6 +48,7 @@ mod springs;
 mod sweep;
 mod symmetric;
 mod transfer;
+mod trial;
 mod vectors;
 
 pub use body::Body;

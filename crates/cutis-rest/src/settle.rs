@@ -9,6 +9,7 @@ use crate::fill::Curvature;
 use crate::local::Relaxed;
 use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
+use crate::trial::Trial;
 use crate::{Body, Options, Rest, RestError, Step};
 
 /// Accuracy of the equations of a step without the exact second derivatives, and with them.
@@ -18,16 +19,9 @@ const SOLVED: f64 = 2.5;
 /// Length of a step over the displacement from the start, below which the next step uses the exact
 /// second derivatives.
 const NEAR: f64 = 0.003;
-/// Length of a step below which the next one has a larger shift.
-const SHORT: f64 = 0.1;
-/// The first shift, the smallest one, and the largest one.
-const FIRST_SHIFT: f64 = 1e-4;
-const LEAST_SHIFT: f64 = 1e-7;
-const MOST_SHIFT: f64 = 1e6;
 /// The levels are built again if a step needs this many times the cycles of the step for which they
 /// were built.
 const STALE: f64 = 3.0;
-
 /// A search for the state of rest of a body, step by step.
 pub struct Search<'a> {
     pub(crate) body: &'a Body,
@@ -41,7 +35,7 @@ pub struct Search<'a> {
     error: f64,
     pub(crate) steps: Vec<Step>,
     pub(crate) energy_change_j: f64,
-    levels: Option<Levels>,
+    pub(crate) levels: Option<Levels>,
     /// The matrix of the present step.
     matrix: Matrix,
     vectors: conjugate::Vectors,
@@ -49,10 +43,12 @@ pub struct Search<'a> {
     complexity: f64,
     /// Length of a step in m below which the exact second derivatives are tried, and whether the
     /// last step was below.
-    near_m: f64,
-    near: bool,
+    pub(crate) near_m: f64,
+    pub(crate) near: bool,
     /// Shift of the matrix, see [`Body::fill`].
-    shift: f64,
+    pub(crate) shift: f64,
+    /// The longest move of a vertex in a step, in m.
+    pub(crate) reach_m: f64,
     /// The state before a full step that raised the energy.
     pub(crate) pending: Option<Pending>,
     /// Whether full steps may raise the energy.
@@ -60,7 +56,7 @@ pub struct Search<'a> {
 }
 
 /// A preconditioner that is kept for several steps.
-struct Levels {
+pub(crate) struct Levels {
     multigrid: Multigrid,
     /// Cycles per digit in the first step with it.
     cost: Option<f64>,
@@ -150,6 +146,7 @@ impl<'a> Search<'a> {
             near_m: f64::INFINITY,
             near: false,
             shift: 0.0,
+            reach_m: body.reach_m,
             pending: None,
             relaxed: true,
         };
@@ -218,7 +215,7 @@ impl<'a> Search<'a> {
         if self.steps.len() >= self.options.most_steps {
             return Err(failed);
         }
-        let Trial { solution, exact, moved } = self.try_step().ok_or(failed)?;
+        let Trial { solution, exact, moved, too_long } = self.try_step().ok_or(failed)?;
         let Moved { state, length, change, slope, rises, .. } = moved;
         let moved_m = (dot(&solution.x, &solution.x) / solution.x.len() as f64).sqrt() * length;
         let way = self.way(&state);
@@ -231,13 +228,7 @@ impl<'a> Search<'a> {
         self.error = step.error;
         let shorter = length == 1.0 && moved_m < self.near_m.min(NEAR * way);
         self.near = !rises && shorter && state.norm < self.state.norm;
-        self.shift = match length {
-            1.0 if rises => self.shift,
-            1.0 if self.shift > LEAST_SHIFT => 0.1 * self.shift,
-            1.0 => 0.0,
-            length if length < SHORT => self.raised_shift(),
-            _ => self.shift,
-        };
+        self.shift = self.next_shift(length, rises, too_long);
         self.energy_change_j += change;
         let before = std::mem::replace(&mut self.state, state);
         if rises {
@@ -273,47 +264,6 @@ impl<'a> Search<'a> {
         self.spare = memory;
     }
 
-    /// Solves for a step, and searches along it.
-    fn try_step(&mut self) -> Option<Trial> {
-        let mut wasted = 0;
-        loop {
-            let exact = self.near;
-            let fresh = self.levels.is_none();
-            let curvature = if exact { Curvature::All } else { Curvature::Stretched };
-            let forces = std::mem::take(&mut self.state.forces);
-            let mut solution = self.solve(&forces, curvature);
-            self.state.forces = forces;
-            wasted += solution.cycles;
-            if !(exact && solution.indefinite) {
-                if let Some(moved) = self.advance(&solution.x) {
-                    solution.cycles = wasted;
-                    return Some(Trial { solution, exact, moved });
-                }
-                if let Some((direction, moved)) = self.undo() {
-                    let solution = Solution { x: direction, cycles: wasted, indefinite: false };
-                    return Some(Trial { solution, exact: false, moved });
-                }
-            }
-            if exact {
-                // Not near enough. Wait until the steps are half as long.
-                self.near_m = 0.5 * self.steps.last().map_or(0.0, |step| step.moved_m);
-                self.near = false;
-            } else if !fresh {
-                // The direction may come from levels that are too old.
-                self.levels = None;
-            } else if self.shift < MOST_SHIFT {
-                self.shift = self.raised_shift();
-            } else {
-                return None;
-            }
-        }
-    }
-
-    /// The next larger shift.
-    fn raised_shift(&self) -> f64 {
-        (10.0 * self.shift).max(FIRST_SHIFT)
-    }
-
     /// Solves the equations of a step under these forces, with the second derivatives of some
     /// constraints. Builds the levels if there are none.
     pub(crate) fn solve(&mut self, forces: &[Vector3<f64>], curvature: Curvature) -> Solution {
@@ -340,12 +290,7 @@ impl<'a> Search<'a> {
         self.complexity = levels.multigrid.complexity(matrix);
         let most = self.options.most_cycles;
         let vectors = &mut self.vectors;
-        let mut solution = conjugate::solve(matrix, &mut levels.multigrid, forces, tolerance, most, vectors);
-        // Where nothing resists, the equations have no finite solution.
-        let longest = solution.x.iter().map(Vector3::norm).fold(0.0, f64::max);
-        if longest > body.reach_m && longest.is_finite() {
-            solution.x.iter_mut().for_each(|x| *x *= body.reach_m / longest);
-        }
+        let solution = conjugate::solve(matrix, &mut levels.multigrid, forces, tolerance, most, vectors);
         let cost = solution.cycles as f64 / -tolerance.log10();
         if cost > STALE * *levels.cost.get_or_insert(cost) {
             self.levels = None;
@@ -376,14 +321,6 @@ impl<'a> Search<'a> {
         }
         if way > 0.0 && ratio < 1.0 { ratio / (1.0 - ratio) * step.moved_m / way } else { f64::INFINITY }
     }
-}
-
-/// A step before it is made.
-struct Trial {
-    solution: Solution,
-    /// Whether the equations have the exact second derivatives.
-    exact: bool,
-    moved: Moved,
 }
 
 /// Diagonal of the box around some places.

@@ -153,3 +153,27 @@ fn a_start_far_from_rest_ends_at_a_minimum_or_an_error() {
         Err(error) => assert!(error.to_string().contains("not at rest"), "{error}"),
     }
 }
+
+/// A block that nothing holds starts in a heap, a thousand times smaller than it is. It unfolds and
+/// comes to rest in its shape.
+#[test]
+fn a_heap_unfolds() {
+    let noise = |n: usize| (n as f64 * 12.9898).sin() * EDGE;
+    for size in [3, 4] {
+        let system = Make { size, held: false, ..Make::default() }.system();
+        let heap = |(n, x): (usize, &Point3<f64>)| {
+            Point3::from(1e-3 * (x.coords + 0.2 * Vector3::new(noise(n), noise(n + 7), noise(n + 13))))
+        };
+        let positions: Vec<Point3<f64>> = system.positions().iter().enumerate().map(heap).collect();
+        let mut solver = SolverReference::new(system.clone(), Settings::default()).unwrap();
+        solver.restore(&positions, &vec![Vector3::zeros(); positions.len()], 0).unwrap();
+        let body = Body::of(solver.system().unwrap(), [0.0; 3]).unwrap();
+        let found = body.settle(&Options::default(), &mut |_| ()).unwrap();
+        assert!(found.energy_change_j < 0.0 && found.steps.len() < 100);
+        // All springs have their lengths: the distances between vertices are those at the start.
+        let distances = |x: &[Point3<f64>]| -> Vec<f64> { x.iter().map(|p| (p - x[0]).norm()).collect() };
+        let pairs = distances(&found.positions).into_iter().zip(distances(&system.positions()));
+        let far = pairs.map(|(found, wanted)| (found - wanted).abs()).fold(0.0, f64::max);
+        assert!(far < 1e-3 * EDGE, "size {size}: {far:e} m after {} steps", found.steps.len());
+    }
+}
