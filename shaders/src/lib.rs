@@ -9,6 +9,7 @@ pub mod coloring;
 pub mod constraints;
 pub mod render;
 pub mod resample;
+pub mod rest;
 pub mod solver;
 
 /// Joins parts to one source, in order. Each part starts on a new line.

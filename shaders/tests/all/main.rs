@@ -4,6 +4,7 @@ mod chainmail;
 mod coloring;
 mod render;
 mod resample;
+mod rest;
 mod solver;
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
