@@ -28,19 +28,19 @@ impl Body {
         let x = self.local(before)?;
         let moves: Vec<Vector3<f64>> = self.start.iter().zip(&x).map(|(to, from)| to - from).collect();
         let mut search = Search::at(self, x, options)?;
-        search.follow(&moves);
+        search.follow(&moves)?;
         self.finish(search, progress)
     }
 }
 
 impl Search<'_> {
     /// Moves the fixed vertices, and the body with them. `moves` counts at fixed vertices only.
-    fn follow(&mut self, moves: &[Vector3<f64>]) {
+    fn follow(&mut self, moves: &[Vector3<f64>]) -> Result<(), RestError> {
         let body = self.body;
         let fixed = || (0..moves.len()).filter(|&v| body.is_fixed(v));
         let longest = fixed().map(|v| moves[v].norm()).fold(0.0, f64::max);
         if longest == 0.0 {
-            return;
+            return Ok(());
         }
         let before = self.state.x.clone();
         let placed = |length: f64| {
@@ -53,12 +53,13 @@ impl Search<'_> {
         let pairs = self.state.forces.iter().zip(&ahead.forces);
         let forces: Vec<Vector3<f64>> = pairs.map(|(force, ahead)| force + (ahead - force) / small).collect();
         let mut x = placed(1.0);
-        let mut solution = self.solve(&forces, Curvature::Stretched);
+        let mut solution = self.solve(&forces, Curvature::Stretched)?;
         self.shorten(&mut solution);
         for (&v, step) in body.free.iter().zip(&solution.x) {
             x[v as usize] += step;
         }
         let followed = body.at(x);
         self.begin_at(if followed.is_finite() { followed } else { body.at(placed(1.0)) });
+        Ok(())
     }
 }

@@ -36,11 +36,13 @@ mod error;
 mod fill;
 mod follow;
 mod fronts;
+mod host;
 mod local;
 mod matrix;
 mod multigrid;
 mod options;
 mod order;
+mod place;
 mod settle;
 mod smoother;
 #[cfg(test)]

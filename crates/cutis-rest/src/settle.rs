@@ -3,12 +3,13 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::advance::{Moved, Pending};
-use crate::conjugate::{self, Solution};
+use crate::conjugate::Solution;
 use crate::energy::State;
 use crate::fill::Curvature;
 use crate::local::Relaxed;
 use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
+use crate::place::Place;
 use crate::trial::Trial;
 use crate::{Body, Options, Rest, RestError, Step};
 
@@ -38,7 +39,8 @@ pub struct Search<'a> {
     pub(crate) levels: Option<Levels>,
     /// The matrix of the present step.
     matrix: Matrix,
-    vectors: conjugate::Vectors,
+    /// Where the equations are solved.
+    place: Place,
     /// See [`Rest::complexity`].
     complexity: f64,
     /// Length of a step in m below which the exact second derivatives are tried, and whether the
@@ -115,7 +117,7 @@ impl<'a> Search<'a> {
     /// Starts at the positions of the system.
     ///
     /// # Errors
-    /// [`RestError::Value`] for an option out of range, [`RestError::NotFinite`].
+    /// [`RestError::Value`] for an option out of range, [`RestError::NotFinite`], `RestError::Gpu`.
     pub fn new(body: &'a Body, options: &Options) -> Result<Self, RestError> {
         Self::at(body, body.start.clone(), options)
     }
@@ -141,7 +143,7 @@ impl<'a> Search<'a> {
             energy_change_j: 0.0,
             levels: None,
             matrix: body.empty_matrix(),
-            vectors: conjugate::Vectors::default(),
+            place: body.place()?,
             complexity: 1.0,
             near_m: f64::INFINITY,
             near: false,
@@ -209,13 +211,14 @@ impl<'a> Search<'a> {
     ///
     /// # Errors
     /// [`RestError::NotAtRest`] if the allowed steps are made, or no step lowers the energy.
+    /// `RestError::Gpu` if the equations are solved on a GPU and do not fit it, or if it is lost.
     pub fn step(&mut self) -> Result<&Step, RestError> {
         let force = self.force();
         let failed = RestError::NotAtRest { steps: self.steps.len(), force, tolerance: self.options.force };
         if self.steps.len() >= self.options.most_steps {
             return Err(failed);
         }
-        let Trial { solution, exact, moved, too_long } = self.try_step().ok_or(failed)?;
+        let Trial { solution, exact, moved, too_long } = self.try_step()?.ok_or(failed)?;
         let Moved { state, length, change, slope, rises, .. } = moved;
         let moved_m = (dot(&solution.x, &solution.x) / solution.x.len() as f64).sqrt() * length;
         let way = self.way(&state);
@@ -266,7 +269,11 @@ impl<'a> Search<'a> {
 
     /// Solves the equations of a step under these forces, with the second derivatives of some
     /// constraints. Builds the levels if there are none.
-    pub(crate) fn solve(&mut self, forces: &[Vector3<f64>], curvature: Curvature) -> Solution {
+    pub(crate) fn solve(
+        &mut self,
+        forces: &[Vector3<f64>],
+        curvature: Curvature,
+    ) -> Result<Solution, RestError> {
         let tolerance = TOLERANCES[usize::from(curvature == Curvature::All)];
         let (body, x) = (self.body, &self.state.x);
         let matrix = &mut self.matrix;
@@ -277,6 +284,7 @@ impl<'a> Search<'a> {
                 levels
             }
             none => {
+                self.place.drop_levels();
                 // Levels need a matrix that is never negative.
                 body.fill(matrix, x, Curvature::Stretched, self.shift);
                 let mut multigrid = Multigrid::new(matrix, &body.places(&self.state));
@@ -289,13 +297,13 @@ impl<'a> Search<'a> {
         };
         self.complexity = levels.multigrid.complexity(matrix);
         let most = self.options.most_cycles;
-        let vectors = &mut self.vectors;
-        let solution = conjugate::solve(matrix, &mut levels.multigrid, forces, tolerance, most, vectors);
+        let multigrid = &mut levels.multigrid;
+        let solution = self.place.solve(matrix, multigrid, forces, tolerance, most)?;
         let cost = solution.cycles as f64 / -tolerance.log10();
         if cost > STALE * *levels.cost.get_or_insert(cost) {
             self.levels = None;
         }
-        solution
+        Ok(solution)
     }
 
     /// Displacement from the start to a state in m, as a root of the mean square.

@@ -8,10 +8,10 @@
 
 use nalgebra::Vector3;
 
-use crate::Search;
 use crate::advance::Moved;
 use crate::conjugate::Solution;
 use crate::fill::Curvature;
+use crate::{RestError, Search};
 
 /// Length of a step below which the next one has a larger shift.
 const SHORT: f64 = 0.1;
@@ -38,8 +38,11 @@ pub(crate) struct Trial {
 }
 
 impl Search<'_> {
-    /// Solves for a step, and searches along it.
-    pub(crate) fn try_step(&mut self) -> Option<Trial> {
+    /// Solves for a step, and searches along it. `None` if there is none.
+    ///
+    /// # Errors
+    /// `RestError::Gpu`.
+    pub(crate) fn try_step(&mut self) -> Result<Option<Trial>, RestError> {
         let mut wasted = 0;
         let shift = self.shift;
         let mut impatient = self.steps.len() >= PATIENCE;
@@ -48,8 +51,9 @@ impl Search<'_> {
             let fresh = self.levels.is_none();
             let curvature = if exact { Curvature::All } else { Curvature::Stretched };
             let forces = std::mem::take(&mut self.state.forces);
-            let mut solution = self.solve(&forces, curvature);
+            let solution = self.solve(&forces, curvature);
             self.state.forces = forces;
+            let mut solution = solution?;
             wasted += solution.cycles;
             let too_long = self.is_too_long(&solution);
             if too_long && self.shift < FIRST_SHIFT {
@@ -65,11 +69,11 @@ impl Search<'_> {
                         self.reach_m *=
                             if moved.length == 1.0 { GROWTH } else { moved.length.max(SHRINKAGE) };
                     }
-                    return Some(Trial { solution, exact, moved, too_long });
+                    return Ok(Some(Trial { solution, exact, moved, too_long }));
                 }
                 if let Some((direction, moved)) = self.undo() {
                     let solution = Solution { x: direction, cycles: wasted, indefinite: false };
-                    return Some(Trial { solution, exact: false, moved, too_long: false });
+                    return Ok(Some(Trial { solution, exact: false, moved, too_long: false }));
                 }
             }
             if self.near {
@@ -84,7 +88,7 @@ impl Search<'_> {
             } else if self.shift < MOST_SHIFT {
                 self.shift = self.raised_shift();
             } else {
-                return None;
+                return Ok(None);
             }
         }
     }
