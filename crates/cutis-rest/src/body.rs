@@ -39,6 +39,9 @@ pub struct Body {
     pub(crate) start: Vec<Point3<f64>>,
     /// Longest displacement of a vertex in a step: half of the diagonal of the body, in m.
     pub(crate) reach_m: f64,
+    /// The GPU on which searches solve their equations. None for the CPU.
+    #[cfg(feature = "gpu")]
+    pub(crate) gpu: Option<crate::RestGpu>,
 }
 
 impl Body {
@@ -95,7 +98,31 @@ impl Body {
         let neighbors = Arc::new(neighbors(&kinds, &place, free.len(), parts));
         let origin = system.origin().coords.map(T::to_f64);
         let reach_m = 0.5 * diagonal(&start);
-        Ok(Self { kinds, free, place, neighbors, parts, weights, origin, start, reach_m })
+        Ok(Self {
+            kinds,
+            free,
+            place,
+            neighbors,
+            parts,
+            weights,
+            origin,
+            start,
+            reach_m,
+            #[cfg(feature = "gpu")]
+            gpu: None,
+        })
+    }
+
+    /// The same body, whose searches solve their equations on a GPU.
+    ///
+    /// The CPU computes forces and matrices, so that third-party types of constraints need no
+    /// shader for this. Only the matrices go to the device, and only the solution comes back, with
+    /// some sums in each cycle. See [`RestGpu`](crate::RestGpu) for the memory and the agreement
+    /// with the CPU. Bodies that share a `RestGpu` share its kernels.
+    #[cfg(feature = "gpu")]
+    #[must_use]
+    pub fn on_gpu(self, gpu: &crate::RestGpu) -> Self {
+        Self { gpu: Some(gpu.clone()), ..self }
     }
 
     /// Places of the vertices that can move.

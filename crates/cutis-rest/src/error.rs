@@ -52,6 +52,10 @@ pub enum RestError {
         /// The vertex.
         vertex: usize,
     },
+    /// The GPU has too little memory, rejected a call or was lost.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] cutis_gpu::GpuError),
     /// The body is not at rest after the allowed steps, or no step lowers its energy.
     #[error(
         "not at rest after {steps} steps: the force is {force:e} of its scale, above {tolerance:e}; \

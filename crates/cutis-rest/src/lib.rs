@@ -22,6 +22,11 @@
 //! - **Steps.** Each step lowers `U`, but a full one may raise it once: see `advance.rs`. Where no
 //!   step lowers it, a shift is added to the diagonal, and no step is longer than a reach that
 //!   grows: see `trial.rs`. The equations are solved to 20 % far from rest and to 10 % near it.
+//!
+//! # On a GPU
+//! With the feature `gpu`, `Body::on_gpu` gives a body a device that solves the equations of its
+//! searches. Forces, matrices and levels come from the CPU, so that third-party types of
+//! constraints work as they are. See `RestGpu`.
 #![forbid(unsafe_code)]
 
 mod advance;
@@ -36,6 +41,8 @@ mod error;
 mod fill;
 mod follow;
 mod fronts;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod host;
 mod local;
 mod matrix;
@@ -55,6 +62,8 @@ mod vectors;
 
 pub use body::Body;
 pub use error::RestError;
+#[cfg(feature = "gpu")]
+pub use gpu::RestGpu;
 pub use options::{Options, Rest, Step};
 pub use settle::Search;
 

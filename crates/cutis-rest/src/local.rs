@@ -112,6 +112,9 @@ impl Body {
             origin: self.origin,
             start: vertices.iter().map(|&v| x[v as usize]).collect(),
             reach_m: self.reach_m,
+            // A part is small.
+            #[cfg(feature = "gpu")]
+            gpu: None,
         }
     }
 }

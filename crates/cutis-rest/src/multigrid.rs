@@ -24,32 +24,33 @@ pub(crate) const LANES: usize = 8;
 const BOTTOM: usize = 150;
 
 /// A level and the way to the next one.
-struct Level<const B: usize, const L: usize> {
-    smoother: Smoother<B, L>,
+pub(crate) struct Level<const B: usize, const L: usize> {
+    pub smoother: Smoother<B, L>,
     /// From the unknowns of the next level, and back.
-    transfer: Transfer<B>,
+    pub transfer: Transfer<B>,
     /// Memory for vectors of this level and of the next one.
     residual: Vector<L>,
     coarse: Vector<LANES>,
 }
 
 /// A level below the finest one.
-struct Coarse {
-    matrix: Symmetric<RIGID, LANES>,
-    level: Level<RIGID, LANES>,
+pub(crate) struct Coarse {
+    pub matrix: Symmetric<RIGID, LANES>,
+    pub level: Level<RIGID, LANES>,
 }
 
 /// The levels of a matrix.
 pub(crate) struct Multigrid {
     /// None if the matrix is small enough to be solved directly.
-    fine: Option<Level<3, 4>>,
-    coarse: Vec<Coarse>,
-    bottom: Bottom,
+    pub fine: Option<Level<3, 4>>,
+    pub coarse: Vec<Coarse>,
+    pub bottom: Bottom,
 }
 
 /// A matrix that is solved directly.
-struct Bottom {
-    factor: Option<Cholesky<f64, Dyn>>,
+pub(crate) struct Bottom {
+    /// None if no shift makes the matrix positive. Its solution is then the right-hand side.
+    pub factor: Option<Cholesky<f64, Dyn>>,
 }
 
 impl Multigrid {

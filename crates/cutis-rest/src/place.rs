@@ -11,6 +11,8 @@ use crate::{Body, RestError};
 /// The place of the equations of a search, and the memory there.
 pub(crate) enum Place {
     Host(Vectors),
+    #[cfg(feature = "gpu")]
+    Gpu(Box<crate::gpu::GpuEquations>),
 }
 
 impl Body {
@@ -19,6 +21,10 @@ impl Body {
     /// # Errors
     /// `RestError::Gpu` if the vectors do not fit the device, or if it is lost.
     pub(crate) fn place(&self) -> Result<Place, RestError> {
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &self.gpu {
+            return Ok(Place::Gpu(Box::new(gpu.equations(self.free.len())?)));
+        }
         Ok(Place::Host(Vectors::default()))
     }
 }
@@ -28,6 +34,8 @@ impl Place {
     pub fn drop_levels(&mut self) {
         match self {
             Self::Host(_) => {}
+            #[cfg(feature = "gpu")]
+            Self::Gpu(equations) => equations.drop_levels(),
         }
     }
 
@@ -47,6 +55,11 @@ impl Place {
             Self::Host(vectors) => {
                 let mut equations = HostEquations { matrix, multigrid, vectors };
                 conjugate::solve(&mut equations, right, tolerance, most_cycles)
+            }
+            #[cfg(feature = "gpu")]
+            Self::Gpu(equations) => {
+                equations.load(matrix, multigrid)?;
+                conjugate::solve(&mut **equations, right, tolerance, most_cycles)
             }
         }
     }

@@ -130,7 +130,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
     }
 
     /// The factors of a change, for the change before and for the residual, one pair per step.
-    fn factors(&self) -> [Factors; PRODUCTS] {
+    pub fn factors(&self) -> [Factors; PRODUCTS] {
         let (middle, half) = (0.5 * self.largest * (1.0 + SPECTRUM), 0.5 * self.largest * (1.0 - SPECTRUM));
         let ratio = middle / half;
         let mut factors = [(0.0, 1.0 / middle); PRODUCTS];

@@ -214,7 +214,7 @@ impl<const B: usize> Part<B> {
 /// A prolongation and its transposed matrix, as maps of vectors.
 pub(crate) struct Transfer<const B: usize> {
     /// Each block is transposed.
-    prolongation: Blocks<RIGID, B>,
+    pub prolongation: Blocks<RIGID, B>,
     /// Parts of the rows, and the columns that each has blocks in.
     parts: Vec<[Range<usize>; 2]>,
 }

@@ -53,7 +53,13 @@ const LAYERS: &[Layer] = &[
     Layer {
         name: "cutis-rest",
         level: 3,
-        may_use: These(&["cutis-solver", "cutis-constraints", "cutis-coloring"]),
+        may_use: These(&[
+            "cutis-solver",
+            "cutis-constraints",
+            "cutis-coloring",
+            "cutis-gpu",
+            "cutis-shaders",
+        ]),
     },
     Layer { name: "cutis-newton", level: 3, may_use: These(&["cutis-solver", "cutis-constraints"]) },
     Layer { name: "cutis-skin", level: 3, may_use: These(&["cutis-volume", "cutis-mesh"]) },

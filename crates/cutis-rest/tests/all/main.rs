@@ -3,4 +3,6 @@
 
 mod blocks;
 mod equilibria;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod refusals;
