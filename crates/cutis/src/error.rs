@@ -134,7 +134,7 @@ pub enum Error {
     Solver(#[from] SolverError),
     /// The body has no state of rest, or none was found.
     #[error("run.until = \"rest\": {0}")]
-    Rest(#[from] RestError),
+    Rest(#[source] RestError),
     /// An error of the CPU backend.
     #[error(transparent)]
     Cpu(#[from] CpuError),
@@ -204,6 +204,17 @@ pub enum Error {
         /// The mismatch or the damage.
         why: String,
     },
+}
+
+/// A GPU that fails in a search is an error of the GPU.
+impl From<RestError> for Error {
+    fn from(error: RestError) -> Self {
+        match error {
+            #[cfg(feature = "gpu")]
+            RestError::Gpu(error) => Self::Gpu(error),
+            other => Self::Rest(other),
+        }
+    }
 }
 
 impl Error {

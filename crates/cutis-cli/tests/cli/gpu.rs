@@ -44,6 +44,7 @@ fn a_missing_gpu_is_refused_with_installation_advice() {
         "check scene.toml --backend gpu",
         "run scene.toml --set solver.backend=gpu --resume",
         "demo --backend gpu --out elsewhere",
+        "settle scene.toml --backend gpu --out elsewhere",
         "resample scene.toml --run elsewhere --out ct.nii.gz --backend gpu",
     ] {
         let scene = if call.starts_with("demo") { "demo.toml" } else { "scene.toml" };
@@ -148,6 +149,50 @@ fn a_run_on_a_gpu_says_where_it_ran() {
     assert!(page.contains(name) && page.contains("on the GPU"));
     let warned = report["warnings"].to_string().contains("software device");
     assert_eq!(warned, adapters[0]["kind"] == "software");
+}
+
+/// A search for the state of rest solves its equations on the GPU that the run names, and ends
+/// where the CPU does, within the errors that both state. Controls: tissue that is 5 % softer moves
+/// farther, and other backends use no GPU.
+#[test]
+fn a_search_for_rest_on_a_gpu_says_so_and_ends_where_the_cpu_does() {
+    let desk = Desk::new();
+    let Some(adapters) = adapters(&desk) else { return };
+    let name = adapters[0]["name"].as_str().unwrap();
+    let part = name.split(' ').next().unwrap().to_uppercase();
+    let settle = |call: &str| {
+        let call = format!("settle scene.toml --set output={{report=true}} --json {call}");
+        parsed(desk.cutis(&words(&call)))
+    };
+    let gpu = settle(&format!("--out gpu --backend gpu --adapter {part}"));
+    assert_eq!((&gpu["backend"]["name"], &gpu["backend"]["adapter"]), (&"gpu".into(), &name.into()));
+    let on = |report: &Value| {
+        let stages = report["stages"].as_array().unwrap();
+        let search = stages.iter().find(|stage| stage["name"] == "search for the state of rest").unwrap();
+        assert_eq!(search["on"], report["rest"]["equations_on"]);
+        search["on"].as_str().unwrap().to_owned()
+    };
+    let cycles = |report: &Value| -> u64 {
+        let steps = report["rest"]["steps"].as_array().unwrap();
+        steps.iter().map(|step| step["cycles"].as_u64().unwrap()).sum()
+    };
+    assert_eq!(on(&gpu), "gpu");
+    assert!(cycles(&gpu) > 1 && gpu["device"]["readbacks"].as_u64() > Some(cycles(&gpu)), "{gpu}");
+    let page = std::fs::read_to_string(desk.path("gpu/report.html")).unwrap();
+    assert!(page.contains("multigrid cycles on the GPU") && page.contains(name));
+
+    let cpu = settle("--out cpu --backend cpu");
+    assert_eq!((on(&cpu).as_str(), &cpu["device"]), ("cpu", &Value::Null));
+    assert_eq!(on(&settle("--out reference --backend reference")), "cpu");
+    let moved = |report: &Value| report["max_displacement_mm"].as_f64().unwrap();
+    let error = |report: &Value| report["rest"]["error"].as_f64().unwrap();
+    let apart = |report: &Value| (moved(report) / moved(&cpu) - 1.0).abs();
+    let allowed = error(&gpu) + error(&cpu);
+    assert!(allowed < 2e-3 && apart(&gpu) < allowed, "{} of {allowed}", apart(&gpu));
+    let soft =
+        "--set constraints.distance.youngs_modulus_pa=4.75e3 --set constraints.volume.bulk_modulus_pa=4.75e4";
+    let control = settle(&format!("--out control --backend gpu {soft}"));
+    assert!(apart(&control) > allowed, "{} of {allowed}", apart(&control));
 }
 
 /// Both backends give the same bits for every vertex and every opening.

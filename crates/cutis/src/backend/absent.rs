@@ -30,6 +30,19 @@ impl DevicePositions {
     }
 }
 
+/// A GPU for searches for the state of rest. No value of this type exists.
+pub(crate) enum RestDevice {}
+
+impl RestDevice {
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        match *gpu {}
+    }
+
+    pub(crate) fn with(&self, _: cutis_rest::Body) -> cutis_rest::Body {
+        match *self {}
+    }
+}
+
 pub(super) fn named_by_scene(file: SceneFile<'_>, _: &SolverSection, _: &str) -> Result<Chosen, Error> {
     let why = "this build has no GPU backend; use \"cpu\" or \"auto\"".into();
     Err(file.blame("solver.backend")(Error::Backend { backend: "gpu".into(), why }))

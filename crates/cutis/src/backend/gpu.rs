@@ -3,6 +3,7 @@
 use cutis_gpu::{Adapter, AdapterKind, Buffer, GpuError, GpuOptions, Select, adapters};
 use cutis_render::RenderError;
 use cutis_resample::{ResampleError, ResampleReport, ResamplerGpu, ResamplerOptions, Warp, resample_gpu};
+use cutis_rest::RestGpu;
 use cutis_volume::Volume;
 use nalgebra::Point3;
 
@@ -184,6 +185,24 @@ impl DevicePositions {
     /// [`Error::Gpu`] if the GPU has too little memory or is lost.
     pub(crate) fn with(&self, gpu: &Gpu, further: &[Point3<f32>]) -> Result<Self, Error> {
         Ok(Self::copy(gpu, &self.0, further)?)
+    }
+}
+
+/// A GPU on which a search for the state of rest solves its equations.
+pub(crate) struct RestDevice(RestGpu);
+
+impl RestDevice {
+    /// Compiles the kernels.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if the GPU is lost.
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        Ok(Self(RestGpu::new(gpu)?))
+    }
+
+    /// The same body, whose searches solve their equations here.
+    pub(crate) fn with(&self, body: cutis_rest::Body) -> cutis_rest::Body {
+        body.on_gpu(&self.0)
     }
 }
 

@@ -17,7 +17,7 @@ use crate::output::report::{Backend, DeviceWork};
 use crate::scene::{BackendChoice, LoadedScene, SceneFile, SolverSection};
 
 pub use devices::{Device, DeviceLimits, Devices, devices};
-pub(crate) use gpu::{ABSENT, DevicePositions, Gpu};
+pub(crate) use gpu::{ABSENT, DevicePositions, Gpu, RestDevice};
 pub(crate) use stages::Stages;
 
 /// The backend that a scene requests, as far as it is known before the body is built.

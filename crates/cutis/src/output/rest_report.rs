@@ -14,8 +14,17 @@ pub struct RestReport {
     pub force: f64,
     /// Wall time, ms.
     pub ms: f64,
+    /// Where the equations of the steps were solved: `cpu`, or `gpu` for the device of the backend.
+    /// The CPU computed forces and matrices.
+    #[serde(default = "cpu")]
+    pub equations_on: String,
     /// Newton steps.
     pub steps: Vec<RestStep>,
+}
+
+/// Where reports before this key solved their equations.
+fn cpu() -> String {
+    "cpu".into()
 }
 
 /// A Newton step.
@@ -90,15 +99,16 @@ impl StopReport {
 }
 
 impl RestReport {
-    /// The report of a search that took `ms`.
-    pub(crate) fn of(rest: &cutis_rest::Rest, ms: f64) -> Self {
+    /// The report of a search that took `ms` and solved its equations on `place`.
+    pub(crate) fn of(rest: &cutis_rest::Rest, ms: f64, place: &str) -> Self {
         let step = |step: &cutis_rest::Step| RestStep {
             force: step.force,
             moved_mm: 1e3 * step.moved_m,
             cycles: step.cycles,
             error: step.error.is_finite().then_some(step.error),
         };
-        Self { error: rest.error, force: rest.force, ms, steps: rest.steps.iter().map(step).collect() }
+        let steps = rest.steps.iter().map(step).collect();
+        Self { error: rest.error, force: rest.force, ms, equations_on: place.into(), steps }
     }
 
     /// Multigrid cycles of all steps.
@@ -110,10 +120,11 @@ impl RestReport {
     #[must_use]
     pub fn summary(&self) -> String {
         format!(
-            "at rest, with an estimated error of {:.2} % of the displacement: {} steps, {} multigrid cycles, {:.1} s",
+            "at rest, with an estimated error of {:.2} % of the displacement: {} steps, {} multigrid cycles{}, {:.1} s",
             100.0 * self.error,
             self.steps.len(),
             self.cycles(),
+            if self.equations_on == "gpu" { " on the GPU" } else { "" },
             1e-3 * self.ms
         )
     }

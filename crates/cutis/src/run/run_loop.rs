@@ -123,7 +123,7 @@ impl RunLoop<'_> {
                     frames(simulation, recorder.as_deref_mut(), progress)
                 })?;
             }
-            let (settled, ended) = self.settle(simulation, &lips, recorder, clock)?;
+            let (settled, ended) = self.settle(simulation, place, &lips, recorder, clock)?;
             (Some(settled), ended)
         };
         if let Some(series) = &self.series {
@@ -142,10 +142,12 @@ impl RunLoop<'_> {
         Ok((end, if self.resamples { simulation.positions_on_device() } else { None }))
     }
 
-    /// Finds the state of rest after each thing that is still to be done to the body.
+    /// Finds the state of rest after each thing that is still to be done to the body. The equations
+    /// are solved on `place`.
     fn settle(
         &self,
         simulation: &mut dyn Simulation,
+        place: &'static str,
         lips: &Lips<'_>,
         mut recorder: Option<&mut Recorder>,
         clock: &mut Clock<'_>,
@@ -154,7 +156,7 @@ impl RunLoop<'_> {
         let stops: Vec<&Stop> = self.stops.iter().filter(|stop| stop.time_s > now_s).collect();
         let times_s: Vec<f64> = [now_s].into_iter().chain(stops.iter().map(|stop| stop.time_s)).collect();
         let total = SEARCH * times_s.len() as u64;
-        clock.stage("search for the state of rest", total, |progress| {
+        clock.stage_on(place, "search for the state of rest", total, |progress| {
             let mut settled = Settled::default();
             for (n, &time_s) in times_s.iter().enumerate() {
                 let start = Instant::now();
@@ -171,7 +173,7 @@ impl RunLoop<'_> {
                 if let Some(series) = &self.series {
                     series.rest(simulation, n + 1)?;
                 }
-                settled.add(RestReport::of(&rest, ms), row, done);
+                settled.add(RestReport::of(&rest, ms, place), row, done);
                 progress.advance(before + SEARCH);
             }
             Ok((settled, self.end(simulation)?))

@@ -156,7 +156,8 @@ impl Model for ConstraintModel {
         } else {
             start(backend, system, settings).map_err(input.file.blame("solver"))?
         };
-        let run = SolverRun { solver, wound, threads, hooks, input: *input };
+        let gpu = device.as_ref().map(|device| device.gpu().clone());
+        let run = SolverRun { solver, wound, threads, hooks, gpu, rest_device: None, input: *input };
         Ok(Started { simulation: Box::new(run), device })
     }
 }

@@ -9,7 +9,7 @@ use super::start::StartedSolver;
 use super::threads::Threads;
 use super::wound::GrowingWound;
 use crate::Error;
-use crate::backend::DevicePositions;
+use crate::backend::{DevicePositions, Gpu, RestDevice};
 use crate::body::GrowingCuts;
 use crate::model::{ModelInput, Simulation, SimulationEnd, first_frame};
 use crate::output::report::KindResidual;
@@ -45,6 +45,9 @@ pub(crate) struct SolverRun<'a> {
     pub(crate) threads: Option<Threads>,
     /// The handles that grab tissue later; none if the scene has none.
     pub(crate) hooks: Option<Hooks>,
+    /// The GPU of the run, if it has one, and its kernels for searches after the first one.
+    pub(crate) gpu: Option<Gpu>,
+    pub(crate) rest_device: Option<RestDevice>,
     pub(crate) input: ModelInput<'a>,
 }
 
@@ -229,7 +232,13 @@ impl Simulation for SolverRun<'_> {
         let time_s = solver.time_s();
         hooks::place(solver.system()?, time_s, &mut placed);
         solver.restore(&placed, &velocities, frame)?;
-        let body = cutis_rest::Body::of(solver.system()?, gravity)?;
+        let mut body = cutis_rest::Body::of(solver.system()?, gravity)?;
+        if let (None, Some(gpu)) = (&self.rest_device, &self.gpu) {
+            self.rest_device = Some(RestDevice::new(gpu)?);
+        }
+        if let Some(device) = &self.rest_device {
+            body = device.with(body);
+        }
         let options = rest_options(error);
         let before: Vec<Point3<f64>> = before.iter().map(|x| x.cast()).collect();
         let rest = body.settle_after(&before, &options, progress)?;
