@@ -25,15 +25,27 @@ impl SceneCase {
     }
 }
 
+/// The demo with few voxels and vertices.
+pub fn coarse_demo(effort: Effort) -> Result<LoadedScene, Failure> {
+    let [phantom, spacing] = coarse_size(effort);
+    Ok(cutis::demo(&set(&[("volume.phantom", &phantom), ("lattice.spacing_mm", &spacing)]))?)
+}
+
+/// The phantom of coarse scenes and the spacing of their lattices in mm.
+fn coarse_size(effort: Effort) -> [String; 2] {
+    let quick = effort == Effort::Quick;
+    let (size, spacing) = if quick { ("[64, 64, 48]", "12.0") } else { ("[96, 96, 64]", "8.0") };
+    [format!("{{ size = {size}, seed = 1 }}"), spacing.into()]
+}
+
 /// The demo, an abdomen, a handle, and every kind of constraint alone and all together.
 pub fn all(effort: Effort) -> Result<Vec<SceneCase>, Failure> {
     let quick = effort == Effort::Quick;
     let frames = if quick { 2 } else { 5 };
-    let (size, spacing) = if quick { ("[64, 64, 48]", "12.0") } else { ("[96, 96, 64]", "8.0") };
-    let phantom = format!("{{ size = {size}, seed = 1 }}");
+    let [phantom, spacing] = coarse_size(effort);
     let coarse = [
         ("volume.phantom", phantom.as_str()),
-        ("lattice.spacing_mm", spacing),
+        ("lattice.spacing_mm", spacing.as_str()),
         ("solver.formulation", "xpbd"),
         ("solver.substeps", "5"),
         ("solver.iterations", "1"),

@@ -1,10 +1,11 @@
-//! The outer ring: whole runs of the pipeline on both backends, and conserved quantities of long
-//! runs.
+//! The outer ring: whole runs of the pipeline on both backends, a state of rest, and conserved
+//! quantities of long runs.
 
 mod cases;
 mod checkpoint;
 mod long;
 mod pipeline;
+mod rest;
 
 use super::bench::{Bench, Failure};
 
@@ -13,5 +14,6 @@ pub fn run(bench: &mut Bench<'_, '_>) -> Result<(), Failure> {
     for case in cases::all(bench.effort)? {
         pipeline::compare(bench, &case)?;
     }
+    rest::compare(bench)?;
     long::run(bench)
 }
