@@ -56,6 +56,21 @@ fn inverse_times(place: Place, thread: u32, number: f32) -> f32 {
     return sum;
 }
 
+// The number of `x` that belongs to a thread.
+fn own_number(place: Place) -> f32 {
+    return x[place.number / 4u][place.number % 4u];
+}
+
+// Writes the residual and the next change, after the change or solution `x`. All threads of the
+// workgroup must call this.
+fn write_change(place: Place, thread: u32, rest: f32) {
+    let step = inverse_times(place, thread, rest);
+    if (place.exists) {
+        residual[place.number] = rest;
+        next[place.number] = factors.old * own_number(place) + factors.step * step;
+    }
+}
+
 // Writes a multiple of the inverse of the diagonal times the right-hand side to the solution.
 @compute @workgroup_size(64)
 fn start(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) thread: u32) {
@@ -72,11 +87,7 @@ fn start(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) t
 fn first(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) thread: u32) {
     let place = place_of(slice.x, thread);
     let rest = select(0.0, right[place.number], place.exists) - product_at(place);
-    let step = inverse_times(place, thread, rest);
-    if (place.exists) {
-        residual[place.number] = rest;
-        next[place.number] = factors.old * own_number(place) + factors.step * step;
-    }
+    write_change(place, thread, rest);
 }
 
 // Subtracts the product with the change `x` from the residual, and writes the next change.
@@ -84,11 +95,7 @@ fn first(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) t
 fn second(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) thread: u32) {
     let place = place_of(slice.x, thread);
     let rest = select(0.0, residual[place.number], place.exists) - product_at(place);
-    let step = inverse_times(place, thread, rest);
-    if (place.exists) {
-        residual[place.number] = rest;
-        next[place.number] = factors.old * own_number(place) + factors.step * step;
-    }
+    write_change(place, thread, rest);
 }
 
 // Subtracts the product with the second change `x` from the residual. Adds the first, the second
@@ -114,9 +121,4 @@ fn product(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index)
     if (place.exists) {
         next[place.number] = found;
     }
-}
-
-// The number of `x` that belongs to a thread.
-fn own_number(place: Place) -> f32 {
-    return x[place.number / 4u][place.number % 4u];
 }
