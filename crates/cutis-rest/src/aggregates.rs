@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::blocks::{Block, ROWS, divided, row_parts};
@@ -97,6 +98,17 @@ impl Aggregates {
             *aggregate = *number;
         }
         Self { of, count: count as usize }
+    }
+
+    /// The center of the nodes of each aggregate.
+    pub fn centers(&self, places: &[Point3<f64>]) -> Vec<Point3<f64>> {
+        let mut sums = vec![(Vector3::zeros(), 0.0); self.count];
+        for (&aggregate, place) in self.of.iter().zip(places) {
+            let (sum, count) = &mut sums[aggregate as usize];
+            *sum += place.coords;
+            *count += 1.0;
+        }
+        sums.into_iter().map(|(sum, count)| Point3::from(sum / count)).collect()
     }
 }
 

@@ -60,13 +60,13 @@ impl Multigrid {
             return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix) };
         }
         let modes = places.par_iter().map(transfer::rigid_modes).collect();
-        let (fine, mut matrix, mut modes) = Level::new(matrix, modes);
+        let (fine, mut matrix, mut modes, mut places) = Level::new(matrix, modes, places);
         let mut coarse = Vec::new();
         while matrix.nodes() > BOTTOM {
             let before = matrix.nodes();
-            let (level, next, next_modes) = Level::new(&matrix, modes);
+            let (level, next, next_modes, next_places) = Level::new(&matrix, modes, &places);
             coarse.push(Coarse { matrix, level });
-            (matrix, modes) = (next, next_modes);
+            (matrix, modes, places) = (next, next_modes, next_places);
             if matrix.nodes() * 10 > before * 9 {
                 break;
             }
@@ -122,14 +122,16 @@ fn below(levels: &mut [Coarse], bottom: &Bottom, right: &[[f32; LANES]], to: &mu
 }
 
 impl<const B: usize, const L: usize> Level<B, L> {
-    /// Builds a level for a matrix, and the matrix and modes of the next one.
+    /// Builds a level for a matrix whose nodes are at some places, in m, and the matrix, modes and
+    /// places of the next one.
     fn new(
         matrix: &impl Operator<B, L>,
         modes: Vec<Modes<B>>,
-    ) -> (Self, Symmetric<RIGID, LANES>, Vec<Modes<RIGID>>) {
+        places: &[Point3<f64>],
+    ) -> (Self, Symmetric<RIGID, LANES>, Vec<Modes<RIGID>>, Vec<Point3<f64>>) {
         let aggregates = Aggregates::of(matrix);
         let (tentative, next_modes) = transfer::tentative(&aggregates, modes);
-        let smoother = Smoother::new(matrix);
+        let smoother = Smoother::new(matrix, places);
         let inverse = |node: usize| smoother.inverse(node);
         let prolongation = transfer::smoothed(matrix, inverse, smoother.largest, &aggregates, &tentative);
         drop(tentative);
@@ -140,7 +142,7 @@ impl<const B: usize, const L: usize> Level<B, L> {
         let residual = vec![[0.0; L]; matrix.nodes()];
         let coarse = vec![[0.0; LANES]; aggregates.count];
         let level = Self { smoother, transfer, residual, coarse };
-        (level, next, next_modes)
+        (level, next, next_modes, aggregates.centers(places))
     }
 
     fn cycle(

@@ -1,6 +1,6 @@
 //! Chebyshev smoothing.
 
-use nalgebra::{Cholesky, SMatrix};
+use nalgebra::{Cholesky, Point3, SMatrix};
 use rayon::prelude::*;
 
 use crate::blocks::{Block, ROWS};
@@ -52,21 +52,23 @@ pub(crate) struct Smoother<const B: usize, const L: usize> {
     vector: Vector<L>,
     /// The change of each unknown, and the next change.
     changes: [Vector<L>; 2],
-    /// The order in which the products take the rows. Without it they come one after the other.
-    fronts: Option<Fronts<4>>,
+    /// The order in which the products take the rows.
+    fronts: Fronts<4>,
 }
 
 impl<const B: usize, const L: usize> Smoother<B, L> {
-    pub fn new(matrix: &impl Operator<B, L>) -> Self {
+    /// The nodes of the matrix are at these places, in m.
+    pub fn new(matrix: &impl Operator<B, L>, places: &[Point3<f64>]) -> Self {
         let nodes = matrix.nodes();
         let start = |node: usize| std::array::from_fn(|n| if n < B { noise(B * node + n) } else { 0.0 });
         let zero = vec![[0.0; L]; nodes];
+        let row_bytes = size_of::<f32>() * matrix.numbers() / (2 * nodes.max(1));
         let mut smoother = Self {
             inverse: Vec::new(),
             largest: 1.0,
             vector: (0..nodes).map(start).collect(),
             changes: [zero.clone(), zero],
-            fronts: Fronts::of(&matrix.above().neighbors),
+            fronts: Fronts::of(&matrix.above().neighbors, places, row_bytes),
         };
         smoother.invert(matrix);
         smoother.find_largest(matrix, POWER_STEPS[0]);
@@ -182,7 +184,7 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
     ) {
         let Self { inverse, changes: [one, two], fronts, .. } = self;
         let vectors = Rows { first: 0, x, residual, changes: [one, two], product };
-        Sweep { matrix, inverse, right, stages }.run(fronts.as_ref(), vectors);
+        Sweep { matrix, inverse, right, stages }.run(fronts, vectors);
     }
 }
 
@@ -245,9 +247,8 @@ mod tests {
             let number = |node: usize, n: usize| if n < 6 { noise(seed + 6 * node + n) } else { 0.0 };
             (0..60_000).map(|node| std::array::from_fn(|n| number(node, n))).collect()
         };
-        // More threads would have too few rows for domains of their own.
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-        let mut smoother = threads.install(|| Smoother::<6, 8>::new(&matrix));
+        let places: Vec<Point3<f64>> = (0..60_000).map(|n| Point3::new(f64::from(n), 0.0, 0.0)).collect();
+        let mut smoother = Smoother::<6, 8>::new(&matrix, &places);
         let (right, start) = (vector(0), vector(1_000_000));
         let times = |x: &Vector<8>| {
             let mut product = start.clone();
@@ -268,9 +269,10 @@ mod tests {
         }
         for together in [true, false] {
             if !together {
-                smoother.fronts = None;
+                // A small matrix has no domains.
+                smoother.fronts = Fronts::of(&matrix.above().neighbors, &places, 1);
             }
-            assert_eq!(smoother.fronts.is_some(), together);
+            assert_ne!(smoother.fronts.domains().is_empty(), together);
             let (mut found, mut residual, mut product) = (start.clone(), start.clone(), start.clone());
             smoother.smooth(&matrix, &right, &mut found, &mut residual, Some(&mut product));
             assert!(found == x && residual == r && product == times(&x), "{together}");

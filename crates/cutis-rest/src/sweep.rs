@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::blocks::ROWS;
 use crate::fronts::Fronts;
 use crate::smoother::{Operator, times};
 
@@ -56,6 +55,39 @@ impl<'a, const L: usize> Rows<'a, L> {
         let changes = [one_after, two_after];
         (before, Self { first: row, x: x_after, residual: residual_after, changes, product: product_after })
     }
+
+    /// What a stage reads and writes. None if it has nothing to write.
+    fn parts(&mut self, stage: Stage) -> Option<Parts<'_, L>> {
+        let Self { x, residual, changes: [one, two], product, .. } = self;
+        let (before, one, to): (&[_], &[_], &mut [_]) = match stage {
+            Stage::Start(_) => (one, two, &mut **x),
+            Stage::First(_) => (x, two, &mut **one),
+            Stage::Second(_) => (one, x, &mut **two),
+            Stage::Third(_) => (two, one, &mut **x),
+            Stage::Product => (x, one, product.as_deref_mut()?),
+        };
+        Some(Parts { before, one, residual, to })
+    }
+}
+
+/// What a stage reads at its rows and their neighbors, the first change, and what it writes.
+struct Parts<'a, const L: usize> {
+    before: &'a [[f32; L]],
+    one: &'a [[f32; L]],
+    residual: &'a mut [[f32; L]],
+    to: &'a mut [[f32; L]],
+}
+
+/// Some parts of a vector, whose rows are ascending.
+fn chosen<'a, T>(mut rest: &'a mut [T], rows: &[Range<usize>]) -> Vec<&'a mut [T]> {
+    let mut first = 0;
+    let mut parts = Vec::with_capacity(rows.len());
+    for rows in rows {
+        let (part, after) = rest.split_at_mut(rows.start - first).1.split_at_mut(rows.len());
+        parts.push(part);
+        (rest, first) = (after, rows.end);
+    }
+    parts
 }
 
 /// Four stages that go through the rows together.
@@ -68,90 +100,60 @@ pub(crate) struct Sweep<'a, M, const B: usize, const L: usize> {
 }
 
 impl<M: Operator<B, L>, const B: usize, const L: usize> Sweep<'_, M, B, L> {
-    /// Runs all stages at all rows: together, or one after the other.
-    pub fn run(&self, fronts: Option<&Fronts<4>>, mut vectors: Rows<'_, L>) {
-        let Some(fronts) = fronts else {
-            return self.stages.into_iter().for_each(|stage| self.everywhere(stage, &mut vectors));
-        };
-        for domains in fronts.passes() {
-            let mut rest = vectors.again();
-            let mut parts = Vec::with_capacity(domains.len());
-            for domain in domains {
-                let (own, after) = rest.split(domain.rows.start).1.split(domain.rows.end);
-                parts.push((domain, own));
-                rest = after;
+    /// Runs all stages at all rows.
+    pub fn run(&self, fronts: &Fronts<4>, mut vectors: Rows<'_, L>) {
+        let mut rest = vectors.again();
+        let mut parts = Vec::with_capacity(fronts.domains().len());
+        for domain in fronts.domains() {
+            let (own, after) = rest.split(domain.rows.start).1.split(domain.rows.end);
+            parts.push((domain, own));
+            rest = after;
+        }
+        parts.into_par_iter().for_each(|(domain, mut own)| {
+            let first = own.first;
+            for (stage, rows) in &domain.steps {
+                let stage = self.stages[*stage];
+                let Some(Parts { before, one, residual, to }) = own.parts(stage) else { continue };
+                let own = rows.start - first..rows.end - first;
+                let to = (&mut residual[own.clone()], &mut to[own]);
+                self.at(stage, rows.clone(), first, before, one, to);
             }
-            parts.into_par_iter().for_each(|(domain, mut own)| {
-                for (stage, rows) in &domain.steps {
-                    self.at(self.stages[*stage], rows.clone(), &mut own);
-                }
-            });
+        });
+        for (number, &stage) in self.stages.iter().enumerate() {
+            let Some(Parts { before, one, residual, to }) = vectors.parts(stage) else { continue };
+            let rows = fronts.rest(number);
+            let parts = chosen(residual, rows).into_par_iter().zip(chosen(to, rows)).zip(rows);
+            parts.for_each(|(to, rows)| self.at(stage, rows.clone(), 0, before, one, to));
         }
     }
 
-    /// Runs a stage at all rows.
-    fn everywhere(&self, stage: Stage, vectors: &mut Rows<'_, L>) {
-        let Rows { x, residual, changes: [one, two], product, .. } = vectors;
-        let rows = residual.par_iter_mut().enumerate().with_min_len(ROWS / 8);
+    /// Runs a stage at some rows. `before` and `one` have rows from the first one on, and `to` has
+    /// the residual and the result at these rows.
+    fn at(
+        &self,
+        stage: Stage,
+        rows: Range<usize>,
+        first: usize,
+        before: &[[f32; L]],
+        one: &[[f32; L]],
+        (residual, to): (&mut [[f32; L]], &mut [[f32; L]]),
+    ) {
+        let before = |row: usize| before[row - first];
+        let rows = rows.zip(residual).zip(to);
         match stage {
-            Stage::Start(factor) => {
-                rows.zip(&mut **x).for_each(|((row, _), x)| *x = self.start(row, factor));
-            }
-            Stage::First(factors) => rows.zip(&mut **one).for_each(|((row, residual), one)| {
+            Stage::Start(factor) => rows.for_each(|((row, _), to)| *to = self.start(row, factor)),
+            Stage::First(factors) => rows.for_each(|((row, residual), to)| {
                 *residual = self.right[row];
-                *one = self.change(row, |row| x[row], residual, Some(factors));
+                *to = self.change(row, before, residual, Some(factors));
             }),
-            Stage::Second(factors) => rows.zip(&mut **two).for_each(|((row, residual), two)| {
-                *two = self.change(row, |row| one[row], residual, Some(factors));
+            Stage::Second(factors) => rows.for_each(|((row, residual), to)| {
+                *to = self.change(row, before, residual, Some(factors));
             }),
-            Stage::Third(factors) => rows.zip(&mut **x).for_each(|((row, residual), x)| {
-                let three = self.change(row, |row| two[row], residual, factors);
-                *x = sum([x, &one[row], &two[row], &three]);
+            Stage::Third(factors) => rows.for_each(|((row, residual), to)| {
+                let three = self.change(row, before, residual, factors);
+                *to = sum([to, &one[row - first], &before(row), &three]);
             }),
-            Stage::Product => {
-                let Some(product) = product else { return };
-                rows.zip(&mut **product)
-                    .for_each(|((row, _), product)| *product = self.matrix.row_times(row, |row| x[row]));
-            }
-        }
-    }
-
-    /// Runs a stage at some rows. `vectors` also have the rows that these read.
-    fn at(&self, stage: Stage, rows: Range<usize>, vectors: &mut Rows<'_, L>) {
-        let Rows { first, x, residual, changes: [one, two], product } = vectors;
-        let first = *first;
-        match stage {
-            Stage::Start(factor) => {
-                for row in rows {
-                    x[row - first] = self.start(row, factor);
-                }
-            }
-            Stage::First(factors) => {
-                for row in rows {
-                    let n = row - first;
-                    residual[n] = self.right[row];
-                    one[n] = self.change(row, |row| x[row - first], &mut residual[n], Some(factors));
-                }
-            }
-            Stage::Second(factors) => {
-                for row in rows {
-                    let n = row - first;
-                    two[n] = self.change(row, |row| one[row - first], &mut residual[n], Some(factors));
-                }
-            }
-            Stage::Third(factors) => {
-                for row in rows {
-                    let n = row - first;
-                    let three = self.change(row, |row| two[row - first], &mut residual[n], factors);
-                    x[n] = sum([&x[n], &one[n], &two[n], &three]);
-                }
-            }
-            Stage::Product => {
-                let Some(product) = product else { return };
-                for row in rows {
-                    product[row - first] = self.matrix.row_times(row, |row| x[row - first]);
-                }
-            }
+            Stage::Product => rows.for_each(|((row, _), to)| *to = self.matrix.row_times(row, before)),
         }
     }
 
