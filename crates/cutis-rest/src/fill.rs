@@ -182,8 +182,8 @@ fn add<T: nalgebra::RealField + Copy>(to: &mut [T], factor: T, matrix: &Matrix3<
 }
 
 impl Scratch {
-    /// Forward differences of the gradients over the position of one vertex, after
-    /// [`evaluate`](Self::evaluate): `∂²C/∂x_own∂x_b` for each vertex `b`.
+    /// Forward differences of the gradients over the position of one vertex, after the constraint
+    /// was evaluated: `∂²C/∂x_own∂x_b` for each vertex `b`.
     fn differentiate(&mut self, kind: &dyn Constraints, k: usize, own: usize) {
         let Self { own: Evaluation { places, gradients, .. }, ahead, curvature, .. } = self;
         curvature.clear();
