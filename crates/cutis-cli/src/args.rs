@@ -92,6 +92,9 @@ pub(crate) enum Command {
         json: bool,
     },
     /// Find solver settings for a scene on this machine, and write a copy of the scene with them
+    ///
+    /// It also searches for the state of rest once, prints how long that takes, and says where
+    /// frames are not needed because only the state of rest counts.
     Tune {
         /// Scene file (TOML)
         scene: PathBuf,
