@@ -115,29 +115,24 @@ impl<M: Operator<B, L>, const B: usize, const L: usize> Sweep<'_, M, B, L> {
                 let stage = self.stages[*stage];
                 let Some(Parts { before, one, residual, to }) = own.parts(stage) else { continue };
                 let own = rows.start - first..rows.end - first;
-                let to = (&mut residual[own.clone()], &mut to[own]);
-                self.at(stage, rows.clone(), first, before, one, to);
+                let (residual, to) = (&mut residual[own.clone()], &mut to[own]);
+                self.at(stage, rows.clone(), first, Parts { before, one, residual, to });
             }
         });
         for (number, &stage) in self.stages.iter().enumerate() {
             let Some(Parts { before, one, residual, to }) = vectors.parts(stage) else { continue };
             let rows = fronts.rest(number);
             let parts = chosen(residual, rows).into_par_iter().zip(chosen(to, rows)).zip(rows);
-            parts.for_each(|(to, rows)| self.at(stage, rows.clone(), 0, before, one, to));
+            parts.for_each(|((residual, to), rows)| {
+                self.at(stage, rows.clone(), 0, Parts { before, one, residual, to });
+            });
         }
     }
 
-    /// Runs a stage at some rows. `before` and `one` have rows from the first one on, and `to` has
-    /// the residual and the result at these rows.
-    fn at(
-        &self,
-        stage: Stage,
-        rows: Range<usize>,
-        first: usize,
-        before: &[[f32; L]],
-        one: &[[f32; L]],
-        (residual, to): (&mut [[f32; L]], &mut [[f32; L]]),
-    ) {
+    /// Runs a stage at some rows. What it reads begins at the row `first`, and what it writes at
+    /// the first one of `rows`.
+    fn at(&self, stage: Stage, rows: Range<usize>, first: usize, parts: Parts<'_, L>) {
+        let Parts { before, one, residual, to } = parts;
         let before = |row: usize| before[row - first];
         let rows = rows.zip(residual).zip(to);
         match stage {
