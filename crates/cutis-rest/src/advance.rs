@@ -45,6 +45,11 @@ pub(crate) struct Pending {
     pub change: f64,
 }
 
+/// Whether a change of the energy is a large enough share of the one that a slope predicts.
+pub(crate) fn is_enough(change: f64, predicted: f64) -> bool {
+    change <= DECREASE * predicted
+}
+
 impl Search<'_> {
     /// Moves along a direction: by the full step if the energy falls, or if it may rise once, and
     /// otherwise by a part of it.
@@ -55,8 +60,7 @@ impl Search<'_> {
         }
         let mut full = self.moved(direction, 1.0, slope);
         if let Some(pending) = &self.pending {
-            let total = pending.change + full.change;
-            return (total <= DECREASE * pending.slope).then_some(full);
+            return is_enough(pending.change + full.change, pending.slope).then_some(full);
         }
         if self.is_lower(&full) {
             return Some(full);
@@ -113,7 +117,7 @@ impl Search<'_> {
         // Where the change of the energy is below its rounding, the slope decides (Hager and
         // Zhang, SIAM J. Optim. 16, 2005).
         let hidden = change.abs() <= noise && end_slope <= (2.0 * DECREASE - 1.0) * slope;
-        let lower = change <= DECREASE * length * slope && change < -noise;
+        let lower = is_enough(change, length * slope) && change < -noise;
         change.is_finite() && end_slope.is_finite() && (lower || hidden)
     }
 }
