@@ -1,9 +1,9 @@
 //! How far a search moves along a direction.
 //!
 //! A full Newton step changes volumes to second order, which a nearly incompressible body resists:
-//! the energy may rise. The next step mends that at small cost, while a shorter step would lose
-//! most of the way. So a full step may raise the energy once, and is taken back if the next step
-//! does not make up for it (the watchdog of Chamberlain, Powell, Lemarechal and Pedersen, Math.
+//! the energy may rise. Local relaxation or the next step mends that at small cost, while a shorter
+//! step would lose most of the way. So a full step may raise the energy, and is taken back if
+//! neither makes up for it (the watchdog of Chamberlain, Powell, Lemarechal and Pedersen, Math.
 //! Program. Study 16, 1982).
 
 use nalgebra::{Point3, Vector3};
@@ -34,7 +34,8 @@ pub(crate) struct Moved {
     pub rises: bool,
 }
 
-/// A full step that raised the energy. It stays if the next step makes up for it.
+/// A full step that raised the energy, also after local relaxation. It stays if the next step makes
+/// up for it.
 pub(crate) struct Pending {
     /// Positions of all vertices before the step.
     pub x: Vec<Point3<f64>>,

@@ -240,7 +240,7 @@ impl<'a> Search<'a> {
         let start = rises.then(|| before.x.clone());
         self.spare = before;
         self.pending = None;
-        // It would cost as much as a part of a step if the body is near enough to rest.
+        // After the last step it would only cost time.
         let relaxed = if length == 1.0 && !self.is_at_rest() { self.relax(&solution.x) } else { 0.0 };
         if let Some(x) = start
             && !is_enough(change + relaxed, slope)
@@ -262,15 +262,15 @@ impl<'a> Search<'a> {
         }
         let relaxed = self.body.with_moved(&self.state, x, &places);
         let change = self.body.difference(&self.state, &relaxed);
-        let lower = change < 0.0 && relaxed.is_finite();
-        if lower {
+        let change = if relaxed.is_finite() { change.min(0.0) } else { 0.0 };
+        if change < 0.0 {
             self.energy_change_j += change;
             memory.x = std::mem::replace(&mut self.state, relaxed).x;
         } else {
             memory.x = relaxed.x;
         }
         self.spare = memory;
-        if lower { change } else { 0.0 }
+        change
     }
 
     /// Solves the equations of a step under these forces, with the second derivatives of some
