@@ -17,6 +17,12 @@ pub const SECOND: &str = "second";
 pub const THIRD: &str = "third";
 /// Name of the entry point of [`smooth`] that computes a product.
 pub const PRODUCT: &str = "product";
+/// Name of the entry point of [`smooth`] that reads the residual at the nodes of a patch.
+pub const GATHER: &str = "gather";
+/// Name of the entry point of [`smooth`] that adds the solution of a patch.
+pub const SCATTER: &str = "scatter";
+/// Name of the entry point of [`smooth`] that computes the residual at some nodes.
+pub const RESIDUAL: &str = "residual_at_nodes";
 /// Name of the entry point of [`transfer`] that goes to the next level.
 pub const RESTRICT: &str = "restriction";
 /// Name of the entry point of [`transfer`] that comes back from it.

@@ -243,6 +243,13 @@ impl<const R: usize, const C: usize> Sums<R, C> {
         &mut self.sums[self.places[column] as usize - 1]
     }
 
+    /// The sum of a column, if there is one.
+    #[inline(always)]
+    pub fn existing(&mut self, column: usize) -> Option<&mut Block<R, C>> {
+        let place = self.places[column].checked_sub(1)?;
+        Some(&mut self.sums[place as usize])
+    }
+
     /// Changes each sum.
     pub fn for_each(&mut self, change: impl FnMut(&mut Block<R, C>)) {
         self.sums.iter_mut().for_each(change);

@@ -21,6 +21,7 @@ mod equations;
 mod kernels;
 mod level;
 mod levels;
+mod patch;
 mod rows;
 mod sliced;
 mod step;

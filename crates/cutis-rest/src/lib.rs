@@ -49,6 +49,7 @@ mod matrix;
 mod multigrid;
 mod options;
 mod order;
+mod patch;
 mod place;
 mod settle;
 mod smoother;

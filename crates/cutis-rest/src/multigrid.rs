@@ -1,8 +1,8 @@
 //! Multigrid by smoothed aggregation: a preconditioner for the equations of an elastic body.
 //!
 //! Each level groups the nodes of the level before. A group moves like a rigid body: it has six
-//! unknowns. The prolongation from these is smoothed by one step of Jacobi's method (Vaněk, Mandel
-//! and Brezina, Computing 56, 1996). The levels come from the matrix alone, so they follow cuts and
+//! unknowns. The prolongation from these is smoothed by two steps of Jacobi's method (Vaněk, Mandel
+//! and Brezina, Computing 56, 1996), of which the second adds no blocks. The levels come from the matrix alone, so they follow cuts and
 //! work for every mesh and every type of constraint.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3};
@@ -11,15 +11,18 @@ use rayon::prelude::*;
 use crate::aggregates::Aggregates;
 use crate::blocks::Columns;
 use crate::matrix::Matrix;
+use crate::patch::Patch;
 use crate::smoother::{Operator, Smoother};
 use crate::symmetric::Symmetric;
-use crate::transfer::{self, Modes, Transfer};
+use crate::transfer::{self, Jacobi, Modes, Transfer};
 use crate::vectors::Vector;
 
 /// Unknowns of a rigid body.
 pub(crate) const RIGID: usize = 6;
 /// [`RIGID`] and the zeros of a vector.
 pub(crate) const LANES: usize = 8;
+/// The share of the spectrum that a smoother leaves to the next level.
+const SPECTRUM: f32 = 0.08;
 /// A level with at most this many nodes is solved directly.
 const BOTTOM: usize = 150;
 
@@ -43,6 +46,8 @@ pub(crate) struct Coarse {
 pub(crate) struct Multigrid {
     /// None if the matrix is small enough to be solved directly.
     pub fine: Option<Level<3, 4>>,
+    /// The part of the finest level that is smoothed more.
+    pub patch: Option<Patch>,
     pub coarse: Vec<Coarse>,
     pub bottom: Bottom,
 }
@@ -57,8 +62,9 @@ impl Multigrid {
     /// Builds the levels for a matrix with one node at each place, in m.
     pub fn new(matrix: &Matrix, places: &[Point3<f64>]) -> Self {
         if matrix.nodes() <= BOTTOM {
-            return Self { fine: None, coarse: Vec::new(), bottom: Bottom::new(matrix) };
+            return Self { fine: None, patch: None, coarse: Vec::new(), bottom: Bottom::new(matrix) };
         }
+        let patch = Patch::of(matrix, places);
         let modes = places.par_iter().map(transfer::rigid_modes).collect();
         let (fine, mut matrix, mut modes, mut places) = Level::new(matrix, modes, places);
         let mut coarse = Vec::new();
@@ -71,14 +77,17 @@ impl Multigrid {
                 break;
             }
         }
-        Self { fine: Some(fine), coarse, bottom: Bottom::new(&matrix) }
+        Self { fine: Some(fine), patch, coarse, bottom: Bottom::new(&matrix) }
     }
 
-    /// Adapts the smoother of the finest level to another matrix. The other levels stay.
+    /// Adapts the smoothers of the finest level to another matrix. The other levels stay.
     pub fn update(&mut self, matrix: &Matrix) {
         match &mut self.fine {
             Some(fine) => fine.smoother.update(matrix),
             None => self.bottom = Bottom::new(matrix),
+        }
+        if let Some(patch) = &mut self.patch {
+            patch.update(matrix);
         }
     }
 
@@ -91,11 +100,20 @@ impl Multigrid {
         to: &mut [[f32; 4]],
         product: &mut [[f32; 4]],
     ) {
-        let Self { fine, coarse, bottom } = self;
+        let Self { fine, patch, coarse, bottom } = self;
         match fine {
             Some(fine) => {
-                let below = |right: &[_], to: &mut [_]| below(coarse, bottom, right, to);
-                fine.cycle(matrix, right, to, Some(product), below);
+                fine.start(matrix, right, to);
+                if let Some(patch) = patch {
+                    patch.smooth(to, &fine.residual);
+                    patch.find_residual(matrix, right, to, &mut fine.residual);
+                }
+                fine.correct(to, |right, to| below(coarse, bottom, right, to));
+                if let Some(patch) = patch {
+                    patch.find_residual(matrix, right, to, &mut fine.residual);
+                    patch.smooth(to, &fine.residual);
+                }
+                fine.smooth(matrix, right, to, Some(product));
             }
             None => {
                 bottom.solve::<3, 4>(right, to);
@@ -115,7 +133,9 @@ impl Multigrid {
 fn below(levels: &mut [Coarse], bottom: &Bottom, right: &[[f32; LANES]], to: &mut [[f32; LANES]]) {
     match levels {
         [Coarse { matrix, level }, rest @ ..] => {
-            level.cycle(&*matrix, right, to, None, |right, to| below(rest, bottom, right, to));
+            level.start(&*matrix, right, to);
+            level.correct(to, |right, to| below(rest, bottom, right, to));
+            level.smooth(&*matrix, right, to, None);
         }
         [] => bottom.solve::<RIGID, LANES>(right, to),
     }
@@ -131,10 +151,11 @@ impl<const B: usize, const L: usize> Level<B, L> {
     ) -> (Self, Symmetric<RIGID, LANES>, Vec<Modes<RIGID>>, Vec<Point3<f64>>) {
         let aggregates = Aggregates::of(matrix);
         let (tentative, next_modes) = transfer::tentative(&aggregates, modes);
-        let smoother = Smoother::new(matrix, places);
-        let inverse = |node: usize| smoother.inverse(node);
-        let prolongation = transfer::smoothed(matrix, inverse, smoother.largest, &aggregates, &tentative);
+        let smoother = Smoother::new(matrix, places, SPECTRUM);
+        let jacobi = Jacobi { inverse: |node: usize| smoother.inverse(node), largest: smoother.largest };
+        let prolongation = transfer::smoothed(matrix, &jacobi, &aggregates, &tentative);
         drop(tentative);
+        let prolongation = transfer::smoothed_again(matrix, &jacobi, &prolongation, &next_modes);
         let columns = Columns::of(&prolongation);
         let next = transfer::galerkin(matrix, &prolongation, &columns);
         drop(columns);
@@ -145,19 +166,26 @@ impl<const B: usize, const L: usize> Level<B, L> {
         (level, next, next_modes, aggregates.centers(places))
     }
 
-    fn cycle(
+    /// Smooths from zero, and keeps the residual.
+    fn start(&mut self, matrix: &impl Operator<B, L>, right: &[[f32; L]], to: &mut [[f32; L]]) {
+        self.smoother.start(matrix, right, to, &mut self.residual);
+    }
+
+    /// Adds the solution of the next level for the residual.
+    fn correct(&mut self, to: &mut [[f32; L]], below: impl FnOnce(&[[f32; LANES]], &mut [[f32; LANES]])) {
+        below(&self.transfer.restrict(&self.residual), &mut self.coarse);
+        self.transfer.add_prolonged(&self.coarse, to);
+    }
+
+    /// Smooths an approximation, and writes the matrix times the result.
+    fn smooth(
         &mut self,
         matrix: &impl Operator<B, L>,
         right: &[[f32; L]],
         to: &mut [[f32; L]],
         product: Option<&mut [[f32; L]]>,
-        below: impl FnOnce(&[[f32; LANES]], &mut [[f32; LANES]]),
     ) {
-        let Self { smoother, transfer, residual, coarse } = self;
-        smoother.start(matrix, right, to, residual);
-        below(&transfer.restrict(residual), coarse);
-        transfer.add_prolonged(coarse, to);
-        smoother.smooth(matrix, right, to, residual, product);
+        self.smoother.smooth(matrix, right, to, &mut self.residual, product);
     }
 }
 

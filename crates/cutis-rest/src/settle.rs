@@ -15,9 +15,9 @@ use crate::{Body, Options, Rest, RestError, Step};
 
 /// Accuracy of the equations of the first step, of which a rough solution would leave the largest
 /// part of the way.
-const FIRST_TOLERANCE: f64 = 0.1;
+const FIRST_TOLERANCE: f64 = 0.05;
 /// Accuracy of the equations of a later step without the exact second derivatives, and with them.
-const TOLERANCES: [f64; 2] = [0.2, 0.1];
+const TOLERANCES: [f64; 2] = [0.15, 0.1];
 /// Relative error of a displacement over the tolerance of its equations.
 const SOLVED: f64 = 2.5;
 /// Length of a step over the displacement from the start, below which the next step uses the exact
@@ -324,7 +324,8 @@ impl<'a> Search<'a> {
 
     /// Estimate of the distance from rest after a step, relative to the displacement `way` from the
     /// start. The steps shrink by a ratio `q`, so that `q/(1 − q)` of the last one is left. The
-    /// larger one of the last two ratios counts, and the error of the equations of a step.
+    /// largest counts of the last two ratios, the next one if they grow, and the error of the
+    /// equations of a step.
     fn estimate(&self, step: &Step, exact: bool, way: f64) -> f64 {
         let [.., before] = self.steps[..] else { return f64::INFINITY };
         // A shortened step, or one whose equations were not solved, does not tell the distance.
@@ -334,7 +335,9 @@ impl<'a> Search<'a> {
         let solved = SOLVED * TOLERANCES[usize::from(exact)];
         let mut ratio = (step.moved_m / before.moved_m).max(solved);
         if let [.., earlier, before] = self.steps[..] {
-            ratio = ratio.max(before.moved_m / earlier.moved_m);
+            let (last, earlier) = (step.moved_m / before.moved_m, before.moved_m / earlier.moved_m);
+            // Ratios that grow will grow on.
+            ratio = ratio.max(earlier).max(2.0 * last - earlier);
         }
         if way > 0.0 && ratio < 1.0 { ratio / (1.0 - ratio) * step.moved_m / way } else { f64::INFINITY }
     }

@@ -11,8 +11,6 @@ use crate::vectors::{Vector, dot};
 
 /// Matrix products of a smoother.
 const PRODUCTS: usize = 3;
-/// The smoother reduces errors in the upper part of the spectrum, down to this share of its end.
-const SPECTRUM: f32 = 0.08;
 /// Steps of the estimate of the largest eigenvalue, from noise and from an earlier estimate.
 const POWER_STEPS: [usize; 2] = [12, 3];
 
@@ -46,6 +44,8 @@ pub(crate) trait Operator<const B: usize, const L: usize>: Sync {
 pub(crate) struct Smoother<const B: usize, const L: usize> {
     /// Inverse of each diagonal block, column by column.
     inverse: Vec<[[f32; L]; B]>,
+    /// It reduces errors in the upper part of the spectrum, down to this share of its end.
+    spectrum: f32,
     /// Upper bound of the eigenvalues of the matrix times these inverses.
     pub largest: f32,
     /// Approximate eigenvector of the largest eigenvalue.
@@ -57,14 +57,16 @@ pub(crate) struct Smoother<const B: usize, const L: usize> {
 }
 
 impl<const B: usize, const L: usize> Smoother<B, L> {
-    /// The nodes of the matrix are at these places, in m.
-    pub fn new(matrix: &impl Operator<B, L>, places: &[Point3<f64>]) -> Self {
+    /// The nodes of the matrix are at these places, in m. Errors are reduced in the part of the
+    /// spectrum from a share `spectrum` of its end on.
+    pub fn new(matrix: &impl Operator<B, L>, places: &[Point3<f64>], spectrum: f32) -> Self {
         let nodes = matrix.nodes();
         let start = |node: usize| std::array::from_fn(|n| if n < B { noise(B * node + n) } else { 0.0 });
         let zero = vec![[0.0; L]; nodes];
         let row_bytes = size_of::<f32>() * matrix.numbers() / (2 * nodes.max(1));
         let mut smoother = Self {
             inverse: Vec::new(),
+            spectrum,
             largest: 1.0,
             vector: (0..nodes).map(start).collect(),
             changes: [zero.clone(), zero],
@@ -133,7 +135,8 @@ impl<const B: usize, const L: usize> Smoother<B, L> {
 
     /// The factors of a change, for the change before and for the residual, one pair per step.
     pub fn factors(&self) -> [Factors; PRODUCTS] {
-        let (middle, half) = (0.5 * self.largest * (1.0 + SPECTRUM), 0.5 * self.largest * (1.0 - SPECTRUM));
+        let half = 0.5 * self.largest;
+        let (middle, half) = (half * (1.0 + self.spectrum), half * (1.0 - self.spectrum));
         let ratio = middle / half;
         let mut factors = [(0.0, 1.0 / middle); PRODUCTS];
         let mut factor = 1.0 / ratio;
@@ -248,7 +251,7 @@ mod tests {
             (0..60_000).map(|node| std::array::from_fn(|n| number(node, n))).collect()
         };
         let places: Vec<Point3<f64>> = (0..60_000).map(|n| Point3::new(f64::from(n), 0.0, 0.0)).collect();
-        let mut smoother = Smoother::<6, 8>::new(&matrix, &places);
+        let mut smoother = Smoother::<6, 8>::new(&matrix, &places, 0.08);
         let (right, start) = (vector(0), vector(1_000_000));
         let times = |x: &Vector<8>| {
             let mut product = start.clone();

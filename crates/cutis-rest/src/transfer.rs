@@ -87,17 +87,39 @@ fn orthonormal<const B: usize>(
     (blocks, factor)
 }
 
-/// The prolongation after one step of damped Jacobi (Vaněk, Mandel and Brezina, Computing 56,
-/// 1996). `inverse` is that of each diagonal block, and `largest` the largest eigenvalue of the
-/// matrix times these.
+/// A smoothing step of a prolongation: damped Jacobi (Vaněk, Mandel and Brezina, Computing 56,
+/// 1996).
+pub(crate) struct Jacobi<F> {
+    /// The inverse of the diagonal block of a node.
+    pub inverse: F,
+    /// The largest eigenvalue of the matrix times these inverses.
+    pub largest: f32,
+}
+
+impl<F> Jacobi<F> {
+    /// Replaces the products of a row of the matrix with a prolongation by its change.
+    fn step<const B: usize>(&self, row: usize, products: &mut Sums<B, RIGID>)
+    where
+        F: Fn(usize) -> Block<B, B>,
+    {
+        let mut factor = (self.inverse)(row);
+        let damping = -4.0 / 3.0 / f64::from(self.largest);
+        factor.as_flattened_mut().iter_mut().for_each(|x| *x *= damping);
+        products.for_each(|product| {
+            let mut step = [[0.0; B]; RIGID];
+            add_product(&mut step, &factor, product);
+            *product = step;
+        });
+    }
+}
+
+/// The prolongation after a smoothing step.
 pub(crate) fn smoothed<const B: usize, const L: usize>(
     matrix: &impl Operator<B, L>,
-    inverse: impl Fn(usize) -> Block<B, B> + Sync,
-    largest: f32,
+    jacobi: &Jacobi<impl Fn(usize) -> Block<B, B> + Sync>,
     aggregates: &Aggregates,
     tentative: &[Modes<B>],
 ) -> Blocks<B, RIGID> {
-    let damping = -4.0 / 3.0 / f64::from(largest);
     let columns = |row: usize, list: &mut Vec<u32>| {
         let neighbors = matrix.above().neighbors.of(row).iter().map(|&node| node as usize);
         list.extend(neighbors.chain([row]).map(|node| aggregates.of[node]));
@@ -106,18 +128,69 @@ pub(crate) fn smoothed<const B: usize, const L: usize>(
         matrix.for_each(row, |column, block| {
             add_product(sums.at(aggregates.of[column] as usize), &block, &tentative[column]);
         });
-        let mut factor = inverse(row);
-        factor.as_flattened_mut().iter_mut().for_each(|x| *x *= damping);
-        sums.for_each(|sum| {
-            let mut step = [[0.0; B]; RIGID];
-            add_product(&mut step, &factor, sum);
-            *sum = step;
-        });
-        let own = sums.at(aggregates.of[row] as usize);
-        for (to, from) in own.as_flattened_mut().iter_mut().zip(tentative[row].as_flattened()) {
-            *to += from;
-        }
+        jacobi.step(row, sums);
+        add(sums.at(aggregates.of[row] as usize), &tentative[row]);
     })
+}
+
+/// The prolongation after another smoothing step, with the same blocks: those that would be new are
+/// left out, and the others still move the body as a whole (Olson, Schroder and Tuminaro, SIAM J.
+/// Sci. Comput. 33, 2011). `modes` are those of the next level.
+pub(crate) fn smoothed_again<const B: usize, const L: usize>(
+    matrix: &impl Operator<B, L>,
+    jacobi: &Jacobi<impl Fn(usize) -> Block<B, B> + Sync>,
+    prolongation: &Blocks<B, RIGID>,
+    modes: &[Modes<RIGID>],
+) -> Blocks<B, RIGID> {
+    let Blocks { pattern, width, .. } = prolongation;
+    let own = |row: usize| &pattern.columns[pattern.places(row)];
+    let columns = |row: usize, list: &mut Vec<u32>| list.extend_from_slice(own(row));
+    Blocks::by_rows(matrix.nodes(), *width, columns, |sums, row| {
+        for &column in own(row) {
+            sums.at(column as usize);
+        }
+        let mut is_whole = true;
+        matrix.for_each(row, |column, block| {
+            for place in pattern.places(column) {
+                match sums.existing(pattern.columns[place] as usize) {
+                    Some(sum) => add_product(sum, &block, &prolongation.block(place)),
+                    None => is_whole = false,
+                }
+            }
+        });
+        jacobi.step(row, sums);
+        if !is_whole {
+            keep_modes(sums, own(row), modes);
+        }
+        prolongation.row(row).for_each(|(column, block)| add(sums.at(column), &block));
+    })
+}
+
+/// Takes the part from the changes of a row that would change the modes: the least one, so that the
+/// sum of changes times modes is zero.
+fn keep_modes<const B: usize>(changes: &mut Sums<B, RIGID>, columns: &[u32], modes: &[Modes<RIGID>]) {
+    let of = |column: u32| SMatrix::<f64, RIGID, RIGID>::from(modes[column as usize]);
+    let mut moved = SMatrix::<f64, B, RIGID>::zeros();
+    let mut squares = SMatrix::<f64, RIGID, RIGID>::zeros();
+    for &column in columns {
+        moved += SMatrix::<f64, B, RIGID>::from(*changes.at(column as usize)) * of(column);
+        squares += of(column).transpose() * of(column);
+    }
+    let factors = squares.cholesky().map(|squares| moved * squares.inverse());
+    for &column in columns {
+        let change = changes.at(column as usize);
+        // Modes that depend on each other cannot be told apart.
+        let kept = factors.map_or(SMatrix::zeros(), |factors| {
+            SMatrix::<f64, B, RIGID>::from(*change) - factors * of(column).transpose()
+        });
+        *change = kept.into();
+    }
+}
+
+fn add<const B: usize>(to: &mut Block<B, RIGID>, block: &Block<B, RIGID>) {
+    for (to, from) in to.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
+        *to += from;
+    }
 }
 
 /// The matrix of the next level, `Pᵀ A P` with the prolongation `P`. `columns` are those of `P`.
@@ -287,7 +360,66 @@ fn hold_missing_modes(block: &mut [[f64; RIGID]; RIGID]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Body;
+    use crate::fill::Curvature;
+    use crate::smoother::Smoother;
+    use crate::springs::block;
     use crate::vectors::dot;
+
+    /// Each smoothing step of the prolongation lowers the energy of its columns, and both move the
+    /// body as a whole where no fixed vertex is near.
+    #[test]
+    fn both_smoothing_steps_lower_the_energy_and_keep_rigid_motions() {
+        let body = Body::of(&block(), [0.0; 3]).unwrap();
+        let mut matrix = body.empty_matrix();
+        body.fill(&mut matrix, &body.start, Curvature::Stretched, 0.0);
+        let places: Vec<_> = body.free.iter().map(|&v| body.start[v as usize]).collect();
+        let aggregates = Aggregates::of(&matrix);
+        let (first, modes) = tentative(&aggregates, places.iter().map(rigid_modes).collect());
+        let smoother = Smoother::<3, 4>::new(&matrix, &places, 0.08);
+        let jacobi = Jacobi { inverse: |node: usize| smoother.inverse(node), largest: smoother.largest };
+        let once = smoothed(&matrix, &jacobi, &aggregates, &first);
+        let twice = smoothed_again(&matrix, &jacobi, &once, &modes);
+        assert!(once.pattern.columns == twice.pattern.columns);
+        let [energy, of_twice] = [&once, &twice].map(|prolongation| {
+            let next = galerkin(&matrix, prolongation, &Columns::of(prolongation));
+            let trace = |node: usize| (0..RIGID).map(|n| next.diagonal(node)[n][n]).sum::<f64>();
+            (0..next.nodes()).map(trace).sum::<f64>()
+        });
+        assert!(of_twice < 0.97 * energy, "{of_twice} and {energy}");
+        let error = |prolongation: &Blocks<3, RIGID>| {
+            let of_row = |row: usize| {
+                let mut sum = [[0.0; 3]; RIGID];
+                for (column, block) in prolongation.row(row) {
+                    add_product(&mut sum, &block, &modes[column]);
+                }
+                let apart = |(a, b): (&f64, &f64)| (a - b).abs();
+                let rigid = rigid_modes(&places[row]);
+                let pairs = sum.as_flattened().iter().zip(rigid.as_flattened());
+                pairs.map(apart).fold(0.0, f64::max)
+            };
+            let inside = (0..places.len()).filter(|&row| places[row].z > 0.05);
+            inside.map(of_row).fold(0.0, f64::max)
+        };
+        assert!(error(&once) < 1e-5 && error(&twice) < 1e-5, "{:e} {:e}", error(&once), error(&twice));
+        // Control: without the part that keeps them, the second step changes the rigid motions.
+        let own = |row: usize, list: &mut Vec<u32>| {
+            list.extend_from_slice(&once.pattern.columns[once.pattern.places(row)]);
+        };
+        let careless = Blocks::by_rows(places.len(), once.width, own, |sums, row| {
+            once.row(row).for_each(|(column, _)| *sums.at(column) = [[0.0; 3]; RIGID]);
+            matrix.for_each(row, |node, block| {
+                for (column, right) in once.row(node) {
+                    if let Some(sum) = sums.existing(column) {
+                        add_product(sum, &block, &right);
+                    }
+                }
+            });
+            jacobi.step(row, sums);
+            once.row(row).for_each(|(column, block)| add(sums.at(column), &block));
+        });
+        assert!(error(&careless) > 1e-2, "control: {:e}", error(&careless));
+    }
 
     /// Restriction is the transposed prolongation, also where the rows are in several parts whose
     /// columns overlap: `(P c) · r = c · (Pᵀ r)`.

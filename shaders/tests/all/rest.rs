@@ -10,6 +10,8 @@ const BOTH: [Unknowns; 2] = [Unknowns::Three, Unknowns::Six];
 fn every_source_is_valid_and_has_its_entry_points() {
     for rows in BOTH {
         let stages = [rest::START, rest::FIRST, rest::SECOND, rest::THIRD, rest::PRODUCT];
+        let of_patches = [rest::GATHER, rest::SCATTER, rest::RESIDUAL];
+        let stages = [&stages[..], &of_patches].concat();
         assert_baseline(&format!("smooth {rows:?}"), &rest::smooth(rows), &stages);
         for columns in BOTH {
             let source = rest::transfer(rows, columns);

@@ -20,6 +20,8 @@ struct Factors {
 @group(1) @binding(4) var<storage, read> change: array<f32>;
 @group(1) @binding(5) var<storage, read_write> solution: array<f32>;
 @group(1) @binding(6) var<uniform> factors: Factors;
+// The nodes of a patch: a matrix with some rows of another one, which belong to these nodes.
+@group(1) @binding(7) var<storage, read> nodes: array<u32>;
 
 // The block on the diagonal, its inverse, and the first one of the neighbors.
 const OWN: u32 = 0u;
@@ -30,9 +32,14 @@ var<workgroup> numbers: array<f32, 64>;
 
 // The matrix times `x`.
 fn product_at(place: Place) -> f32 {
+    return product_of(place, place.node);
+}
+
+// The row of a place times `x`, which belongs to a node.
+fn product_of(place: Place, node: u32) -> f32 {
     let own_block = starts[place.slice] + OWN;
     let end = starts[place.slice + 1u];
-    let own = unknowns_of(place.node);
+    let own = unknowns_of(node);
     var sum = 0.0;
     for (var block = starts[place.slice] + NEIGHBORS; block < end; block++) {
         let neighbor = unknowns_of(column_of(place, block));
@@ -120,5 +127,41 @@ fn product(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index)
     let found = product_at(place);
     if (place.exists) {
         next[place.number] = found;
+    }
+}
+
+// The number of a vector of the whole matrix for a number of a patch.
+fn whole_number(place: Place) -> u32 {
+    return nodes[place.node] * ROW_LANES + place.number % ROW_LANES;
+}
+
+// Writes the residual at the nodes of a patch to a vector of the patch.
+@compute @workgroup_size(64)
+fn gather(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(slice.x, thread);
+    if (place.exists) {
+        next[place.number] = residual[whole_number(place)];
+    }
+}
+
+// Adds the vector `x` of a patch to the solution.
+@compute @workgroup_size(64)
+fn scatter(@builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let place = place_of(slice.x, thread);
+    if (place.exists) {
+        solution[whole_number(place)] += own_number(place);
+    }
+}
+
+// Writes the residual of the solution `x` at the nodes of a patch.
+@compute @workgroup_size(64)
+fn residual_at_nodes(
+    @builtin(workgroup_id) slice: vec3u, @builtin(local_invocation_index) thread: u32
+) {
+    let place = place_of(slice.x, thread);
+    let product = product_of(place, nodes[place.node]);
+    if (place.exists) {
+        let number = whole_number(place);
+        residual[number] = right[number] - product;
     }
 }

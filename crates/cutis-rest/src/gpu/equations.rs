@@ -10,7 +10,9 @@ use rayon::prelude::*;
 use super::kernels::Kernels;
 use super::level::Level;
 use super::levels::Levels;
+use super::patch::Patch;
 use super::rows::OfMatrix;
+use super::sliced::Reads;
 use super::step::Step;
 use super::uniform::FactorUniform;
 use crate::RestError;
@@ -37,8 +39,9 @@ pub(crate) struct GpuEquations {
     turn: BindGroup,
     /// The finest level, and the product of its matrix. None before the first upload.
     fine: Option<(Level<3>, Step)>,
-    /// None if they are not those of the finest level.
+    /// None if they are not those of the finest level. Its patch is there if they are.
     levels: Option<Levels>,
+    patch: Option<Patch>,
 }
 
 /// The vectors of conjugate gradients, see [`Equations`].
@@ -96,6 +99,7 @@ impl GpuEquations {
             shares,
             fine: None,
             levels: None,
+            patch: None,
         })
     }
 
@@ -123,12 +127,19 @@ impl GpuEquations {
             none => {
                 let fine = Level::new(gpu, &kernels.fine, &rows, right, z)?;
                 let vectors = [(0, z.whole()), (3, z_product.whole())];
-                let product = Step::new(gpu, &kernels.product, &fine.matrix, true, &vectors)?;
+                let product = Step::new(gpu, &kernels.product, &fine.matrix, Reads::Blocks, &vectors)?;
                 &mut none.insert((fine, product)).0
             }
         };
-        if self.levels.is_none() {
-            self.levels = Some(Levels::new(gpu, kernels, multigrid, &fine.residual, [right, z])?);
+        match (&self.levels, &self.patch, &multigrid.patch) {
+            (Some(_), Some(own), Some(patch)) => own.write(gpu, matrix, patch)?,
+            (Some(_), ..) => {}
+            (None, _, patch) => {
+                let vectors = [&*right, &*z, &fine.residual];
+                let patch = patch.as_ref().map(|patch| Patch::new(gpu, kernels, matrix, patch, vectors));
+                self.patch = patch.transpose()?;
+                self.levels = Some(Levels::new(gpu, kernels, multigrid, &fine.residual, [right, z])?);
+            }
         }
         Ok(())
     }
@@ -141,7 +152,15 @@ impl GpuEquations {
         if is_smoothed {
             fine.start(pass);
         }
+        if let Some(patch) = &self.patch {
+            patch.smooth(pass);
+            patch.find_residual(pass);
+        }
         levels.correct(pass, &self.kernels, residual, z);
+        if let Some(patch) = &self.patch {
+            patch.find_residual(pass);
+            patch.smooth(pass);
+        }
         if is_smoothed {
             fine.smooth(pass);
         }

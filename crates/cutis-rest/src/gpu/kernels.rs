@@ -12,6 +12,7 @@ pub struct Kernels {
     pub coarse: Smoothing,
     /// The product with the finest matrix.
     pub product: Arc<Kernel>,
+    pub patch: Patch,
     /// The ways from the finest level to the next one and back, and from the others.
     pub from_fine: Transfer,
     pub from_coarse: Transfer,
@@ -26,6 +27,13 @@ pub struct Smoothing {
     pub first: Arc<Kernel>,
     pub second: Arc<Kernel>,
     pub third: Arc<Kernel>,
+}
+
+/// The way between the finest level and a patch of it.
+pub struct Patch {
+    pub gather: Arc<Kernel>,
+    pub scatter: Arc<Kernel>,
+    pub residual: Arc<Kernel>,
 }
 
 /// The way between two levels.
@@ -69,6 +77,11 @@ impl Kernels {
             fine: smoothing(&fine)?,
             coarse: smoothing(&smooth(Unknowns::Six))?,
             product: kernel(&fine, shaders::PRODUCT)?,
+            patch: Patch {
+                gather: kernel(&fine, shaders::GATHER)?,
+                scatter: kernel(&fine, shaders::SCATTER)?,
+                residual: kernel(&fine, shaders::RESIDUAL)?,
+            },
             from_fine: transfer(Unknowns::Three)?,
             from_coarse: transfer(Unknowns::Six)?,
             times: kernel(&change(shaders::dense()), shaders::TIMES)?,

@@ -4,7 +4,7 @@ use cutis_gpu::{Buffer, Gpu, GpuError, Pass};
 
 use super::kernels::{Smoothing, Transfer};
 use super::rows::{OfMatrix, Own, Prolongation, Restriction};
-use super::sliced::Sliced;
+use super::sliced::{Reads, Sliced};
 use super::step::Step;
 use super::uniform::FactorsUniform;
 use crate::multigrid::RIGID;
@@ -45,21 +45,21 @@ impl<const B: usize> Level<B> {
         let factors = [a?, b?, c?, d?, e?, f?, g?];
         let start = |factors: &Buffer<_>| {
             let vectors = [(1, right.whole()), (5, x.whole()), (6, factors.whole())];
-            Step::new(gpu, &kernels.start, &matrix, false, &vectors)
+            Step::new(gpu, &kernels.start, &matrix, Reads::Own, &vectors)
         };
         let first = |factors: &Buffer<_>| {
             let vectors = [(0, x.whole()), (1, right.whole()), (2, residual.whole()), (3, one.whole())];
             let vectors = [&vectors[..], &[(6, factors.whole())]].concat();
-            Step::new(gpu, &kernels.first, &matrix, true, &vectors)
+            Step::new(gpu, &kernels.first, &matrix, Reads::Blocks, &vectors)
         };
         let second = |factors: &Buffer<_>| {
             let vectors = [(0, one.whole()), (2, residual.whole()), (3, two.whole()), (6, factors.whole())];
-            Step::new(gpu, &kernels.second, &matrix, true, &vectors)
+            Step::new(gpu, &kernels.second, &matrix, Reads::Blocks, &vectors)
         };
         let third = |factors: &Buffer<_>| {
             let vectors = [(0, two.whole()), (2, residual.whole()), (4, one.whole()), (5, x.whole())];
             let vectors = [&vectors[..], &[(6, factors.whole())]].concat();
-            Step::new(gpu, &kernels.third, &matrix, true, &vectors)
+            Step::new(gpu, &kernels.third, &matrix, Reads::Blocks, &vectors)
         };
         let [f0, f1, f2, f3, f4, f5, f6] = &factors;
         let (start, smooth) =
@@ -132,8 +132,8 @@ impl Way {
         let down = [(0, residual.whole()), (1, right.whole())];
         let up = [(0, coarse.whole()), (1, x.whole())];
         Ok(Self {
-            restriction: Step::new(gpu, &kernels.restriction, &restriction, true, &down)?,
-            prolongation: Step::new(gpu, &kernels.prolongation, &prolongation, true, &up)?,
+            restriction: Step::new(gpu, &kernels.restriction, &restriction, Reads::Blocks, &down)?,
+            prolongation: Step::new(gpu, &kernels.prolongation, &prolongation, Reads::Blocks, &up)?,
         })
     }
 }

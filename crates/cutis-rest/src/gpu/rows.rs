@@ -60,6 +60,26 @@ impl<M: Operator<B, L> + Own<B>, const B: usize, const L: usize> Rows<B, B> for 
     }
 }
 
+/// The rows of some nodes, with all columns.
+pub struct OfNodes<'a> {
+    pub matrix: OfMatrix<'a, Matrix, 3, 4>,
+    pub nodes: &'a [u32],
+}
+
+impl Rows<3, 3> for OfNodes<'_> {
+    fn count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn blocks(&self, row: usize) -> usize {
+        self.matrix.blocks(self.nodes[row] as usize)
+    }
+
+    fn for_each(&self, row: usize, each: impl FnMut(usize, &Block<3, 3>)) {
+        self.matrix.for_each(self.nodes[row] as usize, each);
+    }
+}
+
 /// A prolongation, whose blocks are stored transposed.
 pub struct Prolongation<'a, const B: usize>(pub &'a Blocks<RIGID, B>);
 

@@ -15,6 +15,17 @@ const MOST_NUMBERS: usize = 32 << 20;
 /// Slices that a thread of the host takes at once.
 const SLICES: usize = 16;
 
+/// What a kernel reads of a matrix.
+#[derive(Clone, Copy, Debug)]
+pub enum Reads {
+    /// Only where its rows are.
+    Rows,
+    /// The blocks of a node itself.
+    Own,
+    /// All blocks.
+    Blocks,
+}
+
 /// A matrix of blocks with `R` rows and `C` columns.
 pub struct Sliced<const R: usize, const C: usize> {
     chunks: Vec<Chunk>,
@@ -144,8 +155,7 @@ impl<const R: usize, const C: usize> Sliced<R, C> {
         Ok(())
     }
 
-    /// Group 0 of a kernel for each part, and the threads that it needs. `columns` says whether the
-    /// kernel reads the columns.
+    /// Group 0 of a kernel for each part, and the threads that it needs.
     ///
     /// # Errors
     /// [`GpuError`] if the device is lost.
@@ -153,7 +163,7 @@ impl<const R: usize, const C: usize> Sliced<R, C> {
         &self,
         gpu: &Gpu,
         kernel: &Kernel,
-        columns: bool,
+        reads: Reads,
     ) -> Result<Vec<(BindGroup, usize)>, GpuError> {
         let bind = |chunk: &Chunk| {
             let all = [
@@ -162,7 +172,11 @@ impl<const R: usize, const C: usize> Sliced<R, C> {
                 (3, chunk.values.whole()),
                 (2, chunk.columns.whole()),
             ];
-            let used = if columns { &all[..] } else { &all[..3] };
+            let used = match reads {
+                Reads::Rows => &all[..1],
+                Reads::Own => &all[..3],
+                Reads::Blocks => &all[..],
+            };
             Ok((gpu.bind(kernel, 0, used)?, WORKGROUP * chunk.slices.len()))
         };
         self.chunks.iter().map(bind).collect()

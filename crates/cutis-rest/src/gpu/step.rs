@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cutis_gpu::{BindGroup, Binding, Gpu, GpuError, Kernel, Pass};
 
-use super::sliced::Sliced;
+use super::sliced::{Reads, Sliced};
 
 /// A kernel of `smooth.wgsl` or `transfer.wgsl` with what it reads and writes.
 pub struct Step {
@@ -15,8 +15,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// A step with the rows of a matrix. `columns` says whether it reads their columns. `vectors`
-    /// are those of group 1.
+    /// A step with the rows of a matrix. `vectors` are those of group 1.
     ///
     /// # Errors
     /// [`GpuError::Limit`] if a vector does not fit a binding, [`GpuError::Lost`].
@@ -24,11 +23,11 @@ impl Step {
         gpu: &Gpu,
         kernel: &Arc<Kernel>,
         matrix: &Sliced<R, C>,
-        columns: bool,
+        reads: Reads,
         vectors: &[(u32, Binding<'_>)],
     ) -> Result<Self, GpuError> {
         let vectors = gpu.bind(kernel, 1, vectors)?;
-        Ok(Self { kernel: kernel.clone(), parts: matrix.bind(gpu, kernel, columns)?, vectors })
+        Ok(Self { kernel: kernel.clone(), parts: matrix.bind(gpu, kernel, reads)?, vectors })
     }
 
     /// Appends the step to a pass.

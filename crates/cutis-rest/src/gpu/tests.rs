@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::equations::GpuEquations;
 use super::rows::{OfMatrix, Prolongation, Restriction};
-use super::sliced::Sliced;
+use super::sliced::{Reads, Sliced};
 use super::{RestGpu, step::Step};
 use crate::conjugate::{Equations, Solution, solve};
 use crate::fill::Curvature;
@@ -14,19 +14,23 @@ use crate::host::{HostEquations, Vectors, scaled};
 use crate::matrix::Matrix;
 use crate::multigrid::{LANES, Multigrid, RIGID};
 use crate::smoother::Operator;
-use crate::springs::block;
+use crate::springs::{block, flat_block};
 use crate::transfer::Transfer;
 use crate::{Body, RestError};
 
 /// Largest difference of a product with a matrix, over its largest number. Measured: 3e-7 with the
 /// matrix, 9.5e-7 with a restriction, 1e-7 with a prolongation.
 const PRODUCT: f64 = 2e-6;
-/// The same for a cycle, and for the matrix times its result. Measured: 3.2e-6 and 3.1e-5. On the
-/// CPU, the cycle of a right-hand side that is rounded in another way differs by 1.6e-6 and 3.7e-5.
-const CYCLE: [f64; 2] = [6e-6, 6e-5];
+/// The same for a cycle, and for the matrix times its result, without a patch and with one.
+/// Measured: 3.2e-6 and 3.1e-5, and with a patch 1.4e-6 and 2.9e-3. On the CPU, the cycle of a
+/// right-hand side that is rounded in another way differs by 2.0e-6 and 3.7e-5, and with a patch by
+/// 2.3e-6 and 2.3e-3, because flat tetrahedra are stiff.
+const CYCLE: [[f64; 2]; 2] = [[6e-6, 6e-5], [6e-6, 6e-3]];
 
 /// A matrix with three levels, and a right-hand side.
 struct Problem {
+    /// Bounds of the differences of a cycle.
+    most: [f64; 2],
     matrix: Matrix,
     multigrid: Multigrid,
     right: Vec<Vector3<f64>>,
@@ -37,8 +41,19 @@ fn noise(n: usize) -> f64 {
 }
 
 impl Problem {
+    /// One problem without a patch, and one with it.
+    fn all() -> [Self; 2] {
+        let [without, with] = [block(), flat_block()].map(|system| Body::of(&system, [0.0; 3]).unwrap());
+        let both = [Self::of(&without, CYCLE[0]), Self::of(&with, CYCLE[1])];
+        assert!(both[0].multigrid.patch.is_none() && both[1].multigrid.patch.is_some());
+        both
+    }
+
     fn new() -> Self {
-        let body = Body::of(&block(), [0.0; 3]).unwrap();
+        Self::all().into_iter().next().unwrap()
+    }
+
+    fn of(body: &Body, most: [f64; 2]) -> Self {
         let mut x = body.start.clone();
         body.free.iter().for_each(|&v| x[v as usize].x += 1e-3 * noise(v as usize));
         let mut matrix = body.empty_matrix();
@@ -47,7 +62,7 @@ impl Problem {
         let multigrid = Multigrid::new(&matrix, &places);
         assert!(!multigrid.coarse.is_empty(), "the problem has more than two levels");
         let right = (0..matrix.nodes()).map(|n| Vector3::from_fn(|axis, _| noise(3 * n + axis))).collect();
-        Self { matrix, multigrid, right }
+        Self { most, matrix, multigrid, right }
     }
 
     /// The numbers of the right-hand side.
@@ -89,8 +104,8 @@ fn difference(found: &[f32], expected: &[f32]) -> f64 {
 }
 
 /// Whether a cycle and its product are those of the CPU.
-fn is_near(found: &[Vec<f32>; 2], expected: &[Vec<f32>; 2]) -> bool {
-    of_cycle(found, expected).into_iter().zip(CYCLE).all(|(found, most)| found < most)
+fn is_near(found: &[Vec<f32>; 2], expected: &[Vec<f32>; 2], most: [f64; 2]) -> bool {
+    of_cycle(found, expected).into_iter().zip(most).all(|(found, most)| found < most)
 }
 
 /// The differences of a cycle and of its product.
@@ -117,7 +132,7 @@ fn product_on<const R: usize, const C: usize>(
     let gpu = device.gpu();
     let (x, found) = (gpu.buffer("x", x).unwrap(), gpu.zeroed::<f32>("found", len).unwrap());
     let vectors = [(from, x.whole()), (to, found.whole())];
-    let step = Step::new(gpu, kernel, matrix, true, &vectors).unwrap();
+    let step = Step::new(gpu, kernel, matrix, Reads::Blocks, &vectors).unwrap();
     let mut pass = gpu.pass("product");
     step.run(&mut pass);
     pass.submit().unwrap();
@@ -173,53 +188,56 @@ fn products_are_those_of_the_cpu() {
 
 #[test]
 fn a_cycle_is_that_of_the_cpu() {
-    let mut problem = Problem::new();
-    let expected = problem.cycle();
-    let mut rounded = Problem::new();
-    rounded.right.iter_mut().enumerate().for_each(|(n, x)| *x *= 1.0 + 6e-8 * noise(n));
-    let of_rounding = of_cycle(&rounded.cycle(), &expected);
-    eprintln!("rounding: {of_rounding:?}");
-    assert!((0..2).all(|n| CYCLE[n] < 5.0 * of_rounding[n]), "{of_rounding:?}");
-    on_each_adapter(|gpu| {
-        let device = RestGpu::new(gpu).unwrap();
-        let found = problem.cycle_on(&device);
-        eprintln!("cycle: {:?}", of_cycle(&found, &expected));
-        assert!(is_near(&found, &expected), "{:?}", of_cycle(&found, &expected));
-        assert!(problem.cycle_on(&device) == found, "a second run");
-        for cap in [1, 100] {
-            let split = RestGpu::new(&in_chunks(gpu, cap)).unwrap();
-            assert!(problem.cycle_on(&split) == found, "chunks of {cap}");
-        }
-    });
-    // Control: a number of the matrix that is off by 10 % is noticed. In the product 1 % is enough.
-    let values = problem.matrix.above.values_mut();
-    let (largest, _) = values.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
-    values[largest] *= 1.1;
-    on_each_adapter(|gpu| {
-        let found = problem.cycle_on(&RestGpu::new(gpu).unwrap());
-        let errors = of_cycle(&found, &expected);
-        assert!((0..2).all(|n| errors[n] > 3.0 * CYCLE[n]), "{errors:?}");
-    });
+    for (mut problem, mut rounded) in Problem::all().into_iter().zip(Problem::all()) {
+        let (most, expected) = (problem.most, problem.cycle());
+        rounded.right.iter_mut().enumerate().for_each(|(n, x)| *x *= 1.0 + 6e-8 * noise(n));
+        let of_rounding = of_cycle(&rounded.cycle(), &expected);
+        eprintln!("rounding: {of_rounding:?}");
+        assert!((0..2).all(|n| most[n] < 5.0 * of_rounding[n]), "{of_rounding:?}");
+        on_each_adapter(|gpu| {
+            let device = RestGpu::new(gpu).unwrap();
+            let found = problem.cycle_on(&device);
+            eprintln!("cycle: {:?}", of_cycle(&found, &expected));
+            assert!(is_near(&found, &expected, most), "{:?}", of_cycle(&found, &expected));
+            assert!(problem.cycle_on(&device) == found, "a second run");
+            for cap in [1, 100] {
+                let split = RestGpu::new(&in_chunks(gpu, cap)).unwrap();
+                assert!(problem.cycle_on(&split) == found, "chunks of {cap}");
+            }
+        });
+        // Control: a number of the matrix that is off by 10 % is noticed. In the product 1 % is
+        // enough.
+        let values = problem.matrix.above.values_mut();
+        let (largest, _) = values.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
+        values[largest] *= 1.1;
+        on_each_adapter(|gpu| {
+            let found = problem.cycle_on(&RestGpu::new(gpu).unwrap());
+            let errors = of_cycle(&found, &expected);
+            assert!((0..2).all(|n| errors[n] > 3.0 * most[n]), "{errors:?}");
+        });
+    }
 }
 
-/// A matrix that is filled again goes to the device with its smoother, and the levels stay.
+/// A matrix that is filled again goes to the device with its smoother and its patch, and the levels
+/// stay.
 #[test]
 fn an_update_is_that_of_the_cpu() {
-    let mut problem = Problem::new();
-    let stale = problem.cycle();
     on_each_adapter(|gpu| {
-        let mut problem = Problem::new();
-        let mut equations = problem.loaded(&RestGpu::new(gpu).unwrap());
-        let buffers = gpu.counters().buffers;
-        problem.matrix.above.values_mut().iter_mut().for_each(|x| *x *= 0.5);
-        problem.multigrid.update(&problem.matrix);
-        let expected = problem.cycle();
-        equations.load(&problem.matrix, &problem.multigrid).unwrap();
-        assert_eq!(gpu.counters().buffers, buffers, "no memory is allocated");
-        equations.begin(&problem.right, 1.0).unwrap();
-        let found = [&equations.vectors.z, &equations.vectors.z_product].map(|v| equations.read(v).unwrap());
-        assert!(is_near(&found, &expected), "{:?}", of_cycle(&found, &expected));
-        assert!(of_cycle(&stale, &expected)[0] > 0.01, "control");
+        for mut problem in Problem::all() {
+            let stale = problem.cycle();
+            let mut equations = problem.loaded(&RestGpu::new(gpu).unwrap());
+            let buffers = gpu.counters().buffers;
+            problem.matrix.above.values_mut().iter_mut().for_each(|x| *x *= 0.5);
+            problem.multigrid.update(&problem.matrix);
+            let expected = problem.cycle();
+            equations.load(&problem.matrix, &problem.multigrid).unwrap();
+            assert_eq!(gpu.counters().buffers, buffers, "no memory is allocated");
+            equations.begin(&problem.right, 1.0).unwrap();
+            let vectors = [&equations.vectors.z, &equations.vectors.z_product];
+            let found = vectors.map(|vector| equations.read(vector).unwrap());
+            assert!(is_near(&found, &expected, problem.most), "{:?}", of_cycle(&found, &expected));
+            assert!(of_cycle(&stale, &expected)[0] > 0.01, "control");
+        }
     });
 }
 
@@ -227,22 +245,23 @@ fn solved(equations: &mut impl Equations, problem: &Problem, tolerance: f64) -> 
     solve(equations, &problem.right, tolerance, 300).unwrap()
 }
 
-/// Conjugate gradients take as many cycles, and one submission for each half of them.
+/// Conjugate gradients take as many cycles, and one submission for each half of them. The solutions
+/// differ by some 2e-6, the rounding of a cycle, whatever their tolerance.
 #[test]
 fn solutions_are_those_of_the_cpu() {
     let mut problem = Problem::new();
     let expected = {
         let mut vectors = Vectors::default();
-        let Problem { matrix, multigrid, right } = &mut problem;
+        let Problem { matrix, multigrid, right, .. } = &mut problem;
         let mut equations = HostEquations { matrix, multigrid, vectors: &mut vectors };
-        [0.1, 1e-4].map(|tolerance| solve(&mut equations, right, tolerance, 300).unwrap())
+        [0.1, 1e-3].map(|tolerance| solve(&mut equations, right, tolerance, 300).unwrap())
     };
     let flat = |x: &[Vector3<f64>]| -> Vec<f32> {
         x.iter().flat_map(|x| <[f64; 3]>::from(*x).map(|x| x as f32)).collect()
     };
     on_each_adapter(|gpu| {
         let mut equations = problem.loaded(&RestGpu::new(gpu).unwrap());
-        for (tolerance, expected) in [0.1, 1e-4].into_iter().zip(&expected) {
+        for (tolerance, expected) in [0.1, 1e-3].into_iter().zip(&expected) {
             let before = gpu.counters();
             let found = solved(&mut equations, &problem, tolerance);
             let after = gpu.counters();
@@ -283,6 +302,14 @@ const MUTATIONS: &[(&str, &str)] = &[
     ("+ change[place.number]", "- change[place.number]"),
     ("+ second) + third", "+ third)"),
     ("+ second) + third", "+ second)"),
+    ("nodes[place.node] * ROW_LANES", "nodes[place.node / 2u] * ROW_LANES"),
+    ("product_of(place, nodes[place.node])", "product_of(place, place.node)"),
+    ("solution[whole_number(place)] +=", "solution[whole_number(place)] ="),
+    ("residual[number] = right[number] - product;", "residual[number] = right[number] - 1.01 * product;"),
+    (
+        "next[place.number] = residual[whole_number(place)];",
+        "next[place.number] = 1.01 * residual[whole_number(place)];",
+    ),
     ("to[place.number] += found;", "to[place.number] = found;"),
     ("column < dense.size", "column + 64u < dense.size"),
     ("dense.lanes * (unknown / dense.unknowns)", "unknown / dense.unknowns"),
@@ -301,7 +328,7 @@ const MUTATIONS: &[(&str, &str)] = &[
 /// Two solutions, the second one from the vectors that the first one left.
 #[test]
 fn every_mutation_of_the_kernels_is_detected() {
-    let mut problem = Problem::new();
+    let [_, mut problem] = Problem::all();
     let expected = problem.cycle();
     let select = |gpu: &Gpu| in_chunks(gpu, 2000);
     on_each_adapter(|gpu| {
@@ -309,7 +336,7 @@ fn every_mutation_of_the_kernels_is_detected() {
         let found = |change: &dyn Fn(String) -> String| {
             let device = RestGpu::with_source(&gpu, change).unwrap();
             let mut equations = problem.loaded(&device);
-            let cycle = is_near(&problem.cycle_on(&device), &expected);
+            let cycle = is_near(&problem.cycle_on(&device), &expected, problem.most);
             let solutions =
                 [1e-2, 1e-3].map(|tolerance| solve(&mut equations, &problem.right, tolerance, 30));
             (cycle, solutions.map(|solution| solution.map(|found| (found.cycles, found.x))))
@@ -320,12 +347,12 @@ fn every_mutation_of_the_kernels_is_detected() {
             .iter()
             .filter(|(from, to)| {
                 let changed = std::cell::Cell::new(false);
-                let (cycle, solutions) = found(&|source| {
+                let found = found(&|source| {
                     changed.set(changed.get() || source.contains(from));
                     source.replace(from, to)
                 });
                 assert!(changed.get(), "{from}");
-                cycle && solutions == right.1
+                found == right
             })
             .collect();
         assert!(undetected.is_empty(), "{undetected:#?}");
