@@ -2,8 +2,8 @@
 //!
 //! Each level groups the nodes of the level before. A group moves like a rigid body: it has six
 //! unknowns. The prolongation from these is smoothed by two steps of Jacobi's method (Vaněk, Mandel
-//! and Brezina, Computing 56, 1996), of which the second adds no blocks. The levels come from the matrix alone, so they follow cuts and
-//! work for every mesh and every type of constraint.
+//! and Brezina, Computing 56, 1996), of which the second adds no blocks. The levels come from the
+//! matrix alone, so they follow cuts and work for every mesh and every type of constraint.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3};
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 //! A cut leaves flat tetrahedra at its walls. They resist a change of their volume with forces that
 //! are many times those of other tetrahedra, but turn and slide as easily. The smoother takes such
 //! motions for stiff ones, and the coarse levels do not have them. So the nodes there and their
-//! neighbors are smoothed alone, while the others hold still (a subspace correction: Xu, SIAM Review
-//! 34, 1992). There are few of them, so that many steps cost little.
+//! neighbors are smoothed alone, while the others hold still (a subspace correction: Xu, SIAM
+//! Review 34, 1992). There are few of them, so that many steps cost little.
 
 use std::sync::Arc;
 

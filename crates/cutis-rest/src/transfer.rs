@@ -179,7 +179,7 @@ fn keep_modes<const B: usize>(changes: &mut Sums<B, RIGID>, columns: &[u32], mod
     let factors = squares.cholesky().map(|squares| moved * squares.inverse());
     for &column in columns {
         let change = changes.at(column as usize);
-        // Modes that depend on each other cannot be told apart.
+        // Modes that depend on each other have no such part.
         let kept = factors.map_or(SMatrix::zeros(), |factors| {
             SMatrix::<f64, B, RIGID>::from(*change) - factors * of(column).transpose()
         });

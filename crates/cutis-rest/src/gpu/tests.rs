@@ -246,7 +246,7 @@ fn solved(equations: &mut impl Equations, problem: &Problem, tolerance: f64) -> 
 }
 
 /// Conjugate gradients take as many cycles, and one submission for each half of them. The solutions
-/// differ by some 2e-6, the rounding of a cycle, whatever their tolerance.
+/// differ by some 2e-6 for both tolerances, which is the rounding of a cycle.
 #[test]
 fn solutions_are_those_of_the_cpu() {
     let mut problem = Problem::new();
