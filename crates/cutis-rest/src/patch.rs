@@ -120,7 +120,9 @@ fn stiff(matrix: &Matrix) -> Option<Vec<u32>> {
         if place == of_neighbors.len() {
             return 0.0;
         }
-        sizes[node] / *of_neighbors.select_nth_unstable_by(place, f64::total_cmp).1
+        let ratio = sizes[node] / *of_neighbors.select_nth_unstable_by(place, f64::total_cmp).1;
+        // Next to nodes that nothing holds there is no usual size.
+        if ratio.is_finite() { ratio } else { 0.0 }
     };
     let ratios: Vec<f64> = nodes().map_init(Vec::new, ratio).collect();
     let mut least = STIFF;

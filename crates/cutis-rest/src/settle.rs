@@ -187,10 +187,15 @@ impl<'a> Search<'a> {
     /// is known.
     pub fn error(&self) -> f64 {
         match self.steps.first() {
-            // Too few steps for an estimate: the share of the forces that is left.
-            Some(first) if self.error.is_infinite() && self.is_balanced() => self.force() / first.force,
+            // Too few steps for an estimate.
+            Some(first) if self.error.is_infinite() && self.is_balanced() => self.forces_left(first),
             _ => self.error,
         }
+    }
+
+    /// The share of the forces that is left. `latest` counts if there was no step before.
+    fn forces_left(&self, latest: &Step) -> f64 {
+        self.force() / self.steps.first().unwrap_or(latest).force
     }
 
     /// The present positions of all vertices in m, in the caller's coordinates.
@@ -246,6 +251,12 @@ impl<'a> Search<'a> {
             && !is_enough(change + relaxed, slope)
         {
             self.pending = Some(Pending { x, direction: solution.x, slope, change: change + relaxed });
+        }
+        // Balanced forces count as rest in any case, and the last steps do not tell the distance
+        // if the vertices that moved far have brought the balance.
+        if self.is_balanced() && step.error > self.options.error {
+            step.error = self.forces_left(&step);
+            self.error = step.error;
         }
         self.steps.push(step);
         Ok(&self.steps[self.steps.len() - 1])
