@@ -168,9 +168,12 @@ impl<'a> Search<'a> {
         self.error = if self.is_balanced() { 0.0 } else { f64::INFINITY };
     }
 
-    /// Whether the estimated error is small enough, or no force is left.
+    /// Whether the estimated error is small enough, or the forces are rounding. Without an estimate
+    /// balanced forces are enough.
     pub fn is_at_rest(&self) -> bool {
-        self.pending.is_none() && (self.error <= self.options.error || self.is_balanced())
+        let is_rounding = self.state.norm <= self.state.floor;
+        let is_balanced = self.error.is_infinite() && self.is_balanced();
+        self.pending.is_none() && (self.error <= self.options.error || is_rounding || is_balanced)
     }
 
     /// Whether the forces cancel as far as wanted, or to rounding.
@@ -187,15 +190,10 @@ impl<'a> Search<'a> {
     /// is known.
     pub fn error(&self) -> f64 {
         match self.steps.first() {
-            // Too few steps for an estimate.
-            Some(first) if self.error.is_infinite() && self.is_balanced() => self.forces_left(first),
+            // Too few steps for an estimate: the share of the forces that is left.
+            Some(first) if self.error.is_infinite() && self.is_balanced() => self.force() / first.force,
             _ => self.error,
         }
-    }
-
-    /// The share of the forces that is left. `latest` counts if there was no step before.
-    fn forces_left(&self, latest: &Step) -> f64 {
-        self.force() / self.steps.first().unwrap_or(latest).force
     }
 
     /// The present positions of all vertices in m, in the caller's coordinates.
@@ -251,12 +249,6 @@ impl<'a> Search<'a> {
             && !is_enough(change + relaxed, slope)
         {
             self.pending = Some(Pending { x, direction: solution.x, slope, change: change + relaxed });
-        }
-        // Balanced forces count as rest in any case, and the last steps do not tell the distance
-        // if the vertices that moved far have brought the balance.
-        if self.is_balanced() && step.error > self.options.error {
-            step.error = self.forces_left(&step);
-            self.error = step.error;
         }
         self.steps.push(step);
         Ok(&self.steps[self.steps.len() - 1])
@@ -347,8 +339,8 @@ impl<'a> Search<'a> {
         let mut ratio = (step.moved_m / before.moved_m).max(solved);
         if let [.., earlier, before] = self.steps[..] {
             let (last, earlier) = (step.moved_m / before.moved_m, before.moved_m / earlier.moved_m);
-            // Ratios that grow will grow on.
-            ratio = ratio.max(earlier).max(2.0 * last - earlier);
+            // Ratios that grow will grow on, but steps that shrink still shrink.
+            ratio = ratio.max(earlier).max((2.0 * last - earlier).min(0.5 + 0.5 * last));
         }
         if way > 0.0 && ratio < 1.0 { ratio / (1.0 - ratio) * step.moved_m / way } else { f64::INFINITY }
     }

@@ -18,8 +18,8 @@ use crate::run::checkpoint::Checkpoint;
 /// Relative error above which a degenerate constraint is reported.
 const COLLAPSED: f64 = 0.01;
 
-/// Relative force at which a body is at rest in any case. Loads and parameters have single
-/// precision: they leave about 3e-6 in a body that is at rest in the scan.
+/// Relative force at which a body is at rest without an estimate of the error. Loads and parameters
+/// have single precision: they leave about 3e-6 in a body that is at rest in the scan.
 const BALANCED: f64 = 1e-5;
 
 /// When a search for the state of rest of a scene ends, for its `run.error`.
