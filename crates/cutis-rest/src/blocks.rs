@@ -165,54 +165,26 @@ impl<const R: usize, const C: usize> Blocks<R, C> {
         }
         sum
     }
-
-    /// Transposes each block at its place.
-    pub fn with_transposed_blocks(self) -> Blocks<C, R> {
-        let Self { pattern, width, mut values } = self;
-        values.par_chunks_exact_mut(R * C).with_min_len(ROWS).for_each(|block| {
-            let mut transposed = [[0.0; C]; R];
-            for (n, &x) in block.iter().enumerate() {
-                transposed[n % R][n / R] = x;
-            }
-            block.copy_from_slice(transposed.as_flattened());
-        });
-        Blocks { pattern, width, values }
-    }
 }
 
 /// The transposed block.
 #[inline(always)]
-pub(crate) fn transposed<const B: usize>(block: &Block<B, B>) -> Block<B, B> {
+pub(crate) fn transposed<const R: usize, const C: usize>(block: &Block<R, C>) -> Block<C, R> {
     std::array::from_fn(|column| std::array::from_fn(|row| block[row][column]))
 }
 
-/// Adds `left · right`.
+/// Adds `left · rightᵀ`. The numbers of a column of `left` lie side by side, so that a processor
+/// takes several at once.
 #[inline(always)]
 pub(crate) fn add_product<const R: usize, const M: usize, const C: usize>(
     to: &mut Block<R, C>,
     left: &Block<R, M>,
-    right: &Block<M, C>,
+    right: &Block<C, M>,
 ) {
     for column in 0..C {
         for middle in 0..M {
             for row in 0..R {
-                to[column][row] += left[middle][row] * right[column][middle];
-            }
-        }
-    }
-}
-
-/// Adds `leftᵀ · right`.
-#[inline(always)]
-pub(crate) fn add_transposed_product<const R: usize, const M: usize, const C: usize>(
-    to: &mut Block<R, C>,
-    left: &Block<M, R>,
-    right: &Block<M, C>,
-) {
-    for column in 0..C {
-        for row in 0..R {
-            for middle in 0..M {
-                to[column][row] += left[row][middle] * right[column][middle];
+                to[column][row] += left[middle][row] * right[middle][column];
             }
         }
     }

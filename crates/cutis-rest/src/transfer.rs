@@ -6,7 +6,7 @@ use nalgebra::{Point3, SMatrix};
 use rayon::prelude::*;
 
 use crate::aggregates::Aggregates;
-use crate::blocks::{Block, Blocks, Columns, ROWS, Sums, add_product, add_transposed_product};
+use crate::blocks::{Block, Blocks, Columns, ROWS, Sums, add_product, transposed};
 use crate::multigrid::{LANES, RIGID};
 use crate::smoother::Operator;
 use crate::symmetric::{Rows, Symmetric};
@@ -98,7 +98,7 @@ pub(crate) struct Jacobi<F> {
 
 impl<F> Jacobi<F> {
     /// Replaces the products of a row of the matrix with a prolongation by its change.
-    fn step<const B: usize>(&self, row: usize, products: &mut Sums<B, RIGID>)
+    fn step<const B: usize>(&self, row: usize, products: &mut Sums<RIGID, B>)
     where
         F: Fn(usize) -> Block<B, B>,
     {
@@ -106,30 +106,31 @@ impl<F> Jacobi<F> {
         let damping = -4.0 / 3.0 / f64::from(self.largest);
         factor.as_flattened_mut().iter_mut().for_each(|x| *x *= damping);
         products.for_each(|product| {
-            let mut step = [[0.0; B]; RIGID];
-            add_product(&mut step, &factor, product);
+            let mut step = [[0.0; RIGID]; B];
+            add_product(&mut step, product, &factor);
             *product = step;
         });
     }
 }
 
-/// The prolongation after a smoothing step.
+/// The prolongation after a smoothing step, with transposed blocks.
 pub(crate) fn smoothed<const B: usize, const L: usize>(
     matrix: &impl Operator<B, L>,
     jacobi: &Jacobi<impl Fn(usize) -> Block<B, B> + Sync>,
     aggregates: &Aggregates,
     tentative: &[Modes<B>],
-) -> Blocks<B, RIGID> {
+) -> Blocks<RIGID, B> {
     let columns = |row: usize, list: &mut Vec<u32>| {
         let neighbors = matrix.above().neighbors.of(row).iter().map(|&node| node as usize);
         list.extend(neighbors.chain([row]).map(|node| aggregates.of[node]));
     };
     Blocks::by_rows(tentative.len(), aggregates.count, columns, |sums, row| {
         matrix.for_each(row, |column, block| {
-            add_product(sums.at(aggregates.of[column] as usize), &block, &tentative[column]);
+            let own = transposed(&tentative[column]);
+            add_product(sums.at(aggregates.of[column] as usize), &own, &block);
         });
         jacobi.step(row, sums);
-        add(sums.at(aggregates.of[row] as usize), &tentative[row]);
+        add(sums.at(aggregates.of[row] as usize), &transposed(&tentative[row]));
     })
 }
 
@@ -139,9 +140,9 @@ pub(crate) fn smoothed<const B: usize, const L: usize>(
 pub(crate) fn smoothed_again<const B: usize, const L: usize>(
     matrix: &impl Operator<B, L>,
     jacobi: &Jacobi<impl Fn(usize) -> Block<B, B> + Sync>,
-    prolongation: &Blocks<B, RIGID>,
+    prolongation: &Blocks<RIGID, B>,
     modes: &[Modes<RIGID>],
-) -> Blocks<B, RIGID> {
+) -> Blocks<RIGID, B> {
     let Blocks { pattern, width, .. } = prolongation;
     let own = |row: usize| &pattern.columns[pattern.places(row)];
     let columns = |row: usize, list: &mut Vec<u32>| list.extend_from_slice(own(row));
@@ -153,7 +154,7 @@ pub(crate) fn smoothed_again<const B: usize, const L: usize>(
         matrix.for_each(row, |column, block| {
             for place in pattern.places(column) {
                 match sums.existing(pattern.columns[place] as usize) {
-                    Some(sum) => add_product(sum, &block, &prolongation.block(place)),
+                    Some(sum) => add_product(sum, &prolongation.block(place), &block),
                     None => is_whole = false,
                 }
             }
@@ -168,38 +169,39 @@ pub(crate) fn smoothed_again<const B: usize, const L: usize>(
 
 /// Takes the part from the changes of a row that would change the modes: the least one, so that the
 /// sum of changes times modes is zero.
-fn keep_modes<const B: usize>(changes: &mut Sums<B, RIGID>, columns: &[u32], modes: &[Modes<RIGID>]) {
+fn keep_modes<const B: usize>(changes: &mut Sums<RIGID, B>, columns: &[u32], modes: &[Modes<RIGID>]) {
     let of = |column: u32| SMatrix::<f64, RIGID, RIGID>::from(modes[column as usize]);
-    let mut moved = SMatrix::<f64, B, RIGID>::zeros();
+    let mut moved = SMatrix::<f64, RIGID, B>::zeros();
     let mut squares = SMatrix::<f64, RIGID, RIGID>::zeros();
     for &column in columns {
-        moved += SMatrix::<f64, B, RIGID>::from(*changes.at(column as usize)) * of(column);
+        moved += of(column).transpose() * SMatrix::<f64, RIGID, B>::from(*changes.at(column as usize));
         squares += of(column).transpose() * of(column);
     }
-    let factors = squares.cholesky().map(|squares| moved * squares.inverse());
+    let factors = squares.cholesky().map(|squares| squares.inverse() * moved);
     for &column in columns {
         let change = changes.at(column as usize);
         // Modes that depend on each other have no such part.
         let kept = factors.map_or(SMatrix::zeros(), |factors| {
-            SMatrix::<f64, B, RIGID>::from(*change) - factors * of(column).transpose()
+            SMatrix::<f64, RIGID, B>::from(*change) - of(column) * factors
         });
         *change = kept.into();
     }
 }
 
-fn add<const B: usize>(to: &mut Block<B, RIGID>, block: &Block<B, RIGID>) {
+fn add<const B: usize>(to: &mut Block<RIGID, B>, block: &Block<RIGID, B>) {
     for (to, from) in to.as_flattened_mut().iter_mut().zip(block.as_flattened()) {
         *to += from;
     }
 }
 
-/// The matrix of the next level, `Pᵀ A P` with the prolongation `P`. `columns` are those of `P`.
+/// The matrix of the next level, `Pᵀ A P` with the prolongation `P`, whose blocks are transposed.
+/// `columns` are those of `P`.
 ///
 /// `A P` has more numbers than `A`. So only the rows are stored at a time that some rows of the
 /// result need.
 pub(crate) fn galerkin<const B: usize, const L: usize>(
     matrix: &impl Operator<B, L>,
-    prolongation: &Blocks<B, RIGID>,
+    prolongation: &Blocks<RIGID, B>,
     columns: &Columns,
 ) -> Symmetric<RIGID, LANES> {
     let count = prolongation.width;
@@ -225,8 +227,8 @@ pub(crate) fn galerkin<const B: usize, const L: usize>(
                 part.clear();
                 for &row in nodes {
                     matrix.for_each(row as usize, |column, block| {
-                        for (to, right) in prolongation.row(column) {
-                            add_product(sums.at(to), &block, &right);
+                        for (to, own) in prolongation.row(column) {
+                            add_product(sums.at(to), &own, &block);
                         }
                     });
                     part.push(sums);
@@ -239,7 +241,7 @@ pub(crate) fn galerkin<const B: usize, const L: usize>(
                 let node = place[node as usize] as usize;
                 for (to, right) in product[node / ROWS].row(node % ROWS) {
                     if to >= row {
-                        add_transposed_product(sums.at(to), &left, &right);
+                        add_product(sums.at(to), &left, &right);
                     }
                 }
             }
@@ -250,7 +252,7 @@ pub(crate) fn galerkin<const B: usize, const L: usize>(
     next.into()
 }
 
-/// Some rows of `A P`.
+/// Some rows of `A P`, with transposed blocks.
 #[derive(Default)]
 struct Part<const B: usize> {
     ends: Vec<usize>,
@@ -266,19 +268,19 @@ impl<const B: usize> Part<B> {
     }
 
     /// Appends the row with these sums, and clears them.
-    fn push(&mut self, sums: &mut Sums<B, RIGID>) {
+    fn push(&mut self, sums: &mut Sums<RIGID, B>) {
         sums.append_from(0, &mut self.columns, &mut self.values);
         self.ends.push(self.columns.len());
     }
 
     /// Columns and blocks of a row.
     #[inline]
-    fn row(&self, row: usize) -> impl Iterator<Item = (usize, Block<B, RIGID>)> {
+    fn row(&self, row: usize) -> impl Iterator<Item = (usize, Block<RIGID, B>)> {
         let start = row.checked_sub(1).map_or(0, |before| self.ends[before]);
         let own = start..self.ends[row];
         let blocks = self.values[B * RIGID * own.start..].chunks_exact(B * RIGID);
         self.columns[own].iter().zip(blocks).map(|(&column, values)| {
-            let block = |n: usize, row: usize| f64::from(values[B * n + row]);
+            let block = |n: usize, row: usize| f64::from(values[RIGID * n + row]);
             (column as usize, std::array::from_fn(|n| std::array::from_fn(|row| block(n, row))))
         })
     }
@@ -293,8 +295,8 @@ pub(crate) struct Transfer<const B: usize> {
 }
 
 impl<const B: usize> Transfer<B> {
-    pub fn new(prolongation: Blocks<B, RIGID>) -> Self {
-        let prolongation = prolongation.with_transposed_blocks();
+    /// From a prolongation with transposed blocks.
+    pub fn new(prolongation: Blocks<RIGID, B>) -> Self {
         let pattern = &prolongation.pattern;
         let height = pattern.starts.len() - 1;
         let count = (height / PART).clamp(1, MOST_PARTS);
@@ -387,11 +389,11 @@ mod tests {
             (0..next.nodes()).map(trace).sum::<f64>()
         });
         assert!(of_twice < 0.97 * energy, "{of_twice} and {energy}");
-        let error = |prolongation: &Blocks<3, RIGID>| {
+        let error = |prolongation: &Blocks<RIGID, 3>| {
             let of_row = |row: usize| {
                 let mut sum = [[0.0; 3]; RIGID];
                 for (column, block) in prolongation.row(row) {
-                    add_product(&mut sum, &block, &modes[column]);
+                    add_product(&mut sum, &transposed(&block), &transposed(&modes[column]));
                 }
                 let apart = |(a, b): (&f64, &f64)| (a - b).abs();
                 let rigid = rigid_modes(&places[row]);
@@ -407,11 +409,11 @@ mod tests {
             list.extend_from_slice(&once.pattern.columns[once.pattern.places(row)]);
         };
         let careless = Blocks::by_rows(places.len(), once.width, own, |sums, row| {
-            once.row(row).for_each(|(column, _)| *sums.at(column) = [[0.0; 3]; RIGID]);
+            once.row(row).for_each(|(column, _)| *sums.at(column) = [[0.0; RIGID]; 3]);
             matrix.for_each(row, |node, block| {
                 for (column, right) in once.row(node) {
                     if let Some(sum) = sums.existing(column) {
-                        add_product(sum, &block, &right);
+                        add_product(sum, &right, &block);
                     }
                 }
             });
@@ -429,7 +431,7 @@ mod tests {
         let width = HEIGHT / 25;
         let number = |n: usize| ((n as f64 + 1.0) * 12.9898).sin();
         let columns_of = |row: usize| [row / 25, (row / 25 + 1).min(width - 1), row * 7 % width];
-        let prolongation = Blocks::<3, RIGID>::by_rows(
+        let prolongation = Blocks::<RIGID, 3>::by_rows(
             HEIGHT,
             width,
             |row, columns| columns.extend(columns_of(row).map(|column| column as u32)),
