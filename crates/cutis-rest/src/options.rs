@@ -8,8 +8,8 @@ pub struct Options {
     /// Largest error of the displacement relative to the displacement from the start, as the search
     /// estimates it. From 0 to 1.
     pub error: f64,
-    /// Relative force at which a body counts as at rest at the start, and later where the steps give
-    /// no estimate of the error. See [`Rest::force`]. From 0 to 1.
+    /// Relative force at which a body counts as at rest at the start, and later where the steps
+    /// give no estimate of the error. See [`Rest::force`]. From 0 to 1.
     pub force: f64,
     /// Largest number of Newton steps.
     pub most_steps: usize,
