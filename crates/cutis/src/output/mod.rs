@@ -55,13 +55,6 @@ pub(crate) struct DeformedBody<'a> {
     pub(crate) on_device: Option<&'a DevicePositions>,
     pub(crate) ct: &'a Volume,
     pub(crate) scene: &'a Scene,
-    /// Number of frames that led to it.
-    pub(crate) frames: u32,
-}
-
-/// When the last of some frames began, s. Cuts are made when a frame begins.
-fn last_cut_s(scene: &Scene, frames: u32) -> f64 {
-    f64::from(frames.saturating_sub(1)) * scene.solver.dt_s
 }
 
 /// Results of the outputs for the report.
@@ -103,8 +96,8 @@ pub(crate) fn write(
     if !(resamples || output.displacement || output.displacement_forward) {
         return Ok(results);
     }
-    let DeformedBody { body, positions, on_device, scene, frames, .. } = *deformed;
-    let warp = BodyWarp::new(body, positions, last_cut_s(scene, frames), on_device, stages)?;
+    let DeformedBody { body, positions, on_device, scene, .. } = *deformed;
+    let warp = BodyWarp::new(body, positions, scene.last_frame_s(), on_device, stages)?;
     write_fields(deformed, &warp, output, folder, clock)?;
     if !resamples {
         return Ok(results);

@@ -6,7 +6,6 @@ use cutis_resample::resample_labels;
 use cutis_volume::{Format, LabelMap, ReadOptions, Volume};
 
 use super::displacement::{FieldDirection, write_field};
-use super::last_cut_s;
 use super::report::Resample;
 use super::warp::BodyWarp;
 use crate::backend::{Request, Stages};
@@ -64,7 +63,9 @@ pub fn resample_run(
     let fingerprint = checkpoint::fingerprint(&loaded.scene, &source.sha256);
     let saved = Checkpoint::read(&folder.checkpoint(), &fingerprint, body.mesh.positions.len())
         .map_err(|error| other_scene::explain(error, &folder, &loaded.scene))?;
-    let warp = BodyWarp::new(&body, &saved.positions, last_cut_s(&loaded.scene, saved.frame), None, &stages)?;
+    // Cuts are made when a frame begins.
+    let last_cut_s = f64::from(saved.frame.saturating_sub(1)) * loaded.scene.solver.dt_s;
+    let warp = BodyWarp::new(&body, &saved.positions, last_cut_s, None, &stages)?;
     let out = &request.out;
     match &request.input {
         ResampleInput::Volume(path) => {

@@ -128,7 +128,6 @@ impl Baseline<'_> {
             on_device: None,
             ct: &self.source.volume,
             scene: &self.loaded.scene,
-            frames: self.loaded.scene.run.frames,
         };
         let mut stages = Stages::on(self.bench.backend.device()?);
         let before = clock.stages.len();
