@@ -82,7 +82,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_by_name() {
     }
     for (position, expected) in [
         (0, "begin"),
-        (7, "version 5"),
+        (7, "version 4"),
         (20, "damaged"),
         (41, "damaged"),
         (45, "damaged"),
@@ -124,6 +124,7 @@ fn a_checkpoint_with_false_lengths_and_a_right_checksum_is_refused() {
     let counts: Vec<u32> =
         good[history..history + 16].as_chunks().0.iter().map(|&count| u32::from_le_bytes(count)).collect();
     assert_eq!(counts, [1, 0, 1, 6]);
+    let rests = history + 16 + 6 * 8 * (2 + 5 + 1);
     let changed = |at: usize, value: &[u8]| {
         let mut bytes = good[..good.len() - 32].to_vec();
         bytes[at..at + value.len()].copy_from_slice(value);
@@ -143,6 +144,8 @@ fn a_checkpoint_with_false_lengths_and_a_right_checksum_is_refused() {
         ("no rows", history + 12, [0; 4]),
         ("fewer rows", history + 12, 5u32.to_le_bytes()),
         ("many rows", history + 12, (vertices as u32).to_le_bytes()),
+        ("states of rest", rests, 4u32.to_le_bytes()),
+        ("countless states of rest", rests, [255; 4]),
         ("a position that is not a number", 52, nan),
     ] {
         std::fs::write(&file, changed(at, &value)).unwrap();

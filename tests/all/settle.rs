@@ -172,6 +172,76 @@ fn what_is_done_later_settles_one_after_the_other() {
     assert_eq!(settled.rest.unwrap().ms, settled.stops[3].ms);
 }
 
+/// Ends a run after so many states of rest.
+struct StopAfter(u64, std::sync::atomic::AtomicU64);
+
+impl cutis::Progress for StopAfter {
+    fn begin(&self, _: &str, _: u64) {
+        self.advance(0);
+    }
+    fn advance(&self, done: u64) {
+        self.1.store(done, std::sync::atomic::Ordering::Relaxed);
+    }
+    fn end(&self) {}
+    fn note(&self, _: &str) {}
+    fn is_stopped(&self) -> bool {
+        self.1.load(std::sync::atomic::Ordering::Relaxed) >= 100 * self.0
+    }
+}
+
+/// A run that is ended between two states of rest and resumed has the bits of one that is not, and
+/// its checkpoint is resampled as the run resampled the scan.
+#[test]
+fn a_search_that_is_resumed_ends_in_the_same_state() {
+    let run = |frames: u32| {
+        let cut = CUT.replace("depth_mm", "at_s = 0.1, speed_mm_s = 500, depth_mm");
+        let hook =
+            "[{ at_mm = [46, 92, 0], radius_mm = 14, move_mm = [20, 8, 0], at_s = 1.5, over_s = 0.2 }]";
+        let sew = "[{ wound = 0, every_mm = 10, bite_mm = 10, at_s = 2.0, tighten_s = 0.3 }]";
+        let run = format!("{{ frames = {frames}, until = 'rest', checkpoint_every = 1 }}");
+        let output = "{ volume = true, surface = true, report = true, series_every = 1 }";
+        small(&[("incision", &cut), ("handle", hook), ("suture", sew), ("run", &run), ("output", output)])
+    };
+    let [whole, parts] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let read = |folder: &std::path::Path, file: &str| std::fs::read(folder.join(file)).unwrap();
+    let same = |file: &str| read(whole.path(), file) == read(parts.path(), file);
+    let expected = run_in(whole.path(), &run(2), false).unwrap();
+    assert_eq!(expected.stops.len(), 4);
+    let options = cutis::RunOptions { out: parts.path().into(), resume: false };
+    for states in 1..4 {
+        let resumed = cutis::RunOptions { resume: states > 1, ..options.clone() };
+        let error = cutis::run(&run(2), &resumed, &StopAfter(1, 0.into())).unwrap_err();
+        assert!(matches!(error, Error::Interrupted { .. }), "{error:?}");
+        assert!(!same("checkpoint.bin"), "after {states}");
+    }
+    let mut found = run_in(parts.path(), &run(2), true).unwrap();
+    let files = ["checkpoint.bin", "skin.vtu", "deformed.nii.gz", "skin-series/skin-rest-000002.vtp"];
+    for file in files {
+        assert!(same(file), "{file} differs");
+    }
+    assert_eq!(found.stops[3].ms, found.rest.as_ref().unwrap().ms);
+    let without_times = |report: &mut cutis::report::Report| {
+        report.stops.iter_mut().for_each(|stop| stop.ms = 0.0);
+        format!("{:?}", report.stops)
+    };
+    let mut expected = expected;
+    assert_eq!(without_times(&mut found), without_times(&mut expected));
+
+    // At the end nothing is left to do.
+    let mut again = run_in(parts.path(), &run(2), true).unwrap();
+    assert_eq!(without_times(&mut again), without_times(&mut expected));
+    for file in files {
+        assert!(same(file), "{file} differs");
+    }
+    let error = run_in(parts.path(), &run(3), true).unwrap_err();
+    assert!(error.is_bad_input() && error.to_string().contains("after 2 frames"), "{error}");
+
+    let (out, input) = (parts.path().join("again.nii.gz"), cutis::ResampleInput::Volume(None));
+    let request = cutis::ResampleRequest { run: parts.path().into(), input, out };
+    cutis::resample_run(&run(2), &request, &cutis::Silent).unwrap();
+    assert!(read(parts.path(), "again.nii.gz") == read(whole.path(), "deformed.nii.gz"));
+}
+
 #[test]
 fn models_without_energies_are_refused() {
     for (name, set) in

@@ -335,9 +335,17 @@ pub(crate) fn overrides() -> Vec<Vec<u8>> {
     vec![lines.into(), table.into()]
 }
 
-/// A checkpoint of two vertices after two frames, with one wound.
+/// Checkpoints of two vertices after two frames, with one wound: without states of rest, and with
+/// one.
 pub(crate) fn checkpoints() -> Vec<Vec<u8>> {
-    let mut bytes = b"CUTISCP4".to_vec();
+    let rest = r#"{"stops":[{"time_s":0.2,"done":[],"mean_mm":[1.0],"mid_mm":[2.0],"sutures_n":[],"handles_n":[],
+        "error":0.001,"steps":3,"cycles":20,"ms":0.0}],"last":{"error":0.001,"force":1e-6,"ms":0.0,"steps":[
+        {"force":0.1,"moved_mm":1.0,"cycles":7,"error":null}]}}"#;
+    ["", rest].map(checkpoint).into()
+}
+
+fn checkpoint(rest: &str) -> Vec<u8> {
+    let mut bytes = b"CUTISCP5".to_vec();
     bytes.extend([5; 32]);
     bytes.extend(2u32.to_le_bytes());
     bytes.extend(2u64.to_le_bytes());
@@ -348,10 +356,14 @@ pub(crate) fn checkpoints() -> Vec<Vec<u8>> {
             .iter()
             .for_each(|value| bytes.extend(value.to_le_bytes()));
     }
+    let length = rest.len().next_multiple_of(4);
+    bytes.extend((length as u32).to_le_bytes());
+    bytes.extend(rest.bytes());
+    bytes.extend(vec![b' '; length - rest.len()]);
     (0..8u32).for_each(|word| bytes.extend(word.to_le_bytes()));
     let seal = Sha256::digest(&bytes);
     bytes.extend(seal);
-    vec![bytes]
+    bytes
 }
 
 pub(crate) fn markups() -> Vec<Vec<u8>> {

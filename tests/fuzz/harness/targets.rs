@@ -152,7 +152,7 @@ pub const TARGETS: &[Target] = &[
         name: "checkpoint",
         file: "checkpoint.bin",
         seeds: seeds::checkpoints,
-        words: &[b"CUTISCP4", b"CUTISCP3"],
+        words: &[b"CUTISCP5", b"CUTISCP4"],
         prepare: |_| Ok(()),
         read: checkpoint,
         memory_per_byte: 16,

@@ -64,7 +64,7 @@ pub fn resample_run(
     let saved = Checkpoint::read(&folder.checkpoint(), &fingerprint, body.mesh.positions.len())
         .map_err(|error| other_scene::explain(error, &folder, &loaded.scene))?;
     // Cuts are made when a frame begins.
-    let last_cut_s = f64::from(saved.frame.saturating_sub(1)) * loaded.scene.solver.dt_s;
+    let last_cut_s = f64::from(saved.last_begun().unwrap_or(0)) * loaded.scene.solver.dt_s;
     let warp = BodyWarp::new(&body, &saved.positions, last_cut_s, None, &stages)?;
     let out = &request.out;
     match &request.input {

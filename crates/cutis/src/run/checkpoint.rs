@@ -1,14 +1,15 @@
 //! Checkpoints: the exact state from which `--resume` continues.
 //!
 //! Layout, little-endian: magic (8 bytes), fingerprint of scene and volume (32), frame (u32),
-//! vertex count (u64), positions (3 × f32 per vertex, m, local frame), history, three words of 32
-//! bits per vertex, further words, SHA-256 of all that (32). The history is that of
-//! [`history`](super::history). With the model `pbd` the words are velocities
-//! (f32, m/s), the distance at which each thread began to pull (f32, m), and the positions at which
-//! handles with an `at_s` grabbed their vertices (f32, m); what has not happened is NaN. With
-//! `chainmail` they are coordinates (i32, units of the chain), the energy after the last drag (f64,
-//! mm², two words), the coordinates at which the handles grabbed their elements (0 before that),
-//! and the elements that [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
+//! vertex count (u64), positions (3 × f32 per vertex, m, local frame), history, states of rest,
+//! three words of 32 bits per vertex, further words, SHA-256 of all that (32). The history is that
+//! of [`history`](super::history), and the states of rest are those of [`rests`](super::rests).
+//! With the model `pbd` the words are velocities (f32, m/s), the distance at which each thread
+//! began to pull (f32, m), and the positions at which handles with an `at_s` grabbed their vertices
+//! (f32, m); what has not happened is NaN. With `chainmail` they are coordinates (i32, units of the
+//! chain), the energy after the last drag (f64, mm², two words), the coordinates at which the
+//! handles grabbed their elements (0 before that), and the elements that
+//! [`Chain::strained`](cutis_chainmail::Chain::strained) lists.
 
 use std::path::Path;
 
@@ -17,6 +18,7 @@ use sha2::{Digest, Sha256};
 
 use super::frames::FrameRow;
 use super::history;
+use super::rests::{self, Rests};
 use crate::run::files;
 use crate::{Error, Scene};
 
@@ -24,21 +26,23 @@ use crate::{Error, Scene};
 pub(crate) const OTHER_SCENE: &str = "scene, volume or program version differ from those that wrote it; give the same \
                                       --set as for the run";
 
-const MAGIC: &[u8; 8] = b"CUTISCP4";
+const MAGIC: &[u8; 8] = b"CUTISCP5";
 const HEADER: usize = 8 + 32 + 4 + 8;
 const SEAL: usize = 32;
 
-/// State after a whole number of frames.
+/// State after a whole number of frames, or a state of rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    /// Number of frames computed.
+    /// Number of frames that have passed.
     pub frame: u32,
     /// Positions of the vertices, local meters.
     pub positions: Vec<Point3<f32>>,
     /// The rest of the state, as the model defines it; at least three words per vertex.
     pub words: Vec<u32>,
-    /// The state before the first frame and one row per frame, without their wall times.
+    /// The state before the first frame and one row per computed frame, without their wall times.
     pub(crate) history: Vec<FrameRow>,
+    /// The states of rest up to this one. None for a state after a frame.
+    pub(crate) rests: Option<Rests>,
 }
 
 /// Identifies scene and volume. It ignores the keys that a resumed run may change: number of
@@ -64,6 +68,17 @@ pub(crate) fn fingerprint(scene: &Scene, volume_sha256: &str) -> [u8; 32] {
 }
 
 impl Checkpoint {
+    /// A state without what came before it.
+    pub(crate) fn of(frame: u32, positions: Vec<Point3<f32>>, words: Vec<u32>) -> Self {
+        Self { frame, positions, words, history: Vec::new(), rests: None }
+    }
+
+    /// The frame that began last, in which cuts were made. A state of rest has the cuts of the
+    /// frame that would come next. None before the first frame.
+    pub(crate) fn last_begun(&self) -> Option<u32> {
+        if self.rests.is_some() { Some(self.frame) } else { self.frame.checked_sub(1) }
+    }
+
     /// Writes the checkpoint as a file.
     ///
     /// # Errors
@@ -77,6 +92,7 @@ impl Checkpoint {
         let positions = self.positions.iter().flat_map(|p| [p.x, p.y, p.z]).map(f32::to_bits);
         positions.for_each(|word| bytes.extend_from_slice(&word.to_le_bytes()));
         history::encode(&self.history, &mut bytes);
+        rests::encode(self.rests.as_ref(), &mut bytes);
         self.words.iter().for_each(|word| bytes.extend_from_slice(&word.to_le_bytes()));
         let seal = Sha256::digest(&bytes);
         bytes.extend_from_slice(&seal);
@@ -152,17 +168,19 @@ impl Checkpoint {
             vertices.ok_or_else(|| fail(format!("it holds fewer bytes than {count} vertices need")))?;
         let (positions, rest) = rest.split_at(12 * vertices);
         let (history, rest) = history::decode(rest).ok_or_else(|| fail("its history is damaged".into()))?;
+        let (rests, rest) =
+            rests::decode(rest).ok_or_else(|| fail("its states of rest are damaged".into()))?;
         let words = |bytes: &[u8]| -> Vec<u32> {
             bytes.as_chunks::<4>().0.iter().map(|&word| u32::from_le_bytes(word)).collect()
         };
         let (positions, words) = (words(positions), words(rest));
         if words.len() < 3 * vertices || rest.len() % 4 != 0 {
             return Err(fail(format!(
-                "it holds {} bytes after the history of {vertices} vertices",
+                "it holds {} bytes after the states of rest of {vertices} vertices",
                 rest.len()
             )));
         }
         let positions = positions.as_chunks::<3>().0.iter().map(|p| Point3::from(p.map(f32::from_bits)));
-        Ok(Self { frame, positions: positions.collect(), words, history })
+        Ok(Self { frame, positions: positions.collect(), words, history, rests })
     }
 }

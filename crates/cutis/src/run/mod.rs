@@ -14,6 +14,7 @@ mod history;
 pub(crate) mod other_scene;
 mod peak_memory;
 pub(crate) mod prepare;
+pub(crate) mod rests;
 mod run_loop;
 mod series;
 mod simulate;

@@ -11,6 +11,7 @@ use super::checkpoint::Checkpoint;
 use super::clock::Clock;
 use super::files::RunFolder;
 use super::frames::FrameRow;
+use super::rests::Rests;
 use super::series::Series;
 use super::stops::{SEARCH, SearchBar, Settled, Stop};
 use super::timing::{PartTimes, Timing};
@@ -31,10 +32,12 @@ pub(super) struct RunLoop<'a> {
     pub(super) sutures: usize,
     /// When something that is done to the body ends, in the order of time.
     pub(super) stops: Vec<Stop>,
-    /// Frame of the checkpoint from which the run resumes.
+    /// Computed frames of the checkpoint from which the run resumes.
     pub(super) resumed: Option<u32>,
     /// The rows up to that frame.
     pub(super) history: Vec<FrameRow>,
+    /// The states of rest of the checkpoint, if it comes after them.
+    pub(super) rests: Option<Rests>,
     pub(super) timing: Timing,
     /// Whether an output needs the final positions on the GPU.
     pub(super) resamples: bool,
@@ -95,14 +98,14 @@ impl RunLoop<'_> {
             }
         }
         if let Some(series) = &self.series {
-            series.begin(self.resumed.is_some())?;
+            series.begin(self.resumed.is_some(), self.rests.is_some())?;
             if self.resumed.is_none() {
                 series.frame(simulation, 0, self.run.frames)?;
             }
         }
         if let Some(recorder) = &mut recorder {
             recorder.start(&rows[0], self.resumed);
-            if let (0, Some(_), Some(last)) = (self.count(), self.resumed, rows.last()) {
+            if let (0, Some(_), Some(last), None) = (self.count(), self.resumed, rows.last(), &self.rests) {
                 recorder.frame(simulation, last)?;
             }
         }
@@ -123,7 +126,7 @@ impl RunLoop<'_> {
                     frames(simulation, recorder.as_deref_mut(), progress)
                 })?;
             }
-            let (settled, ended) = self.settle(simulation, place, &lips, recorder, clock)?;
+            let (settled, ended) = self.settle(simulation, place, &lips, recorder, clock, &rows)?;
             (Some(settled), ended)
         };
         if let Some(series) = &self.series {
@@ -143,7 +146,7 @@ impl RunLoop<'_> {
     }
 
     /// Finds the state of rest after each thing that is still to be done to the body. The equations
-    /// are solved on `place`.
+    /// are solved on `place`. `rows` are those of the frames.
     fn settle(
         &self,
         simulation: &mut dyn Simulation,
@@ -151,29 +154,48 @@ impl RunLoop<'_> {
         lips: &Lips<'_>,
         mut recorder: Option<&mut Recorder>,
         clock: &mut Clock<'_>,
+        rows: &[FrameRow],
     ) -> Result<(Settled, Ended), Error> {
-        let now_s = simulation.time_s();
-        let stops: Vec<&Stop> = self.stops.iter().filter(|stop| stop.time_s > now_s).collect();
-        let times_s: Vec<f64> = [now_s].into_iter().chain(stops.iter().map(|stop| stop.time_s)).collect();
-        let total = SEARCH * times_s.len() as u64;
+        let row = |simulation: &mut dyn Simulation, ms| self.row(simulation, lips, self.run.frames, ms);
+        let mut settled = match &self.rests {
+            Some(rests) => Settled::resumed(rests, row(simulation, None)?),
+            None => Settled::default(),
+        };
+        let known = settled.stops.len();
+        let start_s = settled.stops.first().map_or(simulation.time_s(), |stop| stop.time_s);
+        let later = self.stops.iter().filter(|stop| stop.time_s > start_s);
+        let later = later.map(|stop| (stop.time_s, stop.done.clone()));
+        let states: Vec<(f64, Vec<String>)> = [(start_s, Vec::new())].into_iter().chain(later).collect();
+        let count = states.len();
+        if let (Some(recorder), Some((_, row)), Some(stop)) =
+            (&mut recorder, &settled.last, settled.stops.last().filter(|_| known == count))
+        {
+            recorder.rest([count; 2], &stop.done, simulation, row)?;
+        }
+        let total = SEARCH * count.saturating_sub(known) as u64;
         clock.stage_on(place, "search for the state of rest", total, |progress| {
-            let mut settled = Settled::default();
-            for (n, &time_s) in times_s.iter().enumerate() {
+            for (n, (time_s, done)) in states.into_iter().enumerate().skip(known) {
+                if progress.is_stopped() {
+                    let frame = self.save(simulation, &settled, rows)?;
+                    return Err(Error::Interrupted { frame, checkpoint: self.folder.checkpoint() });
+                }
                 let start = Instant::now();
                 let mut bar = SearchBar::new(self.run.error);
-                let before = SEARCH * n as u64;
+                let before = SEARCH * (n - known) as u64;
                 let mut advance = |step: &Step| progress.advance(before + bar.after(step));
                 let rest = simulation.settle(time_s, self.run.error, &mut advance)?;
                 let ms = start.elapsed().as_secs_f64() * 1e3;
-                let row = self.row(simulation, lips, self.run.frames, Some(ms))?;
-                let done = n.checked_sub(1).map(|n| stops[n].done.clone()).unwrap_or_default();
+                let row = row(simulation, Some(ms))?;
                 if let Some(recorder) = &mut recorder {
-                    recorder.rest([n + 1, times_s.len()], &done, simulation, &row)?;
+                    recorder.rest([n + 1, count], &done, simulation, &row)?;
                 }
                 if let Some(series) = &self.series {
                     series.rest(simulation, n + 1)?;
                 }
                 settled.add(RestReport::of(&rest, ms, place), row, done);
+                if self.run.checkpoint_every > 0 {
+                    self.save(simulation, &settled, rows)?;
+                }
                 progress.advance(before + SEARCH);
             }
             Ok((settled, self.end(simulation)?))
@@ -227,25 +249,26 @@ impl RunLoop<'_> {
                 series.frame(simulation, frame, frames)?;
             }
             if every > 0 && (frame % every == 0 || frame == frames) {
-                self.save(simulation, frame, at, rows)?;
+                at.saved =
+                    Some((self.save(simulation, &Settled::default(), rows)?, self.folder.checkpoint()));
             }
             progress.advance(u64::from(frame - self.done()));
         }
         Ok(())
     }
 
-    /// Writes a checkpoint.
+    /// Writes a checkpoint of the present state, and returns the number of frames that have passed.
     fn save(
         &self,
         simulation: &mut dyn Simulation,
-        frame: u32,
-        at: &mut Position,
+        settled: &Settled,
         rows: &[FrameRow],
-    ) -> Result<(), Error> {
-        let saved = Checkpoint { history: rows.to_vec(), ..simulation.save(frame)? };
+    ) -> Result<u32, Error> {
+        let frame = (simulation.time_s() / self.dt_s).round() as u32;
+        let saved = simulation.save(frame)?;
+        let saved = Checkpoint { history: rows.to_vec(), rests: settled.saved(), ..saved };
         saved.write(&self.folder.checkpoint(), &self.fingerprint)?;
-        at.saved = Some((frame, self.folder.checkpoint()));
-        Ok(())
+        Ok(frame)
     }
 
     /// Saves the state of a run that the user ends, unless the last checkpoint has it.
@@ -253,12 +276,12 @@ impl RunLoop<'_> {
         &self,
         simulation: &mut dyn Simulation,
         frame: u32,
-        at: &mut Position,
+        at: &Position,
         rows: &[FrameRow],
     ) -> Error {
         let is_saved = at.saved.as_ref().is_some_and(|(saved, _)| *saved == frame);
-        match if is_saved { Ok(()) } else { self.save(simulation, frame, at, rows) } {
-            Ok(()) => Error::Interrupted { frame, checkpoint: self.folder.checkpoint() },
+        match if is_saved { Ok(frame) } else { self.save(simulation, &Settled::default(), rows) } {
+            Ok(frame) => Error::Interrupted { frame, checkpoint: self.folder.checkpoint() },
             Err(error) => error,
         }
     }

@@ -32,14 +32,16 @@ impl<'a> Series<'a> {
     }
 
     /// Removes the files of an earlier run that this run does not continue. Its checkpoint goes
-    /// first, because nothing could resume from it without the files of the series.
-    pub(super) fn begin(&self, resumed: bool) -> Result<(), Error> {
+    /// first, because nothing could resume from it without the files of the series. `rests` tells
+    /// whether this run has states of rest of the earlier one.
+    pub(super) fn begin(&self, resumed: bool, rests: bool) -> Result<(), Error> {
         if !resumed {
             remove_file(&self.folder.checkpoint())?;
             remove(self.folder)?;
         }
-        // A run that goes on searches the states of rest again, and may find fewer.
-        for path in paths(&self.folder.series_folder()).iter().filter(|path| is_of_series(path, REST)) {
+        // A run that goes on with frames searches the states of rest again, and may find fewer.
+        let at_rest = |path: &&PathBuf| !rests && is_of_series(path, REST);
+        for path in paths(&self.folder.series_folder()).iter().filter(at_rest) {
             remove_file(path)?;
         }
         files::create_folder(&self.folder.series_folder())

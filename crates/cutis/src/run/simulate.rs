@@ -8,6 +8,7 @@ use super::clock::Clock;
 use super::files::{self, RunFolder};
 use super::frames::FrameRow;
 use super::other_scene;
+use super::rests::Rests;
 use super::run_loop::{RunLoop, RunResult};
 use super::series::Series;
 use super::stops::Stop;
@@ -63,7 +64,8 @@ pub(super) fn simulate(
     let fingerprint = checkpoint::fingerprint(scene, &source.sha256);
     let resumes = options.resume && !begins_again(setup, clock.progress);
     let resumed = if resumes { Some(resume(setup, &fingerprint, &mut *simulation)?) } else { None };
-    let (resumed, history) = resumed.unzip();
+    let (resumed, (history, rests)) =
+        resumed.map_or_else(Default::default, |(frames, history, rests)| (Some(frames), (history, rests)));
     let run_loop = RunLoop {
         run: &scene.run,
         folder,
@@ -72,7 +74,8 @@ pub(super) fn simulate(
         sutures: if scene.solver.formulation == Formulation::Pbd { 0 } else { body.stitches.len() },
         stops: Stop::all(&plan.steps, scene),
         resumed,
-        history: history.unwrap_or_default(),
+        history,
+        rests,
         timing: match (scene.output.report, simulation.parts_are_sequential()) {
             (false, _) => Timing::No,
             (true, true) => Timing::EveryFrame,
@@ -124,19 +127,28 @@ fn begins_again(setup: &Setup<'_>, progress: &dyn Progress) -> bool {
     again
 }
 
-/// Restores the state of the run folder's checkpoint, and returns its frame and the rows up to it.
+/// Restores the state of the run folder's checkpoint, and returns the number of computed frames,
+/// their rows, and the states of rest after them.
 fn resume(
     setup: &Setup<'_>,
     fingerprint: &[u8; 32],
     simulation: &mut dyn Simulation,
-) -> Result<(u32, Vec<FrameRow>), Error> {
-    let (path, frames) = (setup.folder.checkpoint(), setup.loaded.scene.run.frames);
+) -> Result<(u32, Vec<FrameRow>, Option<Rests>), Error> {
+    let (path, run) = (setup.folder.checkpoint(), &setup.loaded.scene.run);
     let saved = Checkpoint::read(&path, fingerprint, setup.body.mesh.positions.len())
         .map_err(|error| other_scene::explain(error, setup.folder, &setup.loaded.scene))?;
-    if saved.frame > frames {
-        let why = format!("it is at frame {}, and run.frames = {frames} lies before it", saved.frame);
-        return Err(Error::Checkpoint { path, why });
-    }
-    simulation.restore(&saved)?;
-    Ok((saved.frame, saved.history))
+    // States of rest come after all frames, and time goes on without frames between them.
+    let computed = saved.history.len().saturating_sub(1) as u32;
+    let why = if saved.rests.is_some() && (run.until, run.frames) != (RunEnd::Rest, computed) {
+        format!(
+            "it is a state of rest after {computed} frames: set run.until = \"rest\" and run.frames = {computed}"
+        )
+    } else if saved.rests.is_none() && saved.frame > run.frames {
+        format!("it is at frame {}, and run.frames = {} lies before it", saved.frame, run.frames)
+    } else {
+        simulation.restore(&saved)?;
+        let frames = if saved.rests.is_some() { computed } else { saved.frame };
+        return Ok((frames, saved.history, saved.rests));
+    };
+    Err(Error::Checkpoint { path, why })
 }

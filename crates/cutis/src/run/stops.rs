@@ -4,6 +4,7 @@
 use cutis_rest::Step;
 
 use super::frames::FrameRow;
+use super::rests::Rests;
 use crate::output::rest_report::{RestReport, StopReport};
 use crate::output::step_report::StepReport;
 use crate::scene::Scene;
@@ -51,6 +52,16 @@ pub(super) struct Settled {
 }
 
 impl Settled {
+    /// The states of rest of a checkpoint. `row` is that of the last one.
+    pub(super) fn resumed(rests: &Rests, row: FrameRow) -> Self {
+        Self { stops: rests.stops.clone(), last: Some((rests.last.clone(), row)) }
+    }
+
+    /// The states of rest for a checkpoint.
+    pub(super) fn saved(&self) -> Option<Rests> {
+        self.last.as_ref().map(|(last, _)| Rests { stops: self.stops.clone(), last: last.clone() })
+    }
+
     /// Adds a state after `done`.
     pub(super) fn add(&mut self, rest: RestReport, row: FrameRow, done: Vec<String>) {
         self.stops.push(StopReport {

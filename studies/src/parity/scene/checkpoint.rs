@@ -6,7 +6,7 @@ use anyhow::bail;
 
 use crate::parity::bench::Failure;
 
-const MAGIC: &[u8] = b"CUTISCP4";
+const MAGIC: &[u8] = b"CUTISCP5";
 /// Length of magic, fingerprint, frame, and number of vertices.
 const HEADER: usize = 8 + 32 + 4 + 8;
 
@@ -35,8 +35,8 @@ impl State {
     }
 }
 
-/// Positions and velocities in the bytes of a checkpoint. The history of the frames lies between
-/// them. Threads and hooks store further words after the velocities.
+/// Positions and velocities in the bytes of a checkpoint. The history of the frames and the states
+/// of rest lie between them. Threads and hooks store further words after the velocities.
 fn vectors(bytes: &[u8]) -> Option<[Vec<f32>; 2]> {
     let (header, rest) = bytes.split_at_checked(HEADER)?;
     let count = usize::try_from(u64::from_le_bytes(header[HEADER - 8..].try_into().ok()?)).ok()?;
@@ -46,7 +46,8 @@ fn vectors(bytes: &[u8]) -> Option<[Vec<f32>; 2]> {
     let number = |n: usize| Some(u32::from_le_bytes(head[4 * n..][..4].try_into().ok()?) as usize);
     let width = 2 + 5 * number(0)? + 2 * number(1)? + number(2)?;
     let history = width.checked_mul(8)?.checked_mul(number(3)?)?;
-    let velocities = rest.get(history..)?.get(..length)?;
+    let (rests, rest) = rest.get(history..)?.split_first_chunk::<4>()?;
+    let velocities = rest.get(u32::from_le_bytes(*rests) as usize..)?.get(..length)?;
     let values = |bytes: &[u8]| {
         bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect::<Vec<f32>>()
     };

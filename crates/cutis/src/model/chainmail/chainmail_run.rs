@@ -297,7 +297,7 @@ impl Simulation for ChainmailRun<'_> {
         });
         let words = units.map(i32::cast_unsigned).chain(energy).chain(starts);
         let words = words.chain(chain.strained().iter().copied()).collect();
-        Ok(Checkpoint { frame, positions: self.positions(), words, history: Vec::new() })
+        Ok(Checkpoint::of(frame, self.positions(), words))
     }
 
     fn end(&mut self) -> Result<SimulationEnd, Error> {

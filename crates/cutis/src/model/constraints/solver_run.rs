@@ -140,14 +140,15 @@ impl Simulation for SolverRun<'_> {
         let velocities: Vec<Vector3<f32>> =
             velocities.chunks_exact(3).map(|v| Vector3::from_fn(|axis, _| f32::from_bits(v[axis]))).collect();
         let frame = u64::from(saved.frame);
-        if (self.wound.is_some() || self.threads.is_some() || self.hooks.is_some()) && frame > 0 {
+        let has_acts = self.wound.is_some() || self.threads.is_some() || self.hooks.is_some();
+        if let Some(begun) = saved.last_begun().filter(|_| has_acts) {
             // Cuts, hooks and threads are as they were when the last frame began. All nodes have
             // their states.
             let mut positions = saved.positions.clone();
             if let Some(own) = &self.hooks {
                 own.place(hooks, &mut positions);
             }
-            self.solver.solver().restore(&positions, &velocities, frame - 1)?;
+            self.solver.solver().restore(&positions, &velocities, begun.into())?;
             self.cut_with(|change| change.states.clear())?;
             self.grab()?;
             self.tighten()?;
@@ -256,7 +257,7 @@ impl Simulation for SolverRun<'_> {
         let words = velocities.iter().flat_map(|v| [v.x, v.y, v.z].map(f32::to_bits));
         let words = words.chain(self.threads.iter().flat_map(Threads::starts));
         let words = words.chain(self.hooks.iter().flat_map(Hooks::starts)).collect();
-        Ok(Checkpoint { frame, positions, words, history: Vec::new() })
+        Ok(Checkpoint::of(frame, positions, words))
     }
 
     /// Reads the whole body once. Residuals are measured on the host, so that they need no GPU

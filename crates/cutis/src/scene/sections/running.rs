@@ -106,7 +106,8 @@ pub struct RunSection {
     /// the search for it estimates both. The search also ends where the forces cancel to single
     /// precision.
     pub error: f64,
-    /// Frames between checkpoints, from which `--resume` continues; 0 writes none.
+    /// Frames between checkpoints, from which `--resume` continues; 0 writes none. Any other number
+    /// also keeps each state of rest.
     pub checkpoint_every: u32,
 }
 
