@@ -227,8 +227,10 @@ fn a_search_that_is_resumed_ends_in_the_same_state() {
     let mut expected = expected;
     assert_eq!(without_times(&mut found), without_times(&mut expected));
 
-    // At the end nothing is left to do.
+    // At the end nothing is left to do. The forces are measured again.
     let mut again = run_in(parts.path(), &run(2), true).unwrap();
+    let measured = |report: &cutis::report::Report| format!("{:?} {:?}", report.sutures, report.handles);
+    assert_eq!(measured(&again), measured(&expected));
     assert_eq!(without_times(&mut again), without_times(&mut expected));
     for file in files {
         assert!(same(file), "{file} differs");

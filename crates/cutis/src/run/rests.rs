@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::frames::FrameRow;
 use crate::output::rest_report::{RestReport, StopReport};
 
 /// The states of rest up to a checkpoint, which holds the last one.
@@ -14,6 +15,16 @@ pub(crate) struct Rests {
     pub(crate) stops: Vec<StopReport>,
     /// The search for the last one.
     pub(crate) last: RestReport,
+}
+
+impl Rests {
+    /// Whether the states have the wounds, sutures and handles of a row.
+    pub(super) fn are_like(&self, row: &FrameRow) -> bool {
+        let shape = [row.gapes.len(), row.gapes.len(), row.sutures.len(), row.handles.len()];
+        self.stops.iter().all(|stop| {
+            [&stop.mean_mm, &stop.mid_mm, &stop.sutures_n, &stop.handles_n].map(Vec::len) == shape
+        })
+    }
 }
 
 /// Appends the states.
@@ -63,6 +74,22 @@ mod tests {
         let last =
             RestReport { error: 1e-3, force: 1e-6, ms: 12.5, equations_on: "cpu".into(), steps: vec![] };
         let rests = Rests { stops: vec![stop], last };
+        let gape = cutis_mesh::WoundGape {
+            mean_mm: 0.0,
+            mid_mm: 0.0,
+            mean_distance_mm: 0.0,
+            mid_distance_mm: 0.0,
+            bins: 0,
+        };
+        let row = |wounds: usize| FrameRow {
+            frame: 0,
+            time_s: 0.0,
+            ms: None,
+            gapes: vec![gape; wounds],
+            sutures: vec![],
+            handles: vec![1.0],
+        };
+        assert!(rests.are_like(&row(1)) && !rests.are_like(&row(2)));
         let mut expected = rests.clone();
         expected.stops[0].ms = 0.0;
         expected.last.ms = 0.0;

@@ -89,9 +89,11 @@ impl RunLoop<'_> {
         let mut times = PartTimes::new(self.timing);
         let mut rows = self.history.clone();
         let now = self.row(simulation, &lips, self.done(), None)?;
+        let has_rests = |rests: &Rests| rests.are_like(&now) && rests.stops.len() <= 1 + self.stops.len();
+        let fits = self.rests.as_ref().is_none_or(has_rests);
         match rows.last() {
             None if self.resumed.is_none() => rows.push(now),
-            Some(last) if last.is_like(&now) && rows.len() as u64 == u64::from(now.frame) + 1 => {}
+            Some(last) if fits && last.is_like(&now) && rows.len() as u64 == u64::from(now.frame) + 1 => {}
             _ => {
                 let why = "its history is not that of this scene".into();
                 return Err(Error::Checkpoint { path: self.folder.checkpoint(), why });
