@@ -10,9 +10,9 @@ use rayon::prelude::*;
 
 use crate::RestError;
 use crate::constraints::Constraints;
+use crate::curvature::is_curved;
 use crate::elements::{Elements, Parts, joined};
 use crate::energy::State;
-use crate::fill::is_curved;
 use crate::order::near_neighbors;
 use crate::settle::diagonal;
 use crate::symmetric::Neighbors;

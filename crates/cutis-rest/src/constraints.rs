@@ -8,28 +8,42 @@ use nalgebra::{Point3, Vector3};
 
 use crate::RestError;
 
-/// Memory for one constraint.
+/// Constraints that are evaluated together. Their numbers stay in the nearest cache.
+pub(crate) const GROUP: usize = 32;
+
+/// Some constraints of one kind, evaluated together.
 #[derive(Default)]
 pub(crate) struct Evaluation {
-    /// Positions of its vertices.
+    /// Positions of their vertices, one constraint after the other.
     pub places: Vec<Point3<f64>>,
-    /// `C`, `1/α` and `∇C`.
-    pub c: f64,
-    pub stiffness: f64,
+    /// `C` and `1/α` of each constraint.
+    pub c: Vec<f64>,
+    pub stiffness: Vec<f64>,
+    /// `∇C` at each vertex, one constraint after the other.
     pub gradients: Vec<Vector3<f64>>,
 }
 
 impl Evaluation {
-    /// Takes the places of some vertices.
-    #[inline]
-    fn gather(&mut self, vertices: &[u32], x: &[Point3<f64>]) {
-        if self.places.len() != vertices.len() {
-            self.places.resize(vertices.len(), Point3::origin());
-            self.gradients.resize(vertices.len(), Vector3::zeros());
+    /// Evaluates these constraints of a kind, with all vertices at `x`. They have `N` vertices
+    /// each, or any number if `N` is zero.
+    pub fn of<const N: usize>(&mut self, kind: &dyn Constraints, constraints: &[u32], x: &[Point3<f64>]) {
+        let arity = if N > 0 { N } else { kind.arity() };
+        let indices = kind.indices();
+        self.places.clear();
+        for &k in constraints {
+            let vertices = &indices[k as usize * arity..][..arity];
+            self.places.extend(vertices.iter().map(|&v| x[v as usize]));
         }
-        for (place, &v) in self.places.iter_mut().zip(vertices) {
-            *place = x[v as usize];
-        }
+        self.of_places(kind, constraints);
+        self.stiffness.clear();
+        kind.stiffness(constraints, &mut self.stiffness);
+    }
+
+    /// Evaluates these constraints with their own vertices at `places`.
+    pub fn of_places(&mut self, kind: &dyn Constraints, constraints: &[u32]) {
+        self.c.resize(constraints.len(), 0.0);
+        self.gradients.resize(self.places.len(), Vector3::zeros());
+        kind.evaluate(constraints, &self.places, &mut self.c, &mut self.gradients);
     }
 }
 
@@ -44,12 +58,16 @@ pub(crate) trait Constraints: Send + Sync {
     /// # Errors
     /// [`RestError::PbdStiffness`], [`RestError::Rigid`].
     fn check(&self) -> Result<(), RestError>;
-    /// Evaluates a constraint with all vertices at `x`.
-    fn evaluate(&self, k: usize, x: &[Point3<f64>], to: &mut Evaluation);
-    /// Evaluates a constraint with its own vertices at the places in `to`.
-    fn evaluate_at(&self, k: usize, to: &mut Evaluation);
-    /// The gradients of a constraint with its own vertices at `places`.
-    fn gradients(&self, k: usize, places: &[Point3<f64>], to: &mut [Vector3<f64>]);
+    /// Writes `C` and `∇C` of some constraints, with their own vertices at `places`.
+    fn evaluate(
+        &self,
+        constraints: &[u32],
+        places: &[Point3<f64>],
+        c: &mut [f64],
+        gradients: &mut [Vector3<f64>],
+    );
+    /// Appends `1/α` of some constraints.
+    fn stiffness(&self, constraints: &[u32], to: &mut Vec<f64>);
     /// The change of the energy of some constraints, whose `C` changes `from` some values `to`
     /// others.
     fn energy_change(&self, constraints: &[u32], from: &[f64], to: &[f64]) -> f64;
@@ -70,7 +88,7 @@ impl<T: Scalar> Constraints for Kind<T> {
 
     fn check(&self) -> Result<(), RestError> {
         let kind = self.name();
-        let Stiffness::Compliance(values) = self.stiffness() else {
+        let Stiffness::Compliance(values) = self.as_ref().stiffness() else {
             return Err(RestError::PbdStiffness { kind });
         };
         for constraint in 0..self.as_ref().len() {
@@ -82,26 +100,23 @@ impl<T: Scalar> Constraints for Kind<T> {
         Ok(())
     }
 
-    fn evaluate(&self, k: usize, x: &[Point3<f64>], to: &mut Evaluation) {
-        let set = self.as_ref();
-        let arity = set.arity();
-        to.gather(&set.indices()[k * arity..][..arity], x);
-        self.evaluate_at(k, to);
+    fn evaluate(
+        &self,
+        constraints: &[u32],
+        places: &[Point3<f64>],
+        c: &mut [f64],
+        gradients: &mut [Vector3<f64>],
+    ) {
+        self.as_ref().evaluate_all(constraints, places, c, gradients);
     }
 
-    #[inline]
-    fn evaluate_at(&self, k: usize, to: &mut Evaluation) {
-        let set = self.as_ref();
-        to.c = set.evaluate(k, &to.places, &mut to.gradients);
-        to.stiffness = 1.0 / set.stiffness().values().at(k).to_f64();
-    }
-
-    fn gradients(&self, k: usize, places: &[Point3<f64>], to: &mut [Vector3<f64>]) {
-        self.as_ref().evaluate(k, places, to);
+    fn stiffness(&self, constraints: &[u32], to: &mut Vec<f64>) {
+        let values = self.as_ref().stiffness().values();
+        to.extend(constraints.iter().map(|&k| 1.0 / values.at(k as usize).to_f64()));
     }
 
     fn energy_change(&self, constraints: &[u32], from: &[f64], to: &[f64]) -> f64 {
-        let values = self.stiffness().values();
+        let values = self.as_ref().stiffness().values();
         let change = |((&k, from), to): ((&u32, &f64), &f64)| {
             0.5 * (to - from) * (to + from) / values.at(k as usize).to_f64()
         };
@@ -126,6 +141,11 @@ impl Subset {
         let indices = vertices.map(|&v| number[v as usize]).collect();
         Self { kind, constraints, indices }
     }
+
+    /// The numbers of some constraints in the kind.
+    fn in_kind(&self, constraints: &[u32]) -> Vec<u32> {
+        constraints.iter().map(|&k| self.constraints[k as usize]).collect()
+    }
 }
 
 impl Constraints for Subset {
@@ -145,22 +165,21 @@ impl Constraints for Subset {
         self.kind.check()
     }
 
-    fn evaluate(&self, k: usize, x: &[Point3<f64>], to: &mut Evaluation) {
-        let arity = self.kind.arity();
-        to.gather(&self.indices[k * arity..][..arity], x);
-        self.evaluate_at(k, to);
+    fn evaluate(
+        &self,
+        constraints: &[u32],
+        places: &[Point3<f64>],
+        c: &mut [f64],
+        gradients: &mut [Vector3<f64>],
+    ) {
+        self.kind.evaluate(&self.in_kind(constraints), places, c, gradients);
     }
 
-    fn evaluate_at(&self, k: usize, to: &mut Evaluation) {
-        self.kind.evaluate_at(self.constraints[k] as usize, to);
-    }
-
-    fn gradients(&self, k: usize, places: &[Point3<f64>], to: &mut [Vector3<f64>]) {
-        self.kind.gradients(self.constraints[k] as usize, places, to);
+    fn stiffness(&self, constraints: &[u32], to: &mut Vec<f64>) {
+        self.kind.stiffness(&self.in_kind(constraints), to);
     }
 
     fn energy_change(&self, constraints: &[u32], from: &[f64], to: &[f64]) -> f64 {
-        let constraints: Vec<u32> = constraints.iter().map(|&k| self.constraints[k as usize]).collect();
-        self.kind.energy_change(&constraints, from, to)
+        self.kind.energy_change(&self.in_kind(constraints), from, to)
     }
 }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::Body;
-use crate::constraints::Evaluation;
-use crate::fill::Scaled;
+use crate::constraints::{Evaluation, GROUP};
+use crate::elements::Elements;
 
 /// The values of all constraints, and the forces.
 #[derive(Default)]
@@ -38,26 +38,21 @@ impl State {
     }
 }
 
-/// Memory to evaluate a constraint, and to differentiate it.
-#[derive(Default)]
-pub(crate) struct Scratch {
-    pub own: Evaluation,
-    /// Gradients at other positions.
-    pub ahead: Vec<Vector3<f64>>,
-    /// Second derivatives, see [`Scratch::differentiate`].
-    pub curvature: Vec<Matrix3<f64>>,
-    /// The scaled gradients of a constraint.
-    pub scaled: Vec<Scaled>,
-    /// For each pair of vertices of a constraint, the place of its block in the row where it was
-    /// found last. In a lattice the next constraint has it at the same place.
-    pub slots: Vec<usize>,
+/// The forces on a part of the free vertices while they add up.
+struct PartSums<'a> {
+    /// Place of the first vertex.
+    start: usize,
+    forces: &'a mut [Vector3<f64>],
+    /// Sums of the sizes of the forces at each vertex, and of their rounding.
+    sizes: Vec<[f64; 2]>,
+    /// Energy of the rounding.
+    noise: f64,
 }
 
-impl Evaluation {
-    /// How much `C` changes if each coordinate changes by its own size.
-    fn reach(&self) -> f64 {
-        self.gradients.iter().zip(&self.places).map(|(g, x)| norm_1(g) * norm_1(&x.coords)).sum()
-    }
+/// How much a constraint changes if each coordinate of its vertices changes by its own size.
+#[inline(always)]
+fn reach(places: &[Point3<f64>], gradients: &[Vector3<f64>]) -> f64 {
+    gradients.iter().zip(places).map(|(g, x)| norm_1(g) * norm_1(&x.coords)).sum()
 }
 
 impl Body {
@@ -117,40 +112,64 @@ impl Body {
         values: &mut Vec<f64>,
     ) -> [f64; 4] {
         let start = part * self.parts.size;
-        let rows = start..start + forces.len();
-        let mut sizes: Vec<[f64; 2]> = forces.iter().map(|force| [force.norm(), 0.0]).collect();
+        let sizes = forces.iter().map(|force| [force.norm(), 0.0]).collect();
+        let mut sums = PartSums { start, forces, sizes, noise: 0.0 };
         values.clear();
         values.reserve_exact(self.kinds.iter().map(|kind| kind.owned(part).len()).sum());
-        let mut noise = 0.0;
         for elements in &self.kinds {
-            let borrowed = elements.borrowed(part);
-            for (n, &k) in elements.of_part(part).iter().enumerate() {
-                elements.kind.evaluate(k as usize, x, scratch);
-                let Evaluation { c, stiffness, .. } = *scratch;
-                let reach = scratch.reach() * stiffness;
-                if n >= borrowed {
+            let add = match elements.kind.arity() {
+                2 => Self::add_forces::<2>,
+                3 => Self::add_forces::<3>,
+                4 => Self::add_forces::<4>,
+                _ => Self::add_forces::<0>,
+            };
+            add(self, elements, part, x, scratch, &mut sums, values);
+        }
+        let mut squares = [0.0, 0.0, 0.0, sums.noise];
+        for (force, [size, rounding]) in sums.forces.iter().zip(sums.sizes) {
+            squares[0] += force.norm_squared();
+            squares[1] += size * size;
+            squares[2] += rounding * rounding;
+        }
+        squares
+    }
+
+    /// Adds the constraints of one kind, with `N` vertices each, or any number if `N` is zero.
+    fn add_forces<const N: usize>(
+        &self,
+        elements: &Elements,
+        part: usize,
+        x: &[Point3<f64>],
+        scratch: &mut Evaluation,
+        sums: &mut PartSums<'_>,
+        values: &mut Vec<f64>,
+    ) {
+        let arity = if N > 0 { N } else { elements.kind.arity() };
+        let indices = elements.kind.indices();
+        let (list, borrowed) = (elements.of_part(part), elements.borrowed(part));
+        for (group, constraints) in list.chunks(GROUP).enumerate() {
+            scratch.of::<N>(&*elements.kind, constraints, x);
+            let Evaluation { places, c, stiffness, gradients } = &*scratch;
+            let corners = places.chunks_exact(arity).zip(gradients.chunks_exact(arity));
+            let of_constraints = constraints.iter().zip(c.iter().zip(stiffness)).zip(corners);
+            for (n, ((&k, (&c, &stiffness)), (places, gradients))) in of_constraints.enumerate() {
+                let reach = reach(places, gradients) * stiffness;
+                if group * GROUP + n >= borrowed {
                     values.push(c);
-                    noise += c.abs() * reach;
+                    sums.noise += c.abs() * reach;
                 }
-                for (gradient, &v) in scratch.gradients.iter().zip(elements.vertices(k as usize)) {
-                    let row = self.place[v as usize] as usize;
-                    if rows.contains(&row) {
-                        let n = row - rows.start;
+                let vertices = &indices[k as usize * arity..][..arity];
+                for (gradient, &v) in gradients.iter().zip(vertices) {
+                    let n = (self.place[v as usize] as usize).wrapping_sub(sums.start);
+                    if let Some(force) = sums.forces.get_mut(n) {
                         let size = gradient.norm();
-                        forces[n] -= gradient * (c * stiffness);
-                        sizes[n][0] += size * (c * stiffness).abs();
-                        sizes[n][1] += size * reach;
+                        *force -= gradient * (c * stiffness);
+                        sums.sizes[n][0] += size * (c * stiffness).abs();
+                        sums.sizes[n][1] += size * reach;
                     }
                 }
             }
         }
-        let mut sums = [0.0, 0.0, 0.0, noise];
-        for (force, [size, rounding]) in forces.iter().zip(sizes) {
-            sums[0] += force.norm_squared();
-            sums[1] += size * size;
-            sums[2] += rounding * rounding;
-        }
-        sums
     }
 
     /// The energy at `to` minus that at `from`, constraint by constraint, so that it is as accurate

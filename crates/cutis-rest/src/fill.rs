@@ -8,24 +8,23 @@ use rayon::prelude::*;
 use crate::Body;
 use crate::blocks::{Block, divided};
 use crate::body::FIXED;
-use crate::constraints::{Constraints, Evaluation};
+use crate::constraints::{Evaluation, GROUP};
+use crate::curvature::{Curvature, Second};
 use crate::elements::Elements;
-use crate::energy::Scratch;
 use crate::matrix::Matrix;
 use crate::smoother::Operator;
 use crate::symmetric::Neighbors;
 
-/// Constraints of a kind that are tried for curvature.
-const TRIED: usize = 16;
-
-/// The constraints whose second derivatives count.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Curvature {
-    /// All of them: the exact second derivatives of the energy.
-    All,
-    /// Stretched constraints of kinds that are curved in a single vertex, such as lengths. The
-    /// matrix is then semidefinite for all kinds of this project.
-    Stretched,
+/// Memory to add up constraints.
+#[derive(Default)]
+struct Scratch {
+    at: Evaluation,
+    second: Second,
+    /// The scaled gradients of a constraint.
+    scaled: Vec<Scaled>,
+    /// For each pair of vertices of a constraint, the place of its block in the row where it was
+    /// found last. In a lattice the next constraint has it at the same place.
+    slots: Vec<usize>,
 }
 
 impl Body {
@@ -46,7 +45,13 @@ impl Body {
             let mut wholes = vec![[[0.0; 3]; 3]; sums.len()];
             rows.values.fill(0.0);
             for elements in &self.kinds {
-                self.add(elements, part, x, curvature, scratch, &mut rows, &mut wholes);
+                let add = match elements.kind.arity() {
+                    2 => Self::add::<2>,
+                    3 => Self::add::<3>,
+                    4 => Self::add::<4>,
+                    _ => Self::add::<0>,
+                };
+                add(self, elements, part, x, curvature, scratch, &mut rows, &mut wholes);
             }
             for (sum, whole) in sums.iter_mut().zip(&wholes) {
                 *sum = whole.map(|[x, y, z]: [f64; 3]| [x as f32, y as f32, z as f32, 0.0]);
@@ -66,9 +71,10 @@ impl Body {
     }
 
     /// Adds the constraints of one kind to the rows of a part above the diagonal, and to the sums
-    /// of the whole rows in double precision.
+    /// of the whole rows in double precision. The constraints have `N` vertices each, or any number
+    /// if `N` is zero.
     #[expect(clippy::too_many_arguments, reason = "one loop, and what it reads and writes")]
-    fn add(
+    fn add<const N: usize>(
         &self,
         elements: &Elements,
         part: usize,
@@ -78,60 +84,63 @@ impl Body {
         to: &mut Rows<'_>,
         wholes: &mut [Block<3, 3>],
     ) {
-        let arity = elements.kind.arity();
-        scratch.slots.clear();
-        scratch.slots.resize(arity * arity, 0);
-        for &k in elements.of_part(part) {
-            let k = k as usize;
-            elements.kind.evaluate(k, x, &mut scratch.own);
-            let Evaluation { c, stiffness, .. } = scratch.own;
-            let counts = match curvature {
-                Curvature::All => c != 0.0,
-                Curvature::Stretched => elements.curved && c > 0.0,
-            };
-            let root = stiffness.sqrt();
-            let mut all = Vector3::zeros();
-            scratch.scaled.clear();
-            for (gradient, &vertex) in scratch.own.gradients.iter().zip(elements.vertices(k)) {
-                let place = self.place[vertex as usize];
-                let gradient = gradient * root;
-                if place != FIXED {
-                    all += gradient;
+        let kind = &*elements.kind;
+        let arity = if N > 0 { N } else { kind.arity() };
+        let Scratch { at, second, scaled, slots } = scratch;
+        scaled.resize(arity, Scaled::default());
+        slots.clear();
+        slots.resize(arity * arity, 0);
+        let counts = |c: f64| match curvature {
+            Curvature::All => c != 0.0,
+            Curvature::Stretched => elements.curved && c > 0.0,
+        };
+        let start = to.neighbors.above_rows(to.rows.clone()).start;
+        for constraints in elements.of_part(part).chunks(GROUP) {
+            at.of::<N>(kind, constraints, x);
+            second.of(kind, constraints, at, counts);
+            let mut curvatures = second.blocks.chunks_exact(arity * arity);
+            let values = at.c.iter().zip(&at.stiffness).zip(at.gradients.chunks_exact(arity));
+            for (&k, ((&c, &stiffness), gradients)) in constraints.iter().zip(values) {
+                let curvature = if counts(c) { curvatures.next() } else { None };
+                let root = stiffness.sqrt();
+                let mut all = Vector3::zeros();
+                let vertices = &kind.indices()[k as usize * arity..][..arity];
+                let scaled = &mut scaled[..arity];
+                for (n, scaled) in scaled.iter_mut().enumerate() {
+                    let place = self.place[vertices[n] as usize];
+                    let gradient = gradients[n] * root;
+                    if place != FIXED {
+                        all += gradient;
+                    }
+                    *scaled = Scaled::new(place, gradient);
                 }
-                scratch.scaled.push(Scaled::new(place, gradient));
-            }
-            for own in 0..arity {
-                let Scaled { place, gradient, rows: left, .. } = scratch.scaled[own];
-                let row = place as usize;
-                if !to.rows.contains(&row) {
-                    continue;
-                }
-                if counts {
-                    scratch.differentiate(&*elements.kind, k, own);
-                }
-                let whole = &mut wholes[row - to.rows.start];
-                add_outer(whole, &gradient, &all);
-                let columns = to.neighbors.later(row);
-                let start = to.neighbors.above_rows(to.rows.start..row).len();
-                for (b, Scaled { place: column, columns: right, .. }) in scratch.scaled.iter().enumerate() {
-                    let curved = counts && *column != FIXED;
-                    if curved {
-                        add(whole.as_flattened_mut(), c * stiffness, &scratch.curvature[b]);
-                    }
-                    if *column == FIXED || *column as usize <= row {
-                        continue;
-                    }
-                    let hint = &mut scratch.slots[own * arity + b];
-                    if columns.get(*hint) != Some(column) {
-                        let smaller = columns.iter().map(|c| u32::from(c < column));
-                        *hint = smaller.sum::<u32>() as usize;
-                    }
-                    let block = &mut to.values[9 * (start + *hint)..][..9];
-                    for n in 0..9 {
-                        block[n] += left[n] * right[n];
-                    }
-                    if curved {
-                        add(block, (c * stiffness) as f32, &scratch.curvature[b].map(|x| x as f32));
+                for (own, Scaled { place, gradient, rows: left, .. }) in scaled.iter().enumerate() {
+                    let row = *place as usize;
+                    let Some(whole) = wholes.get_mut(row.wrapping_sub(to.rows.start)) else { continue };
+                    add_outer(whole, gradient, &all);
+                    let columns = to.neighbors.later(row);
+                    let first = to.neighbors.above(row).start - start;
+                    for (b, Scaled { place: column, columns: right, .. }) in scaled.iter().enumerate() {
+                        let curvature =
+                            curvature.filter(|_| *column != FIXED).map(|blocks| &blocks[own * arity + b]);
+                        if let Some(curvature) = curvature {
+                            add(whole.as_flattened_mut(), c * stiffness, curvature);
+                        }
+                        if *column == FIXED || *column as usize <= row {
+                            continue;
+                        }
+                        let hint = &mut slots[own * arity + b];
+                        if columns.get(*hint) != Some(column) {
+                            let smaller = columns.iter().map(|c| u32::from(c < column));
+                            *hint = smaller.sum::<u32>() as usize;
+                        }
+                        let block = &mut to.values[9 * (first + *hint)..][..9];
+                        for n in 0..9 {
+                            block[n] += left[n] * right[n];
+                        }
+                        if let Some(curvature) = curvature {
+                            add(block, (c * stiffness) as f32, &curvature.map(|x| x as f32));
+                        }
                     }
                 }
             }
@@ -141,7 +150,8 @@ impl Body {
 
 /// A gradient times the root of the stiffness of its constraint. The block of two vertices is the
 /// outer product of theirs.
-pub(crate) struct Scaled {
+#[derive(Clone, Default)]
+struct Scaled {
     /// Place of the vertex, or [`FIXED`].
     place: u32,
     gradient: Vector3<f64>,
@@ -179,53 +189,6 @@ fn add_outer(to: &mut Block<3, 3>, left: &Vector3<f64>, right: &Vector3<f64>) {
 #[inline(always)]
 fn add<T: nalgebra::RealField + Copy>(to: &mut [T], factor: T, matrix: &Matrix3<T>) {
     to.iter_mut().zip(matrix.as_slice()).for_each(|(to, &x)| *to += factor * x);
-}
-
-impl Scratch {
-    /// Forward differences of the gradients over the position of one vertex, after the constraint
-    /// was evaluated: `∂²C/∂x_own∂x_b` for each vertex `b`.
-    fn differentiate(&mut self, kind: &dyn Constraints, k: usize, own: usize) {
-        let Self { own: Evaluation { places, gradients, .. }, ahead, curvature, .. } = self;
-        curvature.clear();
-        curvature.resize(places.len(), Matrix3::zeros());
-        let first = places[0];
-        let extent = places.iter().map(|place| (place - first).norm_squared()).fold(0.0, f64::max).sqrt();
-        let step = f64::EPSILON.sqrt() * extent;
-        if step.is_nan() || step <= 0.0 {
-            return;
-        }
-        ahead.resize(places.len(), Vector3::zeros());
-        for axis in 0..3 {
-            let place = places[own][axis];
-            let moved = place + step;
-            places[own][axis] = moved;
-            kind.gradients(k, places, ahead);
-            places[own][axis] = place;
-            let scale = 1.0 / (moved - place);
-            for (curvature, (ahead, at)) in curvature.iter_mut().zip(ahead.iter().zip(&*gradients)) {
-                for column in 0..3 {
-                    curvature[(axis, column)] = (ahead[column] - at[column]) * scale;
-                }
-            }
-        }
-    }
-}
-
-/// Whether the value of some constraint of a kind is curved as a function of a single vertex.
-/// Lengths are, volumes are not.
-pub(crate) fn is_curved(kind: &dyn Constraints, x: &[Point3<f64>]) -> bool {
-    let mut scratch = Scratch::default();
-    let count = kind.len();
-    (0..count).step_by(count.div_ceil(TRIED).max(1)).any(|k| {
-        kind.evaluate(k, x, &mut scratch.own);
-        let Evaluation { places, gradients, .. } = &scratch.own;
-        let size = gradients.iter().map(Vector3::norm).fold(0.0, f64::max);
-        let extent = places.iter().map(|place| (place - places[0]).norm()).fold(0.0, f64::max);
-        (0..kind.arity()).any(|own| {
-            scratch.differentiate(kind, k, own);
-            scratch.curvature[own].norm() * extent > 1e-3 * size
-        })
-    })
 }
 
 #[cfg(test)]

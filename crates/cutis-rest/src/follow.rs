@@ -6,7 +6,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::fill::Curvature;
+use crate::curvature::Curvature;
 use crate::settle::diagonal;
 use crate::{Body, Options, Rest, RestError, Search, Step};
 

@@ -35,6 +35,7 @@ mod blocks;
 mod body;
 mod conjugate;
 mod constraints;
+mod curvature;
 mod elements;
 mod energy;
 mod error;

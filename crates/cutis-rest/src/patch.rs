@@ -201,7 +201,7 @@ mod tests {
     use super::*;
     use crate::Body;
     use crate::conjugate::solve;
-    use crate::fill::Curvature;
+    use crate::curvature::Curvature;
     use crate::host::{HostEquations, Vectors};
     use crate::multigrid::Multigrid;
     use crate::springs::{FLAT_M, block, flat_block};

@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::advance::{Moved, Pending, is_enough};
 use crate::conjugate::Solution;
+use crate::curvature::Curvature;
 use crate::energy::State;
-use crate::fill::Curvature;
 use crate::local::Relaxed;
 use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;

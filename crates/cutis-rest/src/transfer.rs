@@ -363,7 +363,7 @@ fn hold_missing_modes(block: &mut [[f64; RIGID]; RIGID]) {
 mod tests {
     use super::*;
     use crate::Body;
-    use crate::fill::Curvature;
+    use crate::curvature::Curvature;
     use crate::smoother::Smoother;
     use crate::springs::block;
     use crate::vectors::dot;

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use crate::advance::Moved;
 use crate::conjugate::Solution;
-use crate::fill::Curvature;
+use crate::curvature::Curvature;
 use crate::{RestError, Search};
 
 /// Length of a step below which the next one has a larger shift.

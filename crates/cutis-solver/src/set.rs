@@ -76,6 +76,13 @@ pub trait ConstraintSet<T: Scalar>: Project<T> + Send + Sync {
     /// Panics if there is no such constraint, or if `x` or `grad` does not have
     /// [`arity`](Self::arity) elements.
     fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64;
+    /// Evaluates some constraints as [`evaluate`](Self::evaluate) does, with one virtual call for
+    /// all of them. `x` and `grad` have the vertices of one constraint after the other, and `c` has
+    /// one value per constraint.
+    ///
+    /// # Panics
+    /// Panics if there is no such constraint, or if the lengths do not fit.
+    fn evaluate_all(&self, constraints: &[u32], x: &[Point3<f64>], c: &mut [f64], grad: &mut [Vector3<f64>]);
     /// Returns the same constraints in double precision, with exactly these parameters and
     /// stiffnesses.
     fn to_f64(&self) -> Kind<f64>;

@@ -9,7 +9,7 @@ use super::rows::{OfMatrix, Prolongation, Restriction};
 use super::sliced::{Reads, Sliced};
 use super::{RestGpu, step::Step};
 use crate::conjugate::{Equations, Solution, solve};
-use crate::fill::Curvature;
+use crate::curvature::Curvature;
 use crate::host::{HostEquations, Vectors, scaled};
 use crate::matrix::Matrix;
 use crate::multigrid::{LANES, Multigrid, RIGID};

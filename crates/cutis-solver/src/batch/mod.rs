@@ -12,7 +12,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use cutis_coloring::{Groups, Incidence};
-use cutis_constraints::{Constraint, Scalar, SimdLevel};
+use cutis_constraints::{Constraint, Eval, Params, Scalar, SimdLevel};
 use nalgebra::{Point3, Vector3};
 
 use crate::colored::{SharedStore, SharedVertices};
@@ -148,6 +148,13 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> Batch<C, N, T, C::Params<T>> {
 
     fn positions(&self, k: usize, vertices: &[Vertex<T>]) -> [Point3<T>; N] {
         self.indices[k].map(|i| vertices[i as usize].position())
+    }
+
+    /// Evaluates a constraint in double precision, with its vertices at `x`.
+    #[inline(always)]
+    fn evaluated(&self, k: usize, x: &[Point3<f64>; N]) -> Eval<f64, N> {
+        let params = self.params[k].as_ref();
+        C::eval(x, &Params::from_fn(|j| params[j].to_f64()))
     }
 }
 

@@ -96,12 +96,20 @@ impl<C: Constraint<N>, const N: usize, T: Scalar> ConstraintSet<T> for Batch<C, 
     }
 
     fn evaluate(&self, k: usize, x: &[Point3<f64>], grad: &mut [Vector3<f64>]) -> f64 {
-        let params = self.params[k].as_ref();
-        let params = <C::Params<f64> as Params<f64>>::from_fn(|j| params[j].to_f64());
-        let x = x.as_array().expect("one position per vertex");
-        let eval = C::eval(x, &params);
+        let eval = self.evaluated(k, x.as_array().expect("one position per vertex"));
         grad.copy_from_slice(&eval.grad);
         eval.c
+    }
+
+    fn evaluate_all(&self, constraints: &[u32], x: &[Point3<f64>], c: &mut [f64], grad: &mut [Vector3<f64>]) {
+        let count = constraints.len();
+        assert_eq!([x.len(), c.len(), grad.len()], [N * count, count, N * count], "the lengths do not fit");
+        let of_constraints = constraints.iter().zip(x.as_chunks().0);
+        let to = c.iter_mut().zip(grad.as_chunks_mut().0);
+        for ((&k, x), (c, grad)) in of_constraints.zip(to) {
+            let eval = self.evaluated(k as usize, x);
+            (*c, *grad) = (eval.c, eval.grad);
+        }
     }
 
     fn to_f64(&self) -> Kind<f64> {

@@ -86,6 +86,29 @@ fn unbalance(system: &System<f64>) -> f64 {
     (0..forces.len()).filter(moving).map(|n| forces[n].norm() / weight(n).norm()).fold(0.0, f64::max)
 }
 
+/// Constraints that are evaluated together, in any order, give the bits of single ones.
+#[test]
+fn constraints_evaluate_alike_one_by_one_and_together() {
+    let system = block(1e-3);
+    for kind in system.kinds() {
+        let arity = kind.arity();
+        let constraints: Vec<u32> = (0..kind.len() as u32).rev().chain([0]).collect();
+        let moved = |v: u32| system.vertices()[v as usize].position() * (1.0 + 0.01 * f64::from(v));
+        let vertices = constraints.iter().flat_map(|&k| &kind.indices()[k as usize * arity..][..arity]);
+        let x: Vec<Point3<f64>> = vertices.map(|&v| moved(v)).collect();
+        let mut c = vec![f64::NAN; constraints.len()];
+        let mut gradients = vec![Vector3::zeros(); x.len()];
+        kind.evaluate_all(&constraints, &x, &mut c, &mut gradients);
+        let mut one = vec![Vector3::zeros(); arity];
+        for (n, &k) in constraints.iter().enumerate() {
+            let own = n * arity..(n + 1) * arity;
+            assert_eq!(c[n], kind.evaluate(k as usize, &x[own.clone()], &mut one), "{}", kind.name());
+            assert_eq!(gradients[own], one, "{}", kind.name());
+        }
+        assert!(c.iter().all(|&c| c != 0.0) && c[0] != c[1], "control: {c:?}");
+    }
+}
+
 #[test]
 fn a_body_at_rest_is_in_equilibrium_for_all_settings() {
     let mut tips = Vec::new();
