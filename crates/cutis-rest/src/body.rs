@@ -9,6 +9,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::RestError;
+use crate::blocks::ROWS;
 use crate::constraints::Constraints;
 use crate::curvature::is_curved;
 use crate::elements::{Elements, Parts, joined};
@@ -61,7 +62,7 @@ impl Body {
         let vertices = system.vertices();
         let mut place = vec![FIXED; vertices.len()];
         let start: Vec<Point3<f64>> =
-            vertices.iter().map(|vertex| vertex.position().map(T::to_f64)).collect();
+            vertices.par_iter().with_min_len(ROWS).map(|vertex| vertex.position().map(T::to_f64)).collect();
         let inverse_mass = |v: u32| vertices[v as usize].inverse_mass().to_f64();
         let free: Vec<u32> = (0..vertices.len() as u32).filter(|&v| inverse_mass(v) > 0.0).collect();
         if free.is_empty() {
@@ -80,7 +81,7 @@ impl Body {
             let load = system.loads().get(v as usize).map(|load| load.map(T::to_f64)).unwrap_or_default();
             Vector3::from(gravity_m_s2) / inverse_mass(v) + load
         };
-        let weights = free.iter().map(weight).collect();
+        let weights = free.par_iter().with_min_len(ROWS).map(weight).collect();
         let kinds: Vec<Arc<dyn Constraints>> = system
             .kinds()
             .iter()
@@ -127,7 +128,7 @@ impl Body {
 
     /// Places of the vertices that can move.
     pub(crate) fn places(&self, state: &State) -> Vec<Point3<f64>> {
-        self.free.iter().map(|&v| state.x[v as usize]).collect()
+        self.free.par_iter().with_min_len(ROWS).map(|&v| state.x[v as usize]).collect()
     }
 
     /// Whether a vertex cannot move.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::blocks::divided;
 use crate::body::FIXED;
 use crate::constraints::Constraints;
 
@@ -142,11 +143,12 @@ impl Elements {
 /// Lists one after the other: the start of each one, and the end of the last one.
 pub(crate) fn joined(lists: Vec<Vec<u32>>) -> (Vec<usize>, Vec<u32>) {
     let mut starts = vec![0];
-    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
-    for list in lists {
-        all.extend(list);
-        starts.push(all.len());
+    for list in &lists {
+        starts.push(starts[starts.len() - 1] + list.len());
     }
+    let mut all = vec![0; starts[lists.len()]];
+    let pieces = divided(&mut all, lists.iter().map(Vec::len));
+    pieces.into_par_iter().zip(lists).for_each(|(to, list)| to.copy_from_slice(&list));
     (starts, all)
 }
 

@@ -6,8 +6,10 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::Body;
+use crate::blocks::ROWS;
 use crate::constraints::{Evaluation, GROUP};
 use crate::elements::Elements;
+use crate::vectors::sum;
 
 /// The values of all constraints, and the forces.
 #[derive(Default)]
@@ -187,31 +189,28 @@ impl Body {
             sum
         };
         let parts: Vec<f64> = (0..from.values.len()).into_par_iter().map(part).collect();
-        let work = |(weight, &v): (&Vector3<f64>, &u32)| weight.dot(&(to.x[v as usize] - from.x[v as usize]));
-        parts.iter().sum::<f64>() - self.weights.iter().zip(&self.free).map(work).sum::<f64>()
+        let work = |n: usize| {
+            let v = self.free[n] as usize;
+            self.weights[n].dot(&(to.x[v] - from.x[v]))
+        };
+        parts.iter().sum::<f64>() - sum(self.free.len(), work)
     }
 
-    /// A state whose positions are those of `from`, and whose other numbers have no meaning yet.
-    /// `memory` is an earlier state with the fixed vertices at the same places, or an empty one.
-    pub(crate) fn copied(&self, from: &State, mut memory: State) -> State {
-        if memory.x.is_empty() {
-            memory.x.extend_from_slice(&from.x);
-        }
-        self.free.iter().for_each(|&v| memory.x[v as usize] = from.x[v as usize]);
-        memory
-    }
-
-    /// A placement with the free vertices moved. `memory` is as in [`copied`](Self::copied).
+    /// A placement with the free vertices moved. The memory of an earlier state is used again.
     pub(crate) fn moved(
         &self,
         from: &State,
         direction: &[Vector3<f64>],
         length: f64,
-        memory: State,
+        mut memory: State,
     ) -> State {
-        let mut state = self.copied(from, memory);
-        self.free.iter().zip(direction).for_each(|(&v, step)| state.x[v as usize] += step * length);
-        self.evaluated_again(state)
+        // Fixed vertices have no direction.
+        let moved = |(x, &place): (&Point3<f64>, &u32)| {
+            direction.get(place as usize).map_or(*x, |step| x + step * length)
+        };
+        let vertices = from.x.par_iter().zip(&self.place).with_min_len(ROWS);
+        vertices.map(moved).collect_into_vec(&mut memory.x);
+        self.evaluated_again(memory)
     }
 }
 

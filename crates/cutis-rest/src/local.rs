@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use crate::body::FIXED;
 use crate::constraints::{Constraints, Subset};
 use crate::elements::{Elements, Parts};
+use crate::settle::dot;
 use crate::symmetric::Neighbors;
 use crate::{Body, Options, Search};
 
@@ -56,7 +57,7 @@ impl Body {
 
     /// Places of the vertices that moved far, and of their neighbors, ascending.
     fn far(&self, step: &[Vector3<f64>]) -> Vec<u32> {
-        let mean = step.iter().map(Vector3::norm_squared).sum::<f64>() / step.len() as f64;
+        let mean = dot(step, step) / step.len() as f64;
         let far = |place: &u32| step[*place as usize].norm_squared() > FAR * FAR * mean;
         let mut chosen: Vec<u32> = (0..step.len() as u32).filter(far).collect();
         for _ in 0..RINGS {

@@ -149,14 +149,18 @@ impl<const B: usize, const L: usize> Level<B, L> {
         modes: Vec<Modes<B>>,
         places: &[Point3<f64>],
     ) -> (Self, Symmetric<RIGID, LANES>, Vec<Modes<RIGID>>, Vec<Point3<f64>>) {
-        let aggregates = Aggregates::of(matrix);
+        // One thread forms the aggregates.
+        let (aggregates, smoother) =
+            rayon::join(|| Aggregates::of(matrix), || Smoother::new(matrix, places, SPECTRUM));
         let (tentative, next_modes) = transfer::tentative(&aggregates, modes);
-        let smoother = Smoother::new(matrix, places, SPECTRUM);
         let jacobi = Jacobi { inverse: |node: usize| smoother.inverse(node), largest: smoother.largest };
         let prolongation = transfer::smoothed(matrix, &jacobi, &aggregates, &tentative);
         drop(tentative);
-        let prolongation = transfer::smoothed_again(matrix, &jacobi, &prolongation, &next_modes);
-        let columns = Columns::of(&prolongation);
+        // The blocks stay where they are.
+        let (prolongation, columns) = rayon::join(
+            || transfer::smoothed_again(matrix, &jacobi, &prolongation, &next_modes),
+            || Columns::of(&prolongation),
+        );
         let next = transfer::galerkin(matrix, &prolongation, &columns);
         drop(columns);
         let transfer = Transfer::new(prolongation);

@@ -1,8 +1,10 @@
 //! Newton's method for the state of rest.
 
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::advance::{Moved, Pending, is_enough};
+use crate::blocks::ROWS;
 use crate::conjugate::Solution;
 use crate::curvature::Curvature;
 use crate::energy::State;
@@ -11,6 +13,7 @@ use crate::matrix::Matrix;
 use crate::multigrid::Multigrid;
 use crate::place::Place;
 use crate::trial::Trial;
+use crate::vectors::sum;
 use crate::{Body, Options, Rest, RestError, Step};
 
 /// Accuracy of the equations of the first step, of which a rough solution would leave the largest
@@ -33,7 +36,7 @@ pub struct Search<'a> {
     /// Positions of the free vertices at the start, relative to the origin, in m.
     start: Vec<Point3<f64>>,
     pub(crate) state: State,
-    /// An earlier state, whose memory is used again. Fixed vertices are where they are now.
+    /// An earlier state, whose memory is used again.
     pub(crate) spare: State,
     /// Estimate of the distance from rest, relative to the displacement from the start.
     error: f64,
@@ -164,7 +167,6 @@ impl<'a> Search<'a> {
     /// Goes on from a placement whose fixed vertices are elsewhere.
     pub(crate) fn begin_at(&mut self, state: State) {
         self.state = state;
-        self.spare = State::default();
         self.error = if self.is_balanced() { 0.0 } else { f64::INFINITY };
     }
 
@@ -198,7 +200,7 @@ impl<'a> Search<'a> {
 
     /// The present positions of all vertices in m, in the caller's coordinates.
     pub fn positions(&self) -> Vec<Point3<f64>> {
-        self.state.x.iter().map(|x| x + self.body.origin).collect()
+        self.state.x.par_iter().with_min_len(ROWS).map(|x| x + self.body.origin).collect()
     }
 
     /// The present state.
@@ -258,8 +260,8 @@ impl<'a> Search<'a> {
     /// change of the energy in J.
     fn relax(&mut self, step: &[Vector3<f64>]) -> f64 {
         let Some(Relaxed { places, x: moved }) = self.body.relaxed(&self.state.x, step) else { return 0.0 };
-        let mut memory = self.body.copied(&self.state, std::mem::take(&mut self.spare));
-        let mut x = std::mem::take(&mut memory.x);
+        let mut x = std::mem::take(&mut self.spare.x);
+        x.clone_from(&self.state.x);
         for (&place, moved) in places.iter().zip(moved) {
             x[self.body.free[place as usize] as usize] = moved;
         }
@@ -268,11 +270,10 @@ impl<'a> Search<'a> {
         let change = if relaxed.is_finite() { change.min(0.0) } else { 0.0 };
         if change < 0.0 {
             self.energy_change_j += change;
-            memory.x = std::mem::replace(&mut self.state, relaxed).x;
+            self.spare.x = std::mem::replace(&mut self.state, relaxed).x;
         } else {
-            memory.x = relaxed.x;
+            self.spare.x = relaxed.x;
         }
-        self.spare = memory;
         change
     }
 
@@ -321,8 +322,8 @@ impl<'a> Search<'a> {
     /// Displacement from the start to a state in m, as a root of the mean square.
     fn way(&self, state: &State) -> f64 {
         let free = &self.body.free;
-        let square = |(&v, start): (&u32, &Point3<f64>)| (state.x[v as usize] - start).norm_squared();
-        (free.iter().zip(&self.start).map(square).sum::<f64>() / free.len() as f64).sqrt()
+        let square = |n: usize| (state.x[free[n] as usize] - self.start[n]).norm_squared();
+        (sum(free.len(), square) / free.len() as f64).sqrt()
     }
 
     /// Estimate of the distance from rest after a step, relative to the displacement `way` from the
@@ -356,7 +357,7 @@ pub(crate) fn diagonal(places: &[Point3<f64>]) -> f64 {
 
 /// The inner product of two vectors.
 pub(crate) fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+    sum(a.len(), |n| a[n].dot(&b[n]))
 }
 
 #[cfg(test)]

@@ -11,6 +11,13 @@ pub(crate) type Vector<const L: usize> = Vec<[f32; L]>;
 /// depend on the number of threads.
 pub(crate) const PART: usize = 4096;
 
+/// The sum of a term of each node.
+pub(crate) fn sum(nodes: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
+    let of_part = |part: usize| (part * PART..((part + 1) * PART).min(nodes)).map(&term).sum::<f64>();
+    let parts: Vec<f64> = (0..nodes.div_ceil(PART)).into_par_iter().map(of_part).collect();
+    parts.iter().sum()
+}
+
 /// The inner product of two vectors.
 pub(crate) fn dot<const L: usize>(a: &[[f32; L]], b: &[[f32; L]]) -> f64 {
     let parts = a.par_chunks(PART).zip(b.par_chunks(PART));
