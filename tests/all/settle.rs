@@ -1,7 +1,8 @@
 //! Runs that end in the state of rest.
 
+use cutis::report::MemoryPart;
 use cutis::rest::{Body, Options};
-use cutis::{Error, Scene};
+use cutis::{Error, Plan, Scene, Silent};
 use cutis_newton::{Problem, relative_rms};
 
 use crate::identity::original;
@@ -42,6 +43,21 @@ fn a_wound_rests_where_a_direct_solver_finds_it() {
     };
     let [same, other] = [&system, &other].map(error);
     assert!(same < 1e-6 && other > 0.01, "{same:e} and {other:e}");
+}
+
+/// A plan counts the memory of the search. Control: without one it has no such part.
+#[test]
+fn a_plan_counts_the_memory_of_the_search() {
+    let plan = |set: &[(&str, &str)]| cutis::check(&small(set), &Silent).unwrap();
+    let of_search = |plan: &Plan| -> Vec<usize> {
+        plan.memory.iter().filter(|part| part.part == MemoryPart::REST).map(|part| part.bytes).collect()
+    };
+    let (frames, rest) = (plan(&[("run.frames", "1")]), plan(&[REST]));
+    let free = rest.sizes.vertices - rest.sizes.fixed_vertices;
+    assert_eq!(of_search(&rest), [free * Body::SEARCH_BYTES_PER_VERTEX]);
+    assert!(of_search(&frames).is_empty() && rest.device_memory.is_empty(), "control");
+    let listed = rest.costs.parts.iter().find(|part| part.part == MemoryPart::REST);
+    assert_eq!(listed.map(|part| part.host_bytes), of_search(&rest).first().copied());
 }
 
 /// A wound settles to the same opening from the start and after some frames, and a long run ends
@@ -240,7 +256,7 @@ fn a_search_that_is_resumed_ends_in_the_same_state() {
 
     let (out, input) = (parts.path().join("again.nii.gz"), cutis::ResampleInput::Volume(None));
     let request = cutis::ResampleRequest { run: parts.path().into(), input, out };
-    cutis::resample_run(&run(2), &request, &cutis::Silent).unwrap();
+    cutis::resample_run(&run(2), &request, &Silent).unwrap();
     assert!(read(parts.path(), "again.nii.gz") == read(whole.path(), "deformed.nii.gz"));
 }
 

@@ -85,8 +85,9 @@ impl Second {
                 let place = &mut self.moved.places[start + own][axis];
                 let before = *place;
                 *place += step;
+                let moved = *place - before;
                 self.constraints.push(k);
-                self.scales.push(if step > 0.0 { 1.0 / (*place - before) } else { 0.0 });
+                self.scales.push(if moved > 0.0 { 1.0 / moved } else { 0.0 });
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The plan of a scene as `cutis check` prints it: about a screen.
 
-use cutis::report::{Backend, MaterialRow};
+use cutis::report::{Backend, MaterialRow, MemoryPart};
 use cutis::scene::{RunEnd, Scene};
 use cutis::{CostPart, Plan};
 
@@ -49,13 +49,20 @@ fn cut_out(plan: &Plan) -> String {
     }
 }
 
-/// Memory of the solver, of the CT, and of the program so far.
+/// Memory of the solver, of a search, of the CT, and of the program so far.
 fn memory(plan: &Plan) -> String {
     let mb = |bytes: usize| format!("{:.1} MB", bytes as f64 / 1e6);
-    let sum = |of: fn(&CostPart) -> usize| plan.costs.parts.iter().map(of).sum::<usize>();
-    let mut text = format!("{} for the solver", mb(sum(|part| part.host_bytes)));
-    if !plan.device_memory.is_empty() {
-        text += &format!(", {} on the GPU", mb(sum(|part| part.device_bytes)));
+    let (rest, solver): (Vec<&CostPart>, Vec<&CostPart>) =
+        plan.costs.parts.iter().partition(|part| part.part == MemoryPart::REST);
+    let place = |parts: &[&CostPart]| {
+        let sum = |of: fn(&CostPart) -> usize| parts.iter().map(|part| of(part)).sum::<usize>();
+        let (host, device) = (sum(|part| part.host_bytes), sum(|part| part.device_bytes));
+        let on_gpu = if device > 0 { format!(" and {} on the GPU", mb(device)) } else { String::new() };
+        mb(host) + &on_gpu
+    };
+    let mut text = format!("{} for the solver", place(&solver));
+    if !rest.is_empty() {
+        text += &format!(", about {} for the search for rest", place(&rest));
     }
     text += &format!(", {} for the CT", mb(plan.volume_bytes));
     let peak = plan.stages.iter().filter_map(|stage| stage.peak_bytes).max();

@@ -177,12 +177,14 @@ fn a_search_for_rest_on_a_gpu_says_so_and_ends_where_the_cpu_does() {
         steps.iter().map(|step| step["cycles"].as_u64().unwrap()).sum()
     };
     assert_eq!(on(&gpu), "gpu");
+    let in_device = |report: &Value| report["device_memory"].as_array().unwrap().len();
+    assert_eq!((in_device(&gpu), &gpu["device_memory"][0]["part"]), (1, &"rest".into()));
     assert!(cycles(&gpu) > 1 && gpu["device"]["readbacks"].as_u64() > Some(cycles(&gpu)), "{gpu}");
     let page = std::fs::read_to_string(desk.path("gpu/report.html")).unwrap();
     assert!(page.contains("multigrid cycles on the GPU") && page.contains(name));
 
     let cpu = settle("--out cpu --backend cpu");
-    assert_eq!((on(&cpu).as_str(), &cpu["device"]), ("cpu", &Value::Null));
+    assert_eq!((on(&cpu).as_str(), &cpu["device"], in_device(&cpu)), ("cpu", &Value::Null, 0));
     assert_eq!(on(&settle("--out reference --backend reference")), "cpu");
     let moved = |report: &Value| report["max_displacement_mm"].as_f64().unwrap();
     let error = |report: &Value| report["rest"]["error"].as_f64().unwrap();

@@ -11,8 +11,8 @@ use crate::RestError;
 
 /// A GPU on which searches solve their equations, with its kernels. Clones share them.
 ///
-/// Give it to a body by [`Body::on_gpu`](crate::Body::on_gpu). A search takes about 1.7 kB on the
-/// device per vertex that can move, which is freed when the search ends. Each of its vectors, with
+/// Give it to a body by [`Body::on_gpu`](crate::Body::on_gpu). A search takes about
+/// [`BYTES_PER_VERTEX`](Self::BYTES_PER_VERTEX) on the device, which are freed when it ends. Each of its vectors, with
 /// 16 bytes per vertex, must fit a binding: 8.4 million vertices on a device with the baseline of
 /// WebGPU. Matrices are split.
 ///
@@ -49,6 +49,9 @@ pub struct RestGpu {
 }
 
 impl RestGpu {
+    /// Memory of a search on the device in bytes per vertex that can move, about.
+    pub const BYTES_PER_VERTEX: usize = 1700;
+
     /// Compiles the kernels for a device.
     ///
     /// # Errors

@@ -200,6 +200,11 @@ impl RestDevice {
         Ok(Self(RestGpu::new(gpu)?))
     }
 
+    /// Memory on the device of a search with so many vertices that can move, bytes.
+    pub(crate) fn bytes(vertices: usize) -> usize {
+        vertices * RestGpu::BYTES_PER_VERTEX
+    }
+
     /// The same body, whose searches solve their equations here.
     pub(crate) fn with(&self, body: cutis_rest::Body) -> cutis_rest::Body {
         body.on_gpu(&self.0)

@@ -10,7 +10,7 @@ use cutis_volume::{Grid, VolumeError};
 use super::BodySections;
 use crate::Error;
 use crate::model::ModelChoice;
-use crate::scene::{LatticeSection, Scene};
+use crate::scene::{LatticeSection, RunEnd, Scene};
 
 /// Peak of the memory per lattice point while the body is found, bytes. `cutis skin` took 12.7 on
 /// the phantom, for 0.2 to 5.9 million points.
@@ -23,11 +23,16 @@ const TETS_PER_POINT: u64 = 5;
 /// ChainMail, 79 with XPBD and 176 to 190 with vertex block descent, a membrane and materials, for
 /// 3.5 to 10.7 million tetrahedra, besides the lattice points.
 pub(super) fn bytes_per_tet(scene: &Scene) -> u64 {
-    match (scene.model, scene.solver.formulation) {
+    let of_model = match (scene.model, scene.solver.formulation) {
         (ModelChoice::Chainmail, _) => 33,
         (ModelChoice::Pbd, Formulation::Vbd) => 175,
         (ModelChoice::Pbd, _) => 79,
-    }
+    };
+    let of_search = match scene.run.until {
+        RunEnd::Frames => 0,
+        RunEnd::Rest => cutis_rest::Body::SEARCH_BYTES_PER_VERTEX as u64 / TETS_PER_POINT,
+    };
+    of_model + of_search
 }
 
 /// Refuses a lattice of `points` points whose body cannot be found in the memory of this machine.

@@ -18,11 +18,11 @@ use cutis_solver::{Change, Formulation, Settings, SolverError, StepProfile, Syst
 
 use super::costs::{lines_that_hold, sizes, unfinished_cuts, unfinished_handles, unfinished_sutures};
 use super::{Model, ModelCosts, ModelInput, Started};
-use crate::backend::{Chosen, Request};
-use crate::output::report::Sizes;
+use crate::backend::{Chosen, Request, RestDevice};
+use crate::output::report::{MemoryPart, Sizes};
 use crate::run::clock::Clock;
 use crate::scene::validate::Check;
-use crate::scene::{Scene, TissueMaterials};
+use crate::scene::{RunEnd, Scene, TissueMaterials};
 use crate::{CostReport, Error, Progress};
 
 use coloring::Coloring;
@@ -77,7 +77,7 @@ impl Model for ConstraintModel {
     fn costs(&self, input: &ModelInput<'_>, request: Request) -> Result<ModelCosts, Error> {
         let (system, settings, scene) = (&self.system, &self.settings, input.scene);
         let blame = || input.file.blame("solver");
-        let (estimate, backend, projections) = if scene.run.frames == 0 {
+        let (mut estimate, backend, projections) = if scene.run.frames == 0 {
             let backend = request.settle_on_cpu(&scene.solver, "auto: the run has no frames");
             (CostEstimate::at_rest(system, settings).map_err(blame())?, backend, 0)
         } else {
@@ -107,11 +107,18 @@ impl Model for ConstraintModel {
         warnings.extend(unfinished_handles(scene));
         warnings.extend(unfinished_sutures(scene));
         warnings.extend(input.body.growing.iter().flat_map(|cuts| unfinished_cuts(scene, cuts)));
+        let mut device_memory = match scene.run.frames {
+            0 => Vec::new(),
+            _ => device_memory(&backend, system, settings),
+        };
+        if scene.run.until == RunEnd::Rest {
+            let vertices = system.vertices().len() - motionless;
+            let part = |bytes: usize| MemoryPart { part: MemoryPart::REST.into(), bytes };
+            estimate.memory.push(part(vertices * cutis_rest::Body::SEARCH_BYTES_PER_VERTEX));
+            device_memory.extend(backend.on_gpu().then(|| part(RestDevice::bytes(vertices))));
+        }
         Ok(ModelCosts {
-            device_memory: match scene.run.frames {
-                0 => Vec::new(),
-                _ => device_memory(&backend, system, settings),
-            },
+            device_memory,
             backend,
             sizes: Sizes {
                 lip_pairs: scene.constraints.lip_pairs(input.body),
