@@ -21,7 +21,8 @@
 //!   follow on each other go through the matrix together (see `fronts.rs`).
 //! - **Steps.** Each step lowers `U`, but a full one may raise it once: see `advance.rs`. Where no
 //!   step lowers it, a shift is added to the diagonal, and no step is longer than a reach that
-//!   grows: see `trial.rs`. The equations are solved to 20 % far from rest and to 10 % near it.
+//!   grows: see `trial.rs`. The equations are solved to 5 % in the first step, then to 15 %, and to
+//!   10 % near rest.
 //!
 //! # On a GPU
 //! With the feature `gpu`, `Body::on_gpu` gives a body a device that solves the equations of its

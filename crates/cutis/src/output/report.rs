@@ -269,14 +269,15 @@ impl MembraneReport {
 /// Memory of one part of the solver.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MemoryPart {
-    /// `vertices`, a constraint kind, `multipliers`, `incidences`, [`REST`](Self::REST), …
+    /// `vertices`, a constraint kind, `multipliers`, `incidences`, …, or `rest`: a search for the
+    /// state of rest, about.
     pub part: String,
     /// Bytes.
     pub bytes: usize,
 }
 
 impl MemoryPart {
-    /// The part of a search for the state of rest. Its bytes are an estimate.
+    /// The part of a search for the state of rest.
     pub const REST: &str = "rest";
 }
 
