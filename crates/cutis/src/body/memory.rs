@@ -21,7 +21,8 @@ const TETS_PER_POINT: u64 = 5;
 
 /// Peak of the memory per tetrahedron of a scene, bytes. `cutis check` of the phantom took 33 with
 /// ChainMail, 79 with XPBD and 176 to 190 with vertex block descent, a membrane and materials, for
-/// 3.5 to 10.7 million tetrahedra, besides the lattice points.
+/// 3.5 to 10.7 million tetrahedra, besides the lattice points. A search for the state of rest comes
+/// on top.
 pub(super) fn bytes_per_tet(scene: &Scene) -> u64 {
     let of_model = match (scene.model, scene.solver.formulation) {
         (ModelChoice::Chainmail, _) => 33,
@@ -176,6 +177,7 @@ fn soft_limit(text: &str, name: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::LoadedScene;
 
     #[test]
     fn the_files_of_the_system_are_understood() {
@@ -203,6 +205,19 @@ mod tests {
         }
         assert!(text.contains(&format!("use {:.2} or more", 2.0 * spacing)), "{text}");
         assert!(error.is_bad_input());
+    }
+
+    /// A search for the state of rest needs the memory of its vertices, too.
+    #[test]
+    fn a_search_for_rest_counts() {
+        let mut loaded = crate::demo(&[]).unwrap();
+        let per_tet = |until: RunEnd, loaded: &mut LoadedScene| {
+            loaded.scene.run.until = until;
+            BodySections::of(loaded).bytes_per_tet
+        };
+        let (frames, rest) = (per_tet(RunEnd::Frames, &mut loaded), per_tet(RunEnd::Rest, &mut loaded));
+        let of_vertex = cutis_rest::Body::SEARCH_BYTES_PER_VERTEX as u64;
+        assert_eq!((rest - frames) * TETS_PER_POINT, of_vertex);
     }
 
     /// Far too much tissue is refused before the body is built, unless a region leaves most of it
