@@ -43,7 +43,7 @@ impl Evaluation {
     pub fn of_places(&mut self, kind: &dyn Constraints, constraints: &[u32]) {
         self.c.resize(constraints.len(), 0.0);
         self.gradients.resize(self.places.len(), Vector3::zeros());
-        kind.evaluate(constraints, &self.places, &mut self.c, &mut self.gradients);
+        kind.evaluate(constraints, self);
     }
 }
 
@@ -58,14 +58,8 @@ pub(crate) trait Constraints: Send + Sync {
     /// # Errors
     /// [`RestError::PbdStiffness`], [`RestError::Rigid`].
     fn check(&self) -> Result<(), RestError>;
-    /// Writes `C` and `∇C` of some constraints, with their own vertices at `places`.
-    fn evaluate(
-        &self,
-        constraints: &[u32],
-        places: &[Point3<f64>],
-        c: &mut [f64],
-        gradients: &mut [Vector3<f64>],
-    );
+    /// Writes `C` and `∇C` of some constraints, with their own vertices at the places in `to`.
+    fn evaluate(&self, constraints: &[u32], to: &mut Evaluation);
     /// Appends `1/α` of some constraints.
     fn stiffness(&self, constraints: &[u32], to: &mut Vec<f64>);
     /// The change of the energy of some constraints, whose `C` changes `from` some values `to`
@@ -100,13 +94,8 @@ impl<T: Scalar> Constraints for Kind<T> {
         Ok(())
     }
 
-    fn evaluate(
-        &self,
-        constraints: &[u32],
-        places: &[Point3<f64>],
-        c: &mut [f64],
-        gradients: &mut [Vector3<f64>],
-    ) {
+    fn evaluate(&self, constraints: &[u32], to: &mut Evaluation) {
+        let Evaluation { places, c, gradients, .. } = to;
         self.as_ref().evaluate_all(constraints, places, c, gradients);
     }
 
@@ -165,14 +154,8 @@ impl Constraints for Subset {
         self.kind.check()
     }
 
-    fn evaluate(
-        &self,
-        constraints: &[u32],
-        places: &[Point3<f64>],
-        c: &mut [f64],
-        gradients: &mut [Vector3<f64>],
-    ) {
-        self.kind.evaluate(&self.in_kind(constraints), places, c, gradients);
+    fn evaluate(&self, constraints: &[u32], to: &mut Evaluation) {
+        self.kind.evaluate(&self.in_kind(constraints), to);
     }
 
     fn stiffness(&self, constraints: &[u32], to: &mut Vec<f64>) {
