@@ -237,16 +237,6 @@ impl<const R: usize, const C: usize> Sums<R, C> {
         });
     }
 
-    /// Appends the sums of the columns from one on, in their order, and clears all.
-    pub fn append_from(&mut self, first: usize, columns: &mut Vec<u32>, values: &mut Vec<f32>) {
-        self.drain(|column, sum| {
-            if column as usize >= first {
-                columns.push(column);
-                values.extend(sum.as_flattened().iter().map(|&x| x as f32));
-            }
-        });
-    }
-
     /// Clears the sums. `each` receives them in the order of their columns.
     fn drain(&mut self, mut each: impl FnMut(u32, &Block<R, C>)) {
         self.columns.sort_unstable();
@@ -255,6 +245,49 @@ impl<const R: usize, const C: usize> Sums<R, C> {
             each(column, &self.sums[place as usize]);
         }
         self.sums.clear();
+    }
+}
+
+/// Some rows of a matrix of blocks with `R` rows and `C` columns each.
+#[derive(Default)]
+pub(crate) struct BlockRows<const R: usize, const C: usize> {
+    /// The ends of the rows among the blocks.
+    pub ends: Vec<usize>,
+    /// Column of each block.
+    pub columns: Vec<u32>,
+    /// The blocks one after the other, each column by column.
+    pub values: Vec<f32>,
+}
+
+impl<const R: usize, const C: usize> BlockRows<R, C> {
+    /// Removes all rows, and keeps their memory.
+    pub fn clear(&mut self) {
+        self.ends.clear();
+        self.columns.clear();
+        self.values.clear();
+    }
+
+    /// Appends a row with the sums of the columns from one on, and clears all sums.
+    pub fn push(&mut self, sums: &mut Sums<R, C>, first: usize) {
+        sums.drain(|column, sum| {
+            if column as usize >= first {
+                self.columns.push(column);
+                self.values.extend(sum.as_flattened().iter().map(|&x| x as f32));
+            }
+        });
+        self.ends.push(self.columns.len());
+    }
+
+    /// Columns and blocks of a row.
+    #[inline]
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, Block<R, C>)> {
+        let start = row.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let own = start..self.ends[row];
+        let blocks = self.values[R * C * own.start..].chunks_exact(R * C);
+        self.columns[own].iter().zip(blocks).map(|(&column, values)| {
+            let block = |n: usize, row: usize| f64::from(values[R * n + row]);
+            (column as usize, std::array::from_fn(|n| std::array::from_fn(|row| block(n, row))))
+        })
     }
 }
 

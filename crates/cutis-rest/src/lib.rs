@@ -43,6 +43,7 @@ mod error;
 mod fill;
 mod follow;
 mod fronts;
+mod galerkin;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod host;
@@ -53,6 +54,7 @@ mod options;
 mod order;
 mod patch;
 mod place;
+mod prolongation;
 mod settle;
 mod smoother;
 #[cfg(test)]

@@ -10,11 +10,13 @@ use rayon::prelude::*;
 
 use crate::aggregates::Aggregates;
 use crate::blocks::Columns;
+use crate::galerkin::galerkin;
 use crate::matrix::Matrix;
 use crate::patch::Patch;
+use crate::prolongation::{Jacobi, Modes, rigid_modes, smoothed, smoothed_again, tentative};
 use crate::smoother::{Operator, Smoother};
 use crate::symmetric::Symmetric;
-use crate::transfer::{self, Jacobi, Modes, Transfer};
+use crate::transfer::Transfer;
 use crate::vectors::Vector;
 
 /// Unknowns of a rigid body.
@@ -42,6 +44,14 @@ pub(crate) struct Coarse {
     pub level: Level<RIGID, LANES>,
 }
 
+/// What the next level is built from.
+struct Next {
+    matrix: Symmetric<RIGID, LANES>,
+    modes: Vec<Modes<RIGID>>,
+    /// Where the nodes are, in m.
+    places: Vec<Point3<f64>>,
+}
+
 /// The levels of a matrix.
 pub(crate) struct Multigrid {
     /// None if the matrix is small enough to be solved directly.
@@ -65,19 +75,20 @@ impl Multigrid {
             return Self { fine: None, patch: None, coarse: Vec::new(), bottom: Bottom::new(matrix) };
         }
         let patch = Patch::of(matrix, places);
-        let modes = places.par_iter().map(transfer::rigid_modes).collect();
-        let (fine, mut matrix, mut modes, mut places) = Level::new(matrix, modes, places);
+        let modes = places.par_iter().map(rigid_modes).collect();
+        let (fine, mut next) = Level::new(matrix, modes, places);
         let mut coarse = Vec::new();
-        while matrix.nodes() > BOTTOM {
+        while next.matrix.nodes() > BOTTOM {
+            let Next { matrix, modes, places } = next;
             let before = matrix.nodes();
-            let (level, next, next_modes, next_places) = Level::new(&matrix, modes, &places);
+            let level;
+            (level, next) = Level::new(&matrix, modes, &places);
             coarse.push(Coarse { matrix, level });
-            (matrix, modes, places) = (next, next_modes, next_places);
-            if matrix.nodes() * 10 > before * 9 {
+            if next.matrix.nodes() * 10 > before * 9 {
                 break;
             }
         }
-        Self { fine: Some(fine), patch, coarse, bottom: Bottom::new(&matrix) }
+        Self { fine: Some(fine), patch, coarse, bottom: Bottom::new(&next.matrix) }
     }
 
     /// Adapts the smoothers of the finest level to another matrix. The other levels stay.
@@ -142,32 +153,27 @@ fn below(levels: &mut [Coarse], bottom: &Bottom, right: &[[f32; LANES]], to: &mu
 }
 
 impl<const B: usize, const L: usize> Level<B, L> {
-    /// Builds a level for a matrix whose nodes are at some places, in m, and the matrix, modes and
-    /// places of the next one.
-    fn new(
-        matrix: &impl Operator<B, L>,
-        modes: Vec<Modes<B>>,
-        places: &[Point3<f64>],
-    ) -> (Self, Symmetric<RIGID, LANES>, Vec<Modes<RIGID>>, Vec<Point3<f64>>) {
+    /// Builds a level for a matrix whose nodes are at some places, in m.
+    fn new(matrix: &impl Operator<B, L>, modes: Vec<Modes<B>>, places: &[Point3<f64>]) -> (Self, Next) {
         // One thread forms the aggregates.
         let (aggregates, smoother) =
             rayon::join(|| Aggregates::of(matrix), || Smoother::new(matrix, places, SPECTRUM));
-        let (tentative, next_modes) = transfer::tentative(&aggregates, modes);
+        let (tentative, modes) = tentative(&aggregates, modes);
         let jacobi = Jacobi { inverse: |node: usize| smoother.inverse(node), largest: smoother.largest };
-        let prolongation = transfer::smoothed(matrix, &jacobi, &aggregates, &tentative);
+        let prolongation = smoothed(matrix, &jacobi, &aggregates, &tentative);
         drop(tentative);
         // The blocks stay where they are.
         let (prolongation, columns) = rayon::join(
-            || transfer::smoothed_again(matrix, &jacobi, &prolongation, &next_modes),
+            || smoothed_again(matrix, &jacobi, &prolongation, &modes),
             || Columns::of(&prolongation),
         );
-        let next = transfer::galerkin(matrix, &prolongation, &columns);
+        let next = galerkin(matrix, &prolongation, &columns);
         drop(columns);
         let transfer = Transfer::new(prolongation);
         let residual = vec![[0.0; L]; matrix.nodes()];
         let coarse = vec![[0.0; LANES]; aggregates.count];
-        let level = Self { smoother, transfer, residual, coarse };
-        (level, next, next_modes, aggregates.centers(places))
+        let next = Next { matrix: next, modes, places: aggregates.centers(places) };
+        (Self { smoother, transfer, residual, coarse }, next)
     }
 
     /// Smooths from zero, and keeps the residual.

@@ -226,11 +226,11 @@ fn noise(n: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::symmetric::{Rows, Symmetric};
+    use crate::symmetric::{Symmetric, UpperRows};
 
     /// A symmetric band, in which each node has some neighbors on both sides.
     fn band(count: usize) -> Symmetric<6, 8> {
-        let rows = Rows::of(0..count, count, |sums, row| {
+        let rows = UpperRows::of(0..count, count, |sums, row| {
             for column in row..(row + 7).min(count) {
                 let strength = if row == column { 20.0 } else { f64::from(noise(7 * row + column)) };
                 for n in 0..6 {

@@ -11,7 +11,7 @@ use cutis_constraints::prefetch;
 use rayon::prelude::*;
 use simba::simd::{SimdValue, WideF32x4};
 
-use crate::blocks::{AHEAD, Block, PADDING, ROWS, Sums, divided, transposed};
+use crate::blocks::{AHEAD, Block, BlockRows, PADDING, ROWS, Sums, divided, transposed};
 use crate::smoother::Operator;
 
 /// Blocks below the diagonal after the present one that are fetched into the cache.
@@ -229,17 +229,14 @@ pub(crate) struct Symmetric<const B: usize, const L: usize> {
 
 /// Some rows of a symmetric matrix.
 #[derive(Default)]
-pub(crate) struct Rows<const B: usize> {
-    /// The ends of the rows among the blocks above the diagonal.
-    ends: Vec<usize>,
-    columns: Vec<u32>,
+pub(crate) struct UpperRows<const B: usize> {
     /// The blocks above the diagonal.
-    values: Vec<f32>,
+    above: BlockRows<B, B>,
     /// The blocks on the diagonal.
     diagonal: Vec<f32>,
 }
 
-impl<const B: usize> Rows<B> {
+impl<const B: usize> UpperRows<B> {
     /// Rows of a matrix with this many columns, in parts. `row` adds the blocks of a row to the
     /// sums, on the diagonal and above.
     pub fn of(rows: Range<usize>, width: usize, row: impl Fn(&mut Sums<B, B>, usize) + Sync) -> Vec<Self> {
@@ -249,8 +246,7 @@ impl<const B: usize> Rows<B> {
             for n in start..(start + ROWS).min(rows.end) {
                 row(sums, n);
                 to.diagonal.extend(sums.at(n).as_flattened().iter().map(|&x| x as f32));
-                sums.append_from(n + 1, &mut to.columns, &mut to.values);
-                to.ends.push(to.columns.len());
+                to.above.push(sums, n + 1);
             }
             to
         };
@@ -259,20 +255,20 @@ impl<const B: usize> Rows<B> {
     }
 }
 
-impl<const B: usize, const L: usize> From<Vec<Rows<B>>> for Symmetric<B, L> {
+impl<const B: usize, const L: usize> From<Vec<UpperRows<B>>> for Symmetric<B, L> {
     /// The matrix with all rows.
-    fn from(rows: Vec<Rows<B>>) -> Self {
+    fn from(rows: Vec<UpperRows<B>>) -> Self {
         let mut starts = vec![0];
         for part in &rows {
             let before = starts[starts.len() - 1];
-            starts.extend(part.ends.iter().map(|end| before + end));
+            starts.extend(part.above.ends.iter().map(|end| before + end));
         }
         let count = starts[starts.len() - 1];
         let mut later = Vec::with_capacity(count);
-        rows.iter().for_each(|part| later.extend_from_slice(&part.columns));
+        rows.iter().for_each(|part| later.extend_from_slice(&part.above.columns));
         let mut values = vec![0.0; B * B * count + PADDING];
-        let pieces = divided(&mut values, rows.iter().map(|part| part.values.len()));
-        pieces.into_par_iter().zip(&rows).for_each(|(to, part)| to.copy_from_slice(&part.values));
+        let pieces = divided(&mut values, rows.iter().map(|part| part.above.values.len()));
+        pieces.into_par_iter().zip(&rows).for_each(|(to, part)| to.copy_from_slice(&part.above.values));
         let padded = |block: &[f32]| -> [[f32; L]; B] {
             std::array::from_fn(|column| {
                 std::array::from_fn(|row| if row < B { block[B * column + row] } else { 0.0 })
@@ -330,7 +326,7 @@ mod tests {
                 if (row, i) <= (column, j) { [(row, i), (column, j)] } else { [(column, j), (row, i)] };
             f64::from(number(((row * COUNT + column) * 6 + i) * 6 + j) as f32)
         };
-        let rows = Rows::of(0..COUNT, COUNT, |sums, row| {
+        let rows = UpperRows::of(0..COUNT, COUNT, |sums, row| {
             for column in (row..COUNT).filter(|&column| has(row, column)) {
                 let block = sums.at(column);
                 for (j, of_column) in block.iter_mut().enumerate() {
