@@ -32,8 +32,8 @@ pub(crate) trait Equations {
     /// same way.
     fn turn(&mut self, ratio: f32) -> Result<Turn, RestError>;
 
-    /// The solution times `largest`. If `x` is still zero, `z` times `largest`.
-    fn end(&mut self, largest: f64) -> Result<Vec<Vector3<f64>>, RestError>;
+    /// Adds `length · direction` to `x`, and returns the solution times `largest`.
+    fn end(&mut self, length: f32, largest: f64) -> Result<Vec<Vector3<f64>>, RestError>;
 }
 
 /// Inner products of the first cycle.
@@ -68,7 +68,8 @@ pub(crate) struct Turn {
 /// preconditioner, is `tolerance` of that at zero, and the way that is still to come, as the last
 /// steps suggest, is `tolerance` of the length of `x`. The residual alone says little about the
 /// length where some forces are much stiffer than others. Ends early where the matrix is not
-/// positive definite.
+/// positive definite. In the end the solution moves along the direction that the last cycle found,
+/// which needs no cycle.
 ///
 /// The product of the matrix and a direction follows from those of the cycles, which have them at
 /// hand (Chronopoulos and Gear, J. Comput. Appl. Math. 25, 1989).
@@ -84,7 +85,7 @@ pub(crate) fn solve(
     let first = energy;
     // Of `x`.
     let mut square = 0.0;
-    let (mut cycles, mut indefinite) = (1, false);
+    let (mut cycles, mut indefinite, mut is_spent) = (1, false, false);
     let mut steps = Steps::default();
     while cycles < most_cycles
         && energy > 0.0
@@ -99,6 +100,7 @@ pub(crate) fn solve(
         square = after.square;
         cycles += 1;
         if after.energy.is_nan() || after.energy <= 0.0 {
+            is_spent = true;
             break;
         }
         let ratio = (after.energy / energy) as f32;
@@ -107,7 +109,14 @@ pub(crate) fn solve(
         steps.push(length, turn.square, turn.along);
         curvature = turn.curvature;
     }
-    Ok(Solution { x: equations.end(largest)?, cycles, indefinite })
+    let last = match energy / curvature {
+        _ if is_spent => 0.0,
+        length if energy > 0.0 && curvature > 0.0 => length,
+        // There is no other solution than the result of the first cycle.
+        _ if cycles == 1 => 1.0,
+        _ => 0.0,
+    };
+    Ok(Solution { x: equations.end(last as f32, largest)?, cycles, indefinite })
 }
 
 /// The last steps of an iteration. The length of a single one says little, so they count in pairs.
@@ -135,5 +144,57 @@ impl Steps {
         let [.., before, _, last] = self.pairs[..] else { return f64::INFINITY };
         let ratio = (last / before).max(0.5);
         if ratio < 1.0 { last * ratio / (1.0 - ratio) } else { f64::INFINITY }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::Body;
+    use crate::curvature::Curvature;
+    use crate::host::{HostEquations, Vectors, unscaled};
+    use crate::multigrid::Multigrid;
+    use crate::settle::dot;
+    use crate::smoother::Operator;
+    use crate::springs::block;
+
+    /// The solution after some cycles uses the result of the last one: what is left is orthogonal
+    /// to it.
+    #[test]
+    fn each_cycle_gives_a_direction_of_the_solution() {
+        let body = Body::of(&block(), [0.0; 3]).unwrap();
+        let mut matrix = body.empty_matrix();
+        body.fill(&mut matrix, &body.start, Curvature::Stretched, 0.0);
+        let places: Vec<_> = body.free.iter().map(|&v| body.start[v as usize]).collect();
+        let mut multigrid = Multigrid::new(&matrix, &places);
+        let right: Vec<_> = places.iter().map(|x| Vector3::new((40.0 * x.z).sin(), x.x, 1.0)).collect();
+        let residual = |x: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
+            let of_row = |row: usize| {
+                let mut left = right[row];
+                matrix.for_each(row, |column, block| left -= Matrix3::from(block) * x[column]);
+                left
+            };
+            (0..x.len()).map(of_row).collect()
+        };
+        let mut vectors = Vectors::default();
+        let mut before = vec![Vector3::zeros(); right.len()];
+        for most in 1..5 {
+            let mut equations =
+                HostEquations { matrix: &matrix, multigrid: &mut multigrid, vectors: &mut vectors };
+            let found = solve(&mut equations, &right, 0.0, most).unwrap();
+            assert_eq!((found.cycles, found.indefinite), (most, false));
+            let left = residual(&before);
+            equations.begin(&left, 1.0).unwrap();
+            let cycle: Vec<_> = vectors.z.iter().map(|z| unscaled(z, 1.0)).collect();
+            let along = dot(&residual(&found.x), &cycle) / dot(&left, &cycle);
+            assert!(along.abs() < 1e-4, "{along:e} after {most} cycles");
+            // Control: of a shorter last direction as much is left as is missing.
+            let shorter: Vec<_> = before.iter().zip(&found.x).map(|(a, b)| a + (b - a) * 0.9).collect();
+            let along = dot(&residual(&shorter), &cycle) / dot(&left, &cycle);
+            assert!((along - 0.1).abs() < 1e-2, "control: {along}");
+            before = found.x;
+        }
     }
 }

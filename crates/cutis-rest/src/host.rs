@@ -16,7 +16,7 @@ pub(crate) struct Vectors {
     x: Vector<4>,
     residual: Vector<4>,
     /// The preconditioned residual, and the matrix times it.
-    z: Vector<4>,
+    pub z: Vector<4>,
     z_product: Vector<4>,
     direction: Vector<4>,
     /// The matrix times the direction.
@@ -57,11 +57,12 @@ impl Equations for HostEquations<'_> {
         Ok(turn(direction, product, ratio, z, z_product))
     }
 
-    fn end(&mut self, largest: f64) -> Result<Vec<Vector3<f64>>, RestError> {
-        let Vectors { x, z, .. } = self.vectors;
-        let x = if x.par_iter().with_min_len(ROWS).all(|x| *x == [0.0; 4]) { z } else { x };
-        let unscaled = |x: &[f32; 4]| unscaled(x, largest);
-        Ok(x.par_iter().with_min_len(ROWS).map(unscaled).collect())
+    fn end(&mut self, length: f32, largest: f64) -> Result<Vec<Vector3<f64>>, RestError> {
+        let Vectors { x, direction, .. } = &*self.vectors;
+        let moved = |(x, direction): (&[f32; 4], &[f32; 4])| {
+            unscaled(&std::array::from_fn(|n| x[n] + length * direction[n]), largest)
+        };
+        Ok(x.par_iter().zip(direction).with_min_len(ROWS).map(moved).collect())
     }
 }
 

@@ -34,6 +34,7 @@ mod advance;
 mod aggregates;
 mod blocks;
 mod body;
+mod compression;
 mod conjugate;
 mod constraints;
 mod curvature;

@@ -1,8 +1,9 @@
 //! Multigrid by smoothed aggregation: a preconditioner for the equations of an elastic body.
 //!
 //! Each level groups the nodes of the level before. A group moves like a rigid body: it has six
-//! unknowns. The prolongation from these is smoothed by two steps of Jacobi's method (Vaněk, Mandel
-//! and Brezina, Computing 56, 1996), of which the second adds no blocks. The levels come from the
+//! unknowns. The prolongation from these is smoothed by a step of Jacobi's method (Vaněk, Mandel
+//! and Brezina, Computing 56, 1996). Below the finest level, where that costs little, and in nearly
+//! incompressible bodies a second step follows, which adds no blocks. The levels come from the
 //! matrix alone, so they follow cuts and work for every mesh and every type of constraint.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Point3};
@@ -10,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::aggregates::Aggregates;
 use crate::blocks::Columns;
+use crate::compression::compression_over_shear;
 use crate::galerkin::galerkin;
 use crate::matrix::Matrix;
 use crate::patch::Patch;
@@ -25,6 +27,9 @@ pub(crate) const RIGID: usize = 6;
 pub(crate) const LANES: usize = 8;
 /// The share of the spectrum that a smoother leaves to the next level.
 const SPECTRUM: f32 = 0.08;
+/// The finest prolongation is smoothed twice if the resistance to compression is this many times
+/// that to shear: where the bulk modulus is some thirty times Young's modulus.
+const NEARLY_INCOMPRESSIBLE: f64 = 80.0;
 /// A level with at most this many nodes is solved directly.
 const BOTTOM: usize = 150;
 
@@ -76,13 +81,14 @@ impl Multigrid {
         }
         let patch = Patch::of(matrix, places);
         let modes = places.par_iter().map(rigid_modes).collect();
-        let (fine, mut next) = Level::new(matrix, modes, places);
+        let twice = compression_over_shear(matrix, places) > NEARLY_INCOMPRESSIBLE;
+        let (fine, mut next) = Level::new(matrix, modes, places, twice);
         let mut coarse = Vec::new();
         while next.matrix.nodes() > BOTTOM {
             let Next { matrix, modes, places } = next;
             let before = matrix.nodes();
             let level;
-            (level, next) = Level::new(&matrix, modes, &places);
+            (level, next) = Level::new(&matrix, modes, &places, true);
             coarse.push(Coarse { matrix, level });
             if next.matrix.nodes() * 10 > before * 9 {
                 break;
@@ -153,8 +159,14 @@ fn below(levels: &mut [Coarse], bottom: &Bottom, right: &[[f32; LANES]], to: &mu
 }
 
 impl<const B: usize, const L: usize> Level<B, L> {
-    /// Builds a level for a matrix whose nodes are at some places, in m.
-    fn new(matrix: &impl Operator<B, L>, modes: Vec<Modes<B>>, places: &[Point3<f64>]) -> (Self, Next) {
+    /// Builds a level for a matrix whose nodes are at some places, in m. `twice` smooths the
+    /// prolongation a second time.
+    fn new(
+        matrix: &impl Operator<B, L>,
+        modes: Vec<Modes<B>>,
+        places: &[Point3<f64>],
+        twice: bool,
+    ) -> (Self, Next) {
         // One thread forms the aggregates.
         let (aggregates, smoother) =
             rayon::join(|| Aggregates::of(matrix), || Smoother::new(matrix, places, SPECTRUM));
@@ -162,11 +174,10 @@ impl<const B: usize, const L: usize> Level<B, L> {
         let jacobi = Jacobi { inverse: |node: usize| smoother.inverse(node), largest: smoother.largest };
         let prolongation = smoothed(matrix, &jacobi, &aggregates, &tentative);
         drop(tentative);
-        // The blocks stay where they are.
-        let (prolongation, columns) = rayon::join(
-            || smoothed_again(matrix, &jacobi, &prolongation, &modes),
-            || Columns::of(&prolongation),
-        );
+        let again = || smoothed_again(matrix, &jacobi, &prolongation, &modes);
+        // A second step leaves the blocks where they are.
+        let (again, columns) = rayon::join(|| twice.then(again), || Columns::of(&prolongation));
+        let prolongation = again.unwrap_or(prolongation);
         let next = galerkin(matrix, &prolongation, &columns);
         drop(columns);
         let transfer = Transfer::new(prolongation);

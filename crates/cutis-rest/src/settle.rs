@@ -18,11 +18,11 @@ use crate::{Body, Options, Rest, RestError, Step};
 
 /// Accuracy of the equations of the first step, of which a rough solution would leave the largest
 /// part of the way.
-const FIRST_TOLERANCE: f64 = 0.05;
+const FIRST_TOLERANCE: f64 = 0.07;
 /// Accuracy of the equations of a later step without the exact second derivatives, and with them.
-const TOLERANCES: [f64; 2] = [0.15, 0.1];
+const TOLERANCES: [f64; 2] = [0.2, 0.14];
 /// Relative error of a displacement over the tolerance of its equations.
-const SOLVED: f64 = 2.5;
+const SOLVED: f64 = 2.2;
 /// Length of a step over the displacement from the start, below which the next step uses the exact
 /// second derivatives.
 const NEAR: f64 = 0.003;

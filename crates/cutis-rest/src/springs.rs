@@ -12,6 +12,11 @@ pub(crate) fn block() -> System<f64> {
     block_of(Kuhn::new(CELLS, SPACING_M), |_| 1e-9)
 }
 
+/// The block with a bulk modulus in Pa.
+pub(crate) fn block_with_bulk_modulus(bulk_modulus_pa: f64) -> System<f64> {
+    block_of(Kuhn::new(CELLS, SPACING_M), |volume_m3| volume_m3 / bulk_modulus_pa)
+}
+
 /// The block with a bulk modulus of 100 kPa, and with flat tetrahedra between two planes, as at the
 /// walls of a cut: their vertices are between an edge and a three hundredth of it apart.
 pub(crate) fn flat_block() -> System<f64> {
@@ -27,7 +32,8 @@ pub(crate) fn flat_block() -> System<f64> {
 /// The height of the flat tetrahedra.
 pub(crate) const FLAT_M: Range<f64> = 0.15..0.45;
 const CELLS: [usize; 3] = [10, 10, 60];
-const SPACING_M: f64 = 0.01;
+pub(crate) const SPACING_M: f64 = 0.01;
+pub(crate) const STIFFNESS_N_PER_M: f64 = 100.0;
 
 /// Springs and volumes. `compliance` is that of a tetrahedron with a volume in m³.
 fn block_of(mesh: Kuhn, compliance: impl Fn(f64) -> f64) -> System<f64> {
@@ -36,7 +42,7 @@ fn block_of(mesh: Kuhn, compliance: impl Fn(f64) -> f64) -> System<f64> {
     let inverse_masses: Vec<f64> = positions.iter().map(inverse_mass).collect();
     let colors = cutis_coloring::greedy(&edges, positions.len()).unwrap();
     let of_tets = cutis_coloring::greedy(&tets, positions.len()).unwrap();
-    let springs = Stiffness::compliance(1e-2);
+    let springs = Stiffness::compliance(1.0 / STIFFNESS_N_PER_M);
     let of_tet = |tet: &[u32; 4]| {
         let [a, b, c, d] = tet.map(|v| positions[v as usize]);
         compliance((b - a).cross(&(c - a)).dot(&(d - a)).abs() / 6.0)

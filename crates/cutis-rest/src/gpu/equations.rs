@@ -220,11 +220,12 @@ impl Equations for GpuEquations {
         Ok(Turn { square, along, curvature })
     }
 
-    fn end(&mut self, largest: f64) -> Result<Vec<Vector3<f64>>, RestError> {
-        let mut x = self.read(&self.vectors.x)?;
-        if x.par_iter().with_min_len(ROWS).all(|&x| x == 0.0) {
-            x = self.read(&self.vectors.z)?;
-        }
+    fn end(&mut self, length: f32, largest: f64) -> Result<Vec<Vector3<f64>>, RestError> {
+        self.write_factor(length)?;
+        let mut pass = self.gpu.pass("rest: end");
+        pass.dispatch(&self.kernels.vectors.advance, &[&self.advance], self.threads());
+        pass.submit()?;
+        let x = self.read(&self.vectors.x)?;
         let (nodes, _) = x.as_chunks();
         Ok(nodes.par_iter().with_min_len(ROWS).map(|x| unscaled(x, largest)).collect())
     }

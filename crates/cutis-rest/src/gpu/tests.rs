@@ -381,7 +381,7 @@ fn a_lost_device_and_vectors_that_do_not_fit_are_errors() {
         assert!(lost(equations.begin(&problem.right, 1.0).err().unwrap()));
         assert!(lost(equations.advance(1.0).err().unwrap()));
         assert!(lost(equations.turn(1.0).err().unwrap()));
-        assert!(lost(equations.end(1.0).err().unwrap()));
+        assert!(lost(equations.end(0.5, 1.0).err().unwrap()));
         assert!(lost(equations.load(&problem.matrix, &problem.multigrid).err().unwrap().into()));
         assert!(lost(device.equations(10).err().unwrap()) && lost(RestGpu::new(gpu).err().unwrap()));
     });
