@@ -5,29 +5,34 @@ use nalgebra::Point3;
 use crate::matrix::Matrix;
 use crate::smoother::Operator;
 
-/// The most rows that are looked at.
-const MOST_ROWS: usize = 4096;
+/// Rows that count together, and the most groups of rows.
+const GROUP: usize = 2;
+const MOST_GROUPS: usize = 4096;
 
 /// The modulus of compression along an axis over the shear modulus, `(λ + 2μ)/μ` in an isotropic
-/// body: the median over some rows of the matrix, with nodes at these places. NaN without rows.
+/// body: the median over pairs of rows of the matrix, with nodes at these places. NaN without rows.
 ///
 /// Inside a body of one material, a row times the displacement `x_b² e_a` around its node is
 /// `−2V c`, with the volume `V` of a node. `c` is the modulus of compression for `a = b`, and the
 /// shear modulus otherwise.
 pub(crate) fn compression_over_shear(matrix: &Matrix, places: &[Point3<f64>]) -> f64 {
-    let of_row = |row: usize| {
+    let nodes = matrix.nodes();
+    // The rows of neighboring nodes count together, because a lattice may have two kinds of nodes.
+    let of_group = |first: usize| {
         let (mut along, mut across) = (0.0, 0.0);
-        matrix.for_each(row, |column, block| {
-            let squares = (places[column] - places[row]).map(|x| x * x);
-            for (a, of_column) in block.iter().enumerate() {
-                along += of_column[a] * squares[a];
-                across += of_column[a] * (squares.sum() - squares[a]) / 2.0;
-            }
-        });
+        for row in first..(first + GROUP).min(nodes) {
+            matrix.for_each(row, |column, block| {
+                let squares = (places[column] - places[row]).map(|x| x * x);
+                for (a, of_column) in block.iter().enumerate() {
+                    along += of_column[a] * squares[a];
+                    across += of_column[a] * (squares.sum() - squares[a]) / 2.0;
+                }
+            });
+        }
         along / across
     };
-    let step = matrix.nodes().div_ceil(MOST_ROWS).max(1);
-    let mut ratios: Vec<f64> = (0..matrix.nodes()).step_by(step).map(of_row).collect();
+    let step = nodes.div_ceil(MOST_GROUPS).max(GROUP);
+    let mut ratios: Vec<f64> = (0..nodes).step_by(step).map(of_group).collect();
     ratios.sort_unstable_by(f64::total_cmp);
     ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN)
 }
@@ -37,7 +42,7 @@ mod tests {
     use super::*;
     use crate::Body;
     use crate::curvature::Curvature;
-    use crate::springs::{SPACING_M, STIFFNESS_N_PER_M, block_with_bulk_modulus};
+    use crate::springs::{SPACING_M, STIFFNESS_N_PER_M, cube_with_bulk_modulus};
 
     /// A node has springs to six neighbors at `h`, six at `√2 h` and two at `√3 h`. They sum to
     /// `14 k h²` along the axes and to `5 k h²` across. Volumes add `2 K h³` for each axis.
@@ -45,7 +50,7 @@ mod tests {
     fn springs_and_volumes_have_the_ratio_of_their_lattice() {
         let spring = STIFFNESS_N_PER_M * SPACING_M.powi(2);
         for bulk_modulus_pa in [1.0, 1e4, 1e6] {
-            let body = Body::of(&block_with_bulk_modulus(bulk_modulus_pa), [0.0; 3]).unwrap();
+            let body = Body::of(&cube_with_bulk_modulus(bulk_modulus_pa), [0.0; 3]).unwrap();
             let mut matrix = body.empty_matrix();
             body.fill(&mut matrix, &body.start, Curvature::Stretched, 0.0);
             let places: Vec<_> = body.free.iter().map(|&v| body.start[v as usize]).collect();

@@ -12,9 +12,9 @@ pub(crate) fn block() -> System<f64> {
     block_of(Kuhn::new(CELLS, SPACING_M), |_| 1e-9)
 }
 
-/// The block with a bulk modulus in Pa.
-pub(crate) fn block_with_bulk_modulus(bulk_modulus_pa: f64) -> System<f64> {
-    block_of(Kuhn::new(CELLS, SPACING_M), |volume_m3| volume_m3 / bulk_modulus_pa)
+/// A cube with a bulk modulus in Pa, most of whose vertices have neighbors on all sides.
+pub(crate) fn cube_with_bulk_modulus(bulk_modulus_pa: f64) -> System<f64> {
+    block_of(Kuhn::new([24; 3], SPACING_M), |volume_m3| volume_m3 / bulk_modulus_pa)
 }
 
 /// The block with a bulk modulus of 100 kPa, and with flat tetrahedra between two planes, as at the
