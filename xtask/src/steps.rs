@@ -166,7 +166,7 @@ fn third_party(workspace: &Workspace) -> Result<()> {
 }
 
 /// Studies that measure time in their own process and need a release build.
-const TIMED_STUDIES: [&str; 2] = ["accuracy", "chainmail"];
+const TIMED_STUDIES: [&str; 5] = ["accuracy", "at-rest", "chainmail", "rest", "speed"];
 
 /// `cargo run` of a study.
 pub fn study_command(workspace: &Workspace, name: &str, options: &[&str]) -> Command {
@@ -272,6 +272,14 @@ mod tests {
         assert_eq!(lines.len(), 4);
         assert!(lines[1].starts_with("tests") && lines[1].contains("FAILED") && lines[1].ends_with("1.0 s"));
         assert!(lines[2].ends_with("not reached"));
+    }
+
+    #[test]
+    fn a_study_that_measures_time_is_built_as_a_release() {
+        let workspace = Workspace { root: ".".into(), ci: false };
+        let is_release =
+            |name: &str| study_command(&workspace, name, &[]).get_args().any(|a| a == "--release");
+        assert!(TIMED_STUDIES.iter().all(|name| is_release(name)) && !is_release("parity"));
     }
 
     #[test]
