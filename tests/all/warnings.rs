@@ -17,6 +17,7 @@ fn skin_that_is_too_stiff_for_the_substeps_causes_a_warning() {
     assert!(!warns(&[stiff, ("solver.substeps", "1000")], "stiffer than"));
     assert!(!warns(&[stiff, ("solver.iterations", "100")], "stiffer than"));
     assert!(!warns(&[("constraints.stc.area_modulus_n_per_m", "1.0")], "stiffer than"));
+    assert!(!warns(&[stiff, ("run.until", "rest")], "stiffer than"), "the search needs no substeps");
 }
 
 #[test]
@@ -32,6 +33,7 @@ fn a_membrane_that_is_too_stiff_for_the_substeps_causes_a_warning() {
 fn substeps_that_lose_tension_to_rounding_cause_a_warning() {
     let lost = |substeps| warns(&[("solver.substeps", substeps)], "rounding loses about");
     assert!(lost("3000") && !lost("10") && !lost("100"));
+    assert!(!warns(&[("solver.substeps", "3000"), ("run.until", "rest")], "rounding loses about"));
 }
 
 /// A plate of 18 mm on the belly, which is two lattice steps thick, is thin. Control: one of 60 mm

@@ -46,38 +46,12 @@ pub(crate) enum Command {
         json: bool,
     },
     /// Run a scene
-    Run {
-        /// Scene file (TOML)
-        scene: PathBuf,
-        /// Run folder [default: the scene's name with `-run`, in the current folder]
-        #[arg(long)]
-        out: Option<PathBuf>,
-        #[command(flatten)]
-        change: Change,
-        /// Resume from the checkpoint in the run folder, or begin if a run with checkpoints has
-        /// written none yet
-        #[arg(long)]
-        resume: bool,
-        /// Print report.json on standard output
-        #[arg(long)]
-        json: bool,
-    },
+    Run(RunArgs),
     /// Find where a wound ends up: straight to the state of rest, without the motion
     ///
     /// Frames are computed first only if something happens over time in the scene: cuts that grow,
     /// sutures, handles.
-    Settle {
-        /// Scene file (TOML)
-        scene: PathBuf,
-        /// Run folder [default: the scene's name with `-run`, in the current folder]
-        #[arg(long)]
-        out: Option<PathBuf>,
-        #[command(flatten)]
-        change: Change,
-        /// Print report.json on standard output
-        #[arg(long)]
-        json: bool,
-    },
+    Settle(RunArgs),
     /// Show what a scene would cost: sizes, memory, time, and what it skips
     Check {
         /// Scene file (TOML)
@@ -263,6 +237,25 @@ pub(crate) enum SceneCommand {
     ReportSchema,
     /// JSON schema of a study, which `cutis sweep` runs
     StudySchema,
+}
+
+/// A scene to run, and where.
+#[derive(Clone, Debug, Group)]
+pub(crate) struct RunArgs {
+    /// Scene file (TOML)
+    pub(crate) scene: PathBuf,
+    /// Run folder [default: the scene's name with `-run`, in the current folder]
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) change: Change,
+    /// Resume from the checkpoint in the run folder, or begin if a run with checkpoints has written
+    /// none yet
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Print report.json on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// A volume, and how to read it.

@@ -32,7 +32,7 @@ pub(crate) fn stage_ended() {
 pub(crate) struct Interruptible {
     /// The run folder.
     pub(crate) out: PathBuf,
-    /// Whether the command can resume, as `cutis run` can.
+    /// Whether the command can resume, as `cutis run` and `cutis settle` can.
     pub(crate) can_resume: bool,
     /// Whether the run itself resumed from a checkpoint.
     pub(crate) resumed: bool,
@@ -40,9 +40,9 @@ pub(crate) struct Interruptible {
 
 impl Interruptible {
     /// Waits for Ctrl-C in the background. A run that can be resumed then ends after the present
-    /// frame and saves its state. Everything else ends at once, and so does a run at the second
-    /// Ctrl-C. Without a handler, which a system may refuse, Ctrl-C ends the program as it always
-    /// does.
+    /// frame or search for rest, and saves its state. Everything else ends at once, and so does a
+    /// run at the second Ctrl-C. Without a handler, which a system may refuse, Ctrl-C ends the
+    /// program as it always does.
     #[expect(
         clippy::disallowed_methods,
         reason = "the run goes on in other threads; its partial files are removed"
@@ -52,7 +52,9 @@ impl Interruptible {
         let _ = ctrlc::set_handler(move || {
             let is_first = !PRESSED.swap(true, Ordering::SeqCst);
             if is_first && self.can_resume && ASKS.load(Ordering::SeqCst) {
-                terminal::interrupted("the run ends after this frame; Ctrl-C again ends it at once");
+                terminal::interrupted(
+                    "the run ends after this frame or search; Ctrl-C again ends it at once",
+                );
                 return;
             }
             terminal::interrupted(&self.message(start));
@@ -79,9 +81,10 @@ impl Interruptible {
         match (self.can_resume, is_ours) {
             (true, true) => Self::saved(&checkpoint, self.resumed),
             (true, false) => "interrupted; there is no checkpoint of this run to resume from: \
-                              run.checkpoint_every = 10 saves its state after every tenth frame"
+                              run.checkpoint_every = 10 saves its state after every tenth frame, \
+                              and after each search for rest"
                 .into(),
-            (false, _) => "interrupted; only `cutis run` with run.checkpoint_every can be resumed".into(),
+            (false, _) => "interrupted; only `cutis run` and `cutis settle` can be resumed".into(),
         }
     }
 }

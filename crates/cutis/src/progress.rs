@@ -19,8 +19,9 @@ pub trait Progress: Sync {
     fn end(&self);
     /// A note to the user. Each note is sent once.
     fn note(&self, message: &str);
-    /// Whether the user asked for the end of the run. A run asks before each frame. It then writes
-    /// a checkpoint and returns [`Error::Interrupted`](crate::Error::Interrupted).
+    /// Whether the user asked for the end of the run. A run asks before each frame, and before and
+    /// after each search for a state of rest. It then writes a checkpoint and returns
+    /// [`Error::Interrupted`](crate::Error::Interrupted).
     fn is_stopped(&self) -> bool {
         false
     }

@@ -19,10 +19,8 @@ pub(crate) fn run(command: Command) -> Result<u8, Error> {
     let done = match command {
         Command::Sweep { study, args } => return sweep::sweep(&study, &args),
         Command::Demo { out, change, json } => simulate::demo(&out, &change, json),
-        Command::Run { scene, out, change, resume, json } => {
-            simulate::run(&scene, out, &change, resume, json)
-        }
-        Command::Settle { scene, out, change, json } => simulate::settle(&scene, out, &change, json),
+        Command::Run(args) => simulate::run(args),
+        Command::Settle(args) => simulate::settle(args),
         Command::Check { scene, change, lattice, json } => simulate::check(&scene, &change, lattice, json),
         Command::Tune { scene, tune: args, change, json } => tune::tune(&scene, &change, &args, json),
         Command::Resample { scene, run, input, out, change } => {

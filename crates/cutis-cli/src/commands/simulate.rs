@@ -7,7 +7,7 @@ use cutis::volume::sample::LatticeSize;
 use cutis::{Error, LoadedScene, Override, Progress, ResampleRequest, RunOptions, Scene};
 
 use super::{plan_table, pretty};
-use crate::args::Change;
+use crate::args::{Change, RunArgs};
 use crate::interrupt::Interruptible;
 use crate::terminal::{self, Terminal, print};
 
@@ -23,14 +23,12 @@ pub(crate) fn demo(out: &Path, change: &Change, json: bool) -> Result<(), Error>
     finish(&loaded, RunOptions { out: out.into(), resume: false }, json)
 }
 
-pub(crate) fn settle(scene: &Path, out: Option<PathBuf>, change: &Change, json: bool) -> Result<(), Error> {
-    let loaded = settled(&[], change, |overrides| {
+pub(crate) fn settle(args: RunArgs) -> Result<(), Error> {
+    let loaded = settled(&[], &args.change, |overrides| {
         let until = Override { key: "run.until".into(), value: "rest".into() };
-        Scene::load(scene, &[overrides, &[until]].concat())
+        Scene::load(&args.scene, &[overrides, &[until]].concat())
     })?;
-    let out = out.unwrap_or_else(|| folder(scene));
-    Interruptible { out: out.clone(), can_resume: false, resumed: false }.watch();
-    finish(&loaded, RunOptions { out, resume: false }, json)
+    resumable(&loaded, args)
 }
 
 /// A scene with keys that the user may change, and without frames.
@@ -45,17 +43,18 @@ fn settled(
     Ok(change.applied(load(&overrides)?))
 }
 
-pub(crate) fn run(
-    scene: &Path,
-    out: Option<PathBuf>,
-    change: &Change,
-    resume: bool,
-    json: bool,
-) -> Result<(), Error> {
+pub(crate) fn run(args: RunArgs) -> Result<(), Error> {
+    let RunArgs { scene, change, .. } = &args;
     let loaded = change.applied(Scene::load(scene, &change.overrides(None))?);
-    let options = RunOptions { out: out.unwrap_or_else(|| folder(scene)), resume };
+    resumable(&loaded, args)
+}
+
+/// A run whose state is saved when Ctrl-C ends it.
+fn resumable(loaded: &LoadedScene, args: RunArgs) -> Result<(), Error> {
+    let RunArgs { scene, out, resume, json, .. } = args;
+    let options = RunOptions { out: out.unwrap_or_else(|| folder(&scene)), resume };
     Interruptible { out: options.out.clone(), can_resume: true, resumed: resume }.watch();
-    finish(&loaded, options, json).inspect_err(|error| {
+    finish(loaded, options, json).inspect_err(|error| {
         if let Error::Interrupted { checkpoint, .. } = error {
             terminal::interrupted(&Interruptible::saved(checkpoint, resume));
         }

@@ -3,13 +3,18 @@
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::{Desk, PROGRAM};
+use crate::{Desk, PROGRAM, SCENE};
 
-/// Starts a long run, waits until `ready` exists, sends SIGINT, and returns exit code and standard
-/// error.
-#[expect(clippy::disallowed_methods, reason = "a file of another process is no event to wait for")]
+/// Starts a long run, and interrupts it when `ready` exists.
 fn interrupt(desk: &Desk, options: &[&str], ready: &str) -> (Option<i32>, String) {
     let args = [&["run", "scene.toml", "--out", "run", "--frames", "1000000"], options].concat();
+    interrupt_command(desk, &args, ready)
+}
+
+/// Starts a command, waits until `ready` exists, sends SIGINT, and returns exit code and standard
+/// error.
+#[expect(clippy::disallowed_methods, reason = "a file of another process is no event to wait for")]
+fn interrupt_command(desk: &Desk, args: &[&str], ready: &str) -> (Option<i32>, String) {
     let mut command = Command::new(PROGRAM);
     command.args(args).current_dir(desk.path(".")).stdout(Stdio::null()).stderr(Stdio::piped());
     let child = command.spawn().unwrap();
@@ -84,4 +89,30 @@ fn an_interrupted_run_before_its_frames_says_so() {
     let last = text.trim_end().lines().last().unwrap();
     assert!(last.contains("run.checkpoint_every") && !last.contains("--resume"), "{text}");
     assert!(desk.names("run").is_empty());
+}
+
+/// A search for rest ends first. Then its state is saved, and `settle` goes on with what is done
+/// to the body next.
+#[test]
+fn an_interrupted_settle_resumes_with_the_next_state() {
+    let desk = Desk::new();
+    let scene = SCENE.replace("depth_mm = 20.0, width_mm = 10.0", "depth_mm = 20.0, at_s = 0.1");
+    desk.put("scene.toml", scene.replace("spacing_mm = 12.0", "spacing_mm = 10.0"));
+    let hook =
+        "handle=[{ at_mm = [46, 92, 0], radius_mm = 14, move_mm = [9, 4, 0], at_s = 1.5, over_s = 0.2 }]";
+    let settle = ["settle", "scene.toml", "--set", "run.checkpoint_every=1", "--set", hook];
+    let args = [&settle[..], &["--out", "run"]].concat();
+    let (code, text) = interrupt_command(&desk, &args, "run/checkpoint.bin");
+    assert_eq!(code, Some(130), "{text}");
+    assert!(text.contains("this frame or search") && text.trim_end().ends_with("--resume"), "{text}");
+    assert_eq!(desk.names("run"), ["checkpoint.bin"], "no partial file stays");
+    desk.cutis(&[&args[..], &["--resume"]].concat()).expect_success();
+    desk.cutis(&[&settle[..], &["--out", "whole"]].concat()).expect_success();
+    for file in ["checkpoint.bin", "deformed.nii.gz", "skin.vtu"] {
+        let [resumed, whole] = ["run", "whole"].map(|run| std::fs::read(desk.path(run).join(file)).unwrap());
+        assert!(resumed == whole, "{file} differs");
+    }
+    let report = std::fs::read_to_string(desk.path("run/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["stops"].as_array().unwrap().len(), 3, "{}", report["stops"]);
 }

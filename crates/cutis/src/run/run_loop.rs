@@ -176,11 +176,15 @@ impl RunLoop<'_> {
         }
         let total = SEARCH * count.saturating_sub(known) as u64;
         clock.stage_on(place, "search for the state of rest", total, |progress| {
-            for (n, (time_s, done)) in states.into_iter().enumerate().skip(known) {
-                if progress.is_stopped() {
-                    let frame = self.save(simulation, &settled, rows)?;
-                    return Err(Error::Interrupted { frame, checkpoint: self.folder.checkpoint() });
+            let end_if_stopped = |simulation: &mut dyn Simulation, settled: &Settled| {
+                if !progress.is_stopped() {
+                    return Ok(());
                 }
+                let frame = self.save(simulation, settled, rows)?;
+                Err(Error::Interrupted { frame, checkpoint: self.folder.checkpoint() })
+            };
+            end_if_stopped(simulation, &settled)?;
+            for (n, (time_s, done)) in states.into_iter().enumerate().skip(known) {
                 let start = Instant::now();
                 let mut bar = SearchBar::new(self.run.error);
                 let before = SEARCH * (n - known) as u64;
@@ -199,6 +203,7 @@ impl RunLoop<'_> {
                     self.save(simulation, &settled, rows)?;
                 }
                 progress.advance(before + SEARCH);
+                end_if_stopped(simulation, &settled)?;
             }
             Ok((settled, self.end(simulation)?))
         })

@@ -77,6 +77,7 @@ impl ConstraintModel {
         let parts = BodyParts {
             file,
             solver: &scene.solver,
+            until: scene.run.until,
             constraints: &scene.constraints,
             at_rest: scene.scan_is_at_rest,
             body,

@@ -140,6 +140,7 @@ impl GrowingWound {
         let parts = BodyParts {
             file,
             solver: &scene.solver,
+            until: scene.run.until,
             constraints: &scene.constraints,
             at_rest: scene.scan_is_at_rest,
             body,

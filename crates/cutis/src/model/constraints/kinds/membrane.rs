@@ -367,7 +367,7 @@ impl ConstraintKind for MembraneSection {
             warnings
                 .push("skin tension acts and nothing is fixed: the whole body may shrink and drift".into());
         }
-        if parts.solver.formulation == Formulation::Xpbd {
+        if parts.ends_by_xpbd() {
             warnings.extend(too_stiff(parts, self.frequency(parts)));
             let tension = |values: MembraneValues| values.laws.map(|law| law.tension_n_per_m);
             let most = self.values().map(tension).map_or(0.0, |[along, across]| along.max(across));

@@ -35,7 +35,7 @@ use super::elements::Elements;
 use crate::Error;
 use crate::body::Body;
 use crate::scene::validate::Check;
-use crate::scene::{Scene, SceneFile, SolverSection};
+use crate::scene::{RunEnd, Scene, SceneFile, SolverSection};
 
 /// Writes the section `constraints` of a scene and the table of its kinds from one list of rows.
 /// A row is the documentation, the key and the type of a section that is a [`ConstraintKind`].
@@ -182,6 +182,8 @@ impl fmt::Display for ScanTension {
 pub(crate) struct BodyParts<'a> {
     pub(crate) file: SceneFile<'a>,
     pub(crate) solver: &'a SolverSection,
+    /// When the run ends.
+    pub(crate) until: RunEnd,
     /// All kinds of the scene.
     pub(crate) constraints: &'a ConstraintsSection,
     /// Whether the scan shows the body in equilibrium.
@@ -199,6 +201,11 @@ impl BodyParts<'_> {
     /// Whether stiffness is a compliance in physical units, as in `xpbd` and `vbd`.
     fn compliant(&self) -> bool {
         self.solver.formulation != Formulation::Pbd
+    }
+
+    /// Whether frames of XPBD decide where the body ends, and not a search for the state of rest.
+    fn ends_by_xpbd(&self) -> bool {
+        self.solver.formulation == Formulation::Xpbd && self.until == RunEnd::Frames
     }
 
     /// Rest position of a vertex, local meters.

@@ -323,7 +323,7 @@ impl ConstraintKind for StcSection {
         }
         if parts.body.skin.is_empty() {
             warnings.push("no skin was found: skin tension has nothing to act on".to_owned());
-        } else if parts.solver.formulation == Formulation::Xpbd {
+        } else if parts.ends_by_xpbd() {
             warnings.extend(too_stiff(parts, self.frequency(parts)));
             warnings.extend(lost_in_rounding(parts, self.tension_n_per_m()));
         }
