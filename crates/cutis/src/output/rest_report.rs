@@ -120,12 +120,29 @@ impl RestReport {
     #[must_use]
     pub fn summary(&self) -> String {
         format!(
-            "at rest, with an estimated error of {:.2} % of the displacement: {} steps, {} multigrid cycles{}, {:.1} s",
-            100.0 * self.error,
+            "at rest, with an estimated error of {} % of the displacement: {} steps, {} multigrid cycles{}, {:.1} s",
+            percent(self.error),
             self.steps.len(),
             self.cycles(),
             if self.equations_on == "gpu" { " on the GPU" } else { "" },
             1e-3 * self.ms
         )
+    }
+}
+
+/// An estimated error in percent, as text: `0.28`. An estimate is never zero.
+pub(crate) fn percent(error: f64) -> String {
+    let percent = 100.0 * error;
+    if percent < 0.01 { "less than 0.01".to_owned() } else { format!("{percent:.2}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_error_is_not_called_zero() {
+        let texts = [0.0028, 1e-4, 0.99e-4, 0.0].map(percent);
+        assert_eq!(texts, ["0.28", "0.01", "less than 0.01", "less than 0.01"]);
     }
 }

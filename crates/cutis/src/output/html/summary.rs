@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::text::{capitalized, escape};
 use crate::output::report::{Report, Wound, fixed};
+use crate::output::rest_report::percent;
 use crate::run::frames::FrameRow;
 use crate::scene::Scene;
 
@@ -83,7 +84,7 @@ fn state(report: &Report, rows: &[FrameRow]) -> String {
     if let Some(rest) = &report.rest {
         return format!(
             "The body is <b>at rest</b>, with an estimated error of {} % of the displacement.",
-            fixed(100.0 * rest.error, 2)
+            percent(rest.error)
         );
     }
     let [.., before, last] = rows else { return "The run has no frames.".into() };

@@ -4,7 +4,7 @@ use super::table::{Cell, Table};
 use super::text::escape;
 use crate::CostReport;
 use crate::output::report::{MaterialRow, Report, Stage, fixed};
-use crate::output::rest_report::StopReport;
+use crate::output::rest_report::{StopReport, percent};
 use crate::output::step_report::StepReport;
 
 /// What was done, and the states that followed.
@@ -54,7 +54,7 @@ fn states_of_rest(stops: &[StopReport]) -> String {
     for stop in stops {
         let values = [&stop.mid_mm, &stop.sutures_n, &stop.handles_n].into_iter().flatten();
         let row = [Cell::number(fixed(stop.time_s, 3)), Cell::text(stop.done.join(", "))];
-        let end = [Cell::number(fixed(100.0 * stop.error, 2)), Cell::number(stop.cycles)];
+        let end = [Cell::number(percent(stop.error)), Cell::number(stop.cycles)];
         table.add(row.into_iter().chain(values.map(|&value| Cell::number(fixed(value, 2)))).chain(end));
     }
     table.html("<h2>States of rest, one after the other</h2>")
